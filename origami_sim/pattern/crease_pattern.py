@@ -1,0 +1,51 @@
+"""The crease pattern: vertices, polygon faces and assigned edges, before any mechanics."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
+"""FOLD 1.2 edge assignments: border, mountain, valley, flat, unassigned, cut, join."""
+
+
+@dataclass
+class Pattern:
+    """A polygon mesh with crease assignments.
+
+    Attributes:
+        vertices: [V, 3] positions [m].
+        faces: vertex loops, counter-clockwise seen from the top side.
+        edges: [E, 2] vertex pairs; every face side is listed exactly once.
+        assignments: E letters of `ASSIGNMENTS`.
+        fold_angles: [E] target fold angle [rad], valley positive, in [-pi, pi]; nan where not given.
+        stiffness: [E] crease stiffness [N m/rad]; nan where not given.
+        rest_angles: [E] rest angle [rad]; nan where not given.
+        thickness: [F] panel thickness [m]; nan where not given.
+        materials: F material names or None.
+        notes: sentences telling what a reader defaulted, merged or skipped.
+        extra: keys of the source file that mean nothing to us, kept for the round trip.
+    """
+
+    vertices: np.ndarray
+    faces: list[tuple[int, ...]]
+    edges: np.ndarray
+    assignments: list[str]
+    fold_angles: np.ndarray
+    stiffness: np.ndarray
+    rest_angles: np.ndarray
+    thickness: np.ndarray
+    materials: list[str | None]
+    notes: list[str] = field(default_factory=list)
+    extra: dict = field(default_factory=dict)
+
+    @property
+    def vertex_count(self) -> int:
+        return len(self.vertices)
+
+    @property
+    def face_count(self) -> int:
+        return len(self.faces)
+
+    @property
+    def edge_count(self) -> int:
+        return len(self.edges)
