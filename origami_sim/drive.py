@@ -1,0 +1,153 @@
+"""The drive: fields, voltages and loads as functions of time, as data."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from origami_sim.errors import InputError
+
+CHANNELS = (
+    "field_x", "field_y", "field_z",
+    *(f"gradient_{i}{j}" for i in "xyz" for j in "xyz"),
+    "temperature", "load",
+)  # fmt: skip
+"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel: offset + amplitude sin(2 pi frequency t + phase) + scale * series(t).
+
+    All numbers may be arrays with one value per world. The series is linear between its samples.
+
+    Attributes:
+        offset, amplitude: in the channel's SI unit.
+        frequency: [Hz]. phase: [rad].
+        times, values: samples [s] and their values, or None. scale: factor on the series.
+    """
+
+    offset: float | np.ndarray = 0.0
+    amplitude: float | np.ndarray = 0.0
+    frequency: float | np.ndarray = 0.0
+    phase: float | np.ndarray = 0.0
+    times: np.ndarray | None = None
+    values: np.ndarray | None = None
+    scale: float | np.ndarray = 1.0
+
+    def __post_init__(self):
+        if (self.times is None) != (self.values is None):
+            raise InputError("a sampled signal needs both times and values", field="times")
+        for name in ("offset", "amplitude", "frequency", "phase", "scale"):
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise InputError("a signal must be finite", field=name, value=getattr(self, name))
+        if self.times is None or self.values is None:
+            return
+        times, values = np.asarray(self.times, float), np.asarray(self.values, float)
+        if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
+            raise InputError("a sampled signal needs at least two times and as many values", field="values",
+                             value=values.shape, allowed=f"shape {times.shape}")  # fmt: skip
+        if not np.all(np.isfinite(values)):
+            raise InputError("a sampled signal must be finite", field="values", value=float("nan"))
+        back = np.flatnonzero(~(np.diff(times) > 0))
+        if len(back):
+            raise InputError(f"times must increase; sample {back[0] + 1} does not", field="times",
+                             value=float(times[back[0] + 1]))  # fmt: skip
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    def __call__(self, t: float | np.ndarray) -> np.ndarray:
+        """The signal at times t [s]; arrays of worlds and of times broadcast."""
+        value = self.offset + self.amplitude * np.sin(2 * math.pi * np.asarray(self.frequency) * t + self.phase)
+        if self.times is not None:
+            value = value + np.asarray(self.scale) * np.interp(t, self.times, self.values)
+        return np.asarray(value, float)
+
+
+def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
+    """offset + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
+    return Signal(offset=offset, amplitude=amplitude, frequency=frequency, phase=phase)
+
+
+def ramp(final, duration: float, *, start=0.0) -> Signal:
+    """From `start` linearly to `final` within `duration` [s], then constant."""
+    if not duration > 0:
+        raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed="> 0 s")
+    return Signal(offset=start, times=np.array([0.0, duration, 1e9]), values=np.array([0.0, 1.0, 1.0]),
+                  scale=np.subtract(final, start))  # fmt: skip
+
+
+def series(times, values, *, scale=1.0) -> Signal:
+    """Samples with linear interpolation; a run may not last longer than they do."""
+    return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
+
+
+def as_signal(value) -> Signal:
+    return value if isinstance(value, Signal) else Signal(offset=value)
+
+
+class Drive:
+    """Named channels in time, the same object for a simulation and a recording.
+
+    Args:
+        field: flux density at the origin, three numbers or signals [T].
+        gradient: 3 x 3 nested numbers or signals, dB_i/dx_j [T/m].
+        voltage: a number or signal [V], or one for each electrode group.
+        temperature: rise above the rest state [K]. load: load factor [-].
+
+    Raises:
+        InputError: wrong number of components, times that do not increase, values that are not finite.
+    """
+
+    def __init__(self, *, field=(0.0, 0.0, 0.0), gradient=None, voltage=0.0, temperature=0.0, load=0.0):
+        if len(field) != 3:
+            raise InputError("a field has three components", field="field", value=len(field), allowed="3")
+        gradient = gradient if gradient is not None else [[0.0] * 3] * 3
+        if len(gradient) != 3 or any(len(row) != 3 for row in gradient):
+            raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
+        voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
+        values = [*field, *(g for row in gradient for g in row), temperature, load, *voltages]
+        names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
+        self.signals = {n: as_signal(v) for n, v in zip(names, values, strict=True)}
+
+    def __getitem__(self, channel: str) -> Signal:
+        return self.signals[channel]
+
+    def field(self, t: float) -> np.ndarray:
+        """Uniform part of the flux density at time t [T]: shape (3,) or (3, worlds)."""
+        return np.stack(np.broadcast_arrays(*(self.signals[c](t) for c in CHANNELS[:3])))
+
+    @property
+    def end(self) -> float:
+        """Time at which the first sampled channel ends [s]; infinite if none is sampled."""
+        return min((float(s.times[-1]) for s in self.signals.values() if s.times is not None), default=math.inf)
+
+    def require(self, duration: float):
+        """Raises InputError naming the channel if a sampled channel ends before `duration` [s]."""
+        for name, s in self.signals.items():
+            if s.times is not None and s.times[-1] < duration * (1 - 1e-12):
+                raise InputError("the drive ends before the run does", field=name, value=float(s.times[-1]),
+                                 allowed=f"samples up to {duration:g} s")  # fmt: skip
+
+    def slots(self) -> dict[str, np.ndarray]:
+        """Wave parameters as arrays [channel, world or 1], by the kernels' names."""
+        out = {}
+        for name, value in (
+            ("offset", lambda s: s.offset), ("amplitude", lambda s: s.amplitude),
+            ("angular_frequency", lambda s: 2 * math.pi * np.asarray(s.frequency)), ("phase", lambda s: s.phase),
+            ("scale", lambda s: s.scale if s.times is not None else 0.0),
+        ):  # fmt: skip
+            columns = [np.atleast_1d(np.asarray(value(s), float)) for s in self.signals.values()]
+            worlds = max(len(c) for c in columns)
+            out[name] = np.stack([np.broadcast_to(c, (worlds,)) for c in columns])
+        return out
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Knot times of all sampled channels together, and the values of every channel there [channel, knot]."""
+        sampled = [s for s in self.signals.values() if s.times is not None]
+        times = np.unique(np.concatenate([s.times for s in sampled])) if sampled else np.zeros(0)
+        values = np.zeros((len(self.signals), len(times)))
+        for k, s in enumerate(self.signals.values()):
+            if s.times is not None:
+                values[k] = np.interp(times, s.times, s.values)
+        return times, values

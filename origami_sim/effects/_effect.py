@@ -1,0 +1,136 @@
+"""What an effect is: a law, the entities it acts on, its parameters, and the prose that a diagnosis needs.
+
+A law is a `@wp.func` that knows nothing of meshes. Its arguments are found by name, in this order: quantities of the
+family it acts on (`FAMILIES`), drive channels (`DRIVES`), the effect's own memory, the effect's own parameters. So a
+law reads like its formula, and writing one file is all it takes to add an effect.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import warp as wp
+
+scalar = wp.float64
+"""Laws are written in double precision; literals are wrapped, scalar(0.5), because bare floats are single."""
+
+vec3 = wp.vec3d
+
+FAMILIES: dict[str, tuple[str, ...]] = {
+    # axial force, positive in tension
+    "bar": ("length", "rate", "dt"),
+    # moment, positive towards valley (increasing angle); "crease" is a fold line, "bend" a line inside a panel
+    "crease": ("angle", "rate", "dt"),
+    "bend": ("angle", "rate", "dt"),
+    # forces on the three corners, as the rows of a 3 x 3 matrix
+    "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "dt"),
+    # force on the node
+    "node": ("x", "v", "mass", "dt"),
+    # normal: force along the ground's normal, repulsion positive
+    "contact": ("gap", "rate", "dt"),
+    # friction coefficient: contributions are added
+    "coefficient": ("direction", "speed", "axis", "normal_load", "dt"),
+    # tangential force on the contact point
+    "tangent": ("velocity", "normal", "normal_load", "coefficient", "dt"),
+}
+"""Families of entities, and the quantities that each offers to its laws (SI units)."""
+
+HINGES = ("crease", "bend")
+CONTACTS = ("contact", "coefficient", "tangent")
+
+DRIVES = ("field", "gradient", "voltage", "temperature", "load", "time")
+"""Drive quantities: flux density B at the entity [T], its gradient dB_i/dx_j [T/m], voltage of the entity's electrode
+group [V], temperature rise [K], load factor [-], time [s]."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a law, one value per entity and world.
+
+    Args:
+        name: argument name in the law.
+        symbol: symbol used in the formula.
+        unit: SI unit.
+        default: value of an entity for which nothing else is given; chosen so that the effect then does nothing.
+        bounds: physically admissible values, inclusive.
+        meaning: a short description.
+        knots: for a tabulated parameter, the number of values per entity; the law gets the buffer and the index of
+            the first (arguments `buffer` and `<name>`).
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    default: float
+    bounds: tuple[float, float]
+    meaning: str
+    knots: int = 1
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Extra state of a law, per entity and world: `size` numbers (3: passed as a vector), zero at the start."""
+
+    name: str
+    size: int = 1
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect: law, parameters and prose.
+
+    Args:
+        name: unique name, also the file's.
+        family: key of `FAMILIES`.
+        force: the law. With memory it returns the force and then the new memory values.
+        energy: potential energy of one entity [J], or None if the effect has none.
+        conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
+            the energy, and the time-integrated work otherwise.
+        stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
+            bound the time step. None means that the effect never limits it.
+        damping: likewise, the slope against the rate.
+        formula, source, matters, confused_with, separated_by: prose for the catalogue.
+    """
+
+    name: str
+    family: str
+    force: wp.Function
+    parameters: tuple[Parameter, ...]
+    formula: str
+    source: str
+    matters: str
+    confused_with: str = ""
+    separated_by: str = ""
+    energy: wp.Function | None = None
+    conservative: bool = False
+    memory: tuple[Memory, ...] = ()
+    stiffness: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
+    damping: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
+    arguments: tuple[str, ...] = field(init=False)
+    energy_arguments: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self):
+        if self.family not in FAMILIES:
+            raise ValueError(f"effect '{self.name}': unknown family '{self.family}'; allowed: {', '.join(FAMILIES)}")
+        own = {p.name for p in self.parameters} | {m.name for m in self.memory}
+        known = own | set(FAMILIES[self.family]) | set(DRIVES) | {"buffer"}
+        for attribute, law in (("arguments", self.force), ("energy_arguments", self.energy)):
+            names = tuple(inspect.signature(law.func).parameters) if law is not None else ()
+            for name in names:
+                if name not in known:
+                    raise ValueError(
+                        f"effect '{self.name}': its law asks for '{name}', which is neither a parameter, a memory, a "
+                        f"drive nor a quantity of the family '{self.family}'; allowed: {', '.join(sorted(known))}"
+                    )
+            object.__setattr__(self, attribute, names)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Drive quantities that the law depends on."""
+        return tuple(d for d in DRIVES if d in self.arguments or d in self.energy_arguments)
+
+    @property
+    def exchanges_work(self) -> bool:
+        """Whether the energy balance has to integrate this effect's work over time."""
+        return not (self.conservative and not self.drives)

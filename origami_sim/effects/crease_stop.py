@@ -1,0 +1,54 @@
+"""Barrier that keeps a crease from passing through flat-folded."""
+
+import math
+
+import warp as wp
+
+from origami_sim.effects._effect import Effect, Parameter, scalar
+
+
+@wp.func
+def moment(angle: scalar, stop_stiffness: scalar, stop_angle: scalar):
+    value = scalar(0.0)
+    room = scalar(math.pi) - stop_angle
+    over = wp.abs(angle) - stop_angle
+    if over > scalar(0.0):
+        scale = scalar(2.0) / scalar(math.pi) * room
+        u = wp.min(over / scale, scalar(1.5))
+        value = -stop_stiffness * scale * (wp.tan(u) - u)
+        if angle < scalar(0.0):
+            value = -value
+    return value
+
+
+@wp.func
+def energy(angle: scalar, stop_stiffness: scalar, stop_angle: scalar):
+    value = scalar(0.0)
+    room = scalar(math.pi) - stop_angle
+    over = wp.abs(angle) - stop_angle
+    if over > scalar(0.0):
+        scale = scalar(2.0) / scalar(math.pi) * room
+        u = wp.min(over / scale, scalar(1.5))
+        value = stop_stiffness * scale * scale * (-wp.log(wp.cos(u)) - scalar(0.5) * u * u)
+        if over / scale > scalar(1.5):
+            value += stop_stiffness * scale * (wp.tan(u) - u) * (over - scale * u)
+    return value
+
+
+EFFECT = Effect(
+    name="crease_stop",
+    family="crease",
+    force=moment,
+    energy=energy,
+    conservative=True,
+    parameters=(
+        Parameter("stop_stiffness", "ks", "N m/rad", 0.0, (0.0, math.inf), "scale of the barrier's stiffness"),
+        Parameter("stop_angle", "theta_s", "rad", 2.8, (0.1, 3.13), "fold angle, of either sign, where it begins"),
+    ),
+    stiffness=lambda p: p["stop_stiffness"] * 30.0,
+    formula="M = -ks s (tan u - u) sign(theta),  u = (|theta| - theta_s) / s,  s = 2 (pi - theta_s) / pi",
+    source="barrier after Liu & Paulino 2017, made smooth at its onset; straight on beyond u = 1.5",
+    matters="folds that close; patches whose edges touch",
+    confused_with="stiffening crease",
+    separated_by="kink in angle against field; vary the gap",
+)

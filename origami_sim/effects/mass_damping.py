@@ -1,0 +1,25 @@
+"""Drag proportional to mass and velocity, the usual stand-in for air."""
+
+import math
+
+import warp as wp
+
+from origami_sim.effects._effect import Effect, Parameter, scalar
+
+
+@wp.func
+def force(v: wp.vec3d, mass: scalar, decay_rate: scalar):
+    return -decay_rate * mass * v
+
+
+EFFECT = Effect(
+    name="mass_damping",
+    family="node",
+    force=force,
+    parameters=(Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, math.inf), "rate at which free motion decays"),),
+    formula="f = -alpha m v",
+    source="Rayleigh damping, mass part",
+    matters="brings a model to rest; above 1 /s it visibly brakes free flight, which air does not",
+    confused_with="air drag, crease viscosity",
+    separated_by="decay against amplitude and against mode",
+)

@@ -1,0 +1,233 @@
+"""Model (what is constant), Parameters (what can be identified), State (what moves)."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from origami_sim.effects import CONTACTS, get
+from origami_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class Model:
+    """Topology and reference geometry, shared by all worlds.
+
+    Attributes:
+        position: [N, 3] reference positions of the nodes [m].
+        free: [N, 3] 1 where a node may move along that axis, 0 where it is held.
+        bars: [B, 2] nodes.
+        creases: [C, 4] nodes (i, j, k, l): axis j-k, l left and i right of it seen from the top.
+        bends: [Q, 4] the same for the lines that triangulate a panel.
+        triangles: [T, 3] nodes, counter-clockwise seen from the top.
+        triangle_panel: [T] panel of each triangle.
+        contacts: [K, 3] nodes of the triangle that carries the contact point.
+        contact_weights: [K, 3] barycentric weights of the point.
+        contact_offsets: [K] its height above the mid-plane along the panel's normal [m].
+        contact_axes: [K, 3] weights of the three nodes that give the body's forward axis (they sum to zero).
+        electrodes: [C + Q] electrode group of each hinge.
+        effects: names of the effects that are switched on, in the order of summation.
+        names: labels by family ("crease", "panel", "contact", "node"), for reports.
+    """
+
+    position: np.ndarray
+    free: np.ndarray
+    bars: np.ndarray
+    creases: np.ndarray
+    bends: np.ndarray
+    triangles: np.ndarray
+    triangle_panel: np.ndarray
+    contacts: np.ndarray
+    contact_weights: np.ndarray
+    contact_offsets: np.ndarray
+    contact_axes: np.ndarray
+    electrodes: np.ndarray
+    effects: tuple[str, ...]
+    names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def count(self, family: str) -> int:
+        """Number of entities of a family of effects."""
+        if family in CONTACTS:
+            return len(self.contacts)
+        return len({
+            "bar": self.bars, "crease": self.creases, "bend": self.bends, "triangle": self.triangles,
+            "node": self.position,
+        }[family])  # fmt: skip
+
+    def name(self, family: str, i: int) -> str:
+        """Label of an entity."""
+        names = self.names.get(family, ())
+        return names[i] if i < len(names) else f"{family} {i}"
+
+    def with_effects(self, *names: str, without: tuple[str, ...] = ()) -> "Model":
+        """The same model with these effects added (or removed)."""
+        for n in (*names, *without):
+            get(n)
+        kept = tuple(e for e in self.effects if e not in without)
+        added = tuple(n for n in names if n not in kept)
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Model(**{**values, "effects": kept + added})
+
+    @property
+    def hash(self) -> str:
+        """Digest of everything in the model."""
+        h = hashlib.sha256()
+        for f in fields(self):
+            value = getattr(self, f.name)
+            h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
+        return h.hexdigest()[:16]
+
+
+class Parameters:
+    """Parameter arrays by (owner, name): shape [entity, world] or [entity, 1], tables [entity, world, knot].
+
+    Owners are the effects that are switched on, "inertia" (mass [kg] per node) and "plane" (the ground's tilt [rad],
+    azimuth [rad], height [m] and reach [m], the gap below which contact laws are evaluated).
+    """
+
+    def __init__(self, model: Model, values: Mapping[tuple[str, str], np.ndarray] | None = None):
+        self._values: dict[tuple[str, str], np.ndarray] = {
+            ("inertia", "mass"): np.ones((len(model.position), 1)),
+            **{("plane", n): np.zeros((1, 1)) for n in ("tilt", "azimuth", "height", "reach")},
+        }
+        for name in model.effects:
+            effect = get(name)
+            for p in effect.parameters:
+                shape = (model.count(effect.family), 1) + ((p.knots,) if p.knots > 1 else ())
+                self._values[name, p.name] = np.full(shape, p.default)
+        for (owner, name), value in (values or {}).items():
+            self.set(owner, name, value)
+
+    def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
+        if key not in self._values:
+            owned = sorted(n for o, n in self._values if o == key[0])
+            allowed = ", ".join(owned) if owned else ", ".join(sorted({o for o, _ in self._values}))
+            raise InputError("there is no such parameter", field=".".join(key), allowed=allowed)
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[tuple[str, str]]:
+        return iter(self._values)
+
+    def of(self, owner: str) -> dict[str, np.ndarray]:
+        """All parameters of one owner by name."""
+        return {n: v for (o, n), v in self._values.items() if o == owner}
+
+    def set(self, owner: str, name: str, value, entities=None) -> "Parameters":
+        """Sets values for all entities or for some; a last axis of another length than 1 makes worlds differ.
+
+        Raises:
+            InputError: unknown parameter, wrong shape, values out of bounds or not finite.
+        """
+        old = self[owner, name]
+        knots = old.shape[2:]
+        new = np.asarray(value, float)
+        if not np.all(np.isfinite(new)):
+            raise InputError("a parameter must be finite", field=f"{owner}.{name}", value=value)
+        self._check_bounds(owner, name, new)
+        tail = 1 + len(knots)
+        if new.ndim < 1 + tail:  # scalar, or one value (or table) per entity
+            new = new.reshape((-1, 1, *knots)) if new.ndim else np.full((1, 1), float(new))
+        index = np.arange(len(old)) if entities is None else np.atleast_1d(entities)
+        try:
+            worlds = max(old.shape[1], new.shape[1])
+            out = np.array(np.broadcast_to(old, (len(old), worlds, *knots)))
+            out[index] = np.broadcast_to(new, (len(index), worlds, *knots))
+        except (ValueError, IndexError):
+            raise InputError("a parameter array has the wrong shape", field=f"{owner}.{name}", value=np.shape(value),
+                             allowed=f"broadcastable to ({len(index)}, worlds)") from None  # fmt: skip
+        self._values[owner, name] = out
+        return self
+
+    @staticmethod
+    def _check_bounds(owner: str, name: str, value: np.ndarray):
+        low, high = 0.0, np.inf
+        if owner not in ("inertia", "plane"):
+            low, high = next(p.bounds for p in get(owner).parameters if p.name == name)
+        elif owner == "plane":
+            low = -np.inf
+        elif np.any(value <= 0):
+            raise InputError("a mass must be positive", field="inertia.mass", value=float(value.min()), allowed="> 0 kg")
+        if np.any(value < low) or np.any(value > high):
+            bad = float(value[(value < low) | (value > high)].flat[0])
+            raise InputError("a parameter is out of bounds", field=f"{owner}.{name}", value=bad,
+                             allowed=f"{low:g} to {high:g}")  # fmt: skip
+
+    @property
+    def worlds(self) -> int:
+        """Number of worlds that the arrays describe (1 if none differs)."""
+        return max(v.shape[1] for v in self._values.values())
+
+    def copy(self) -> "Parameters":
+        out = object.__new__(Parameters)
+        out._values = {k: v.copy() for k, v in self._values.items()}
+        return out
+
+    def for_model(self, model: Model) -> "Parameters":
+        """The same values for a model with other effects; new effects get their defaults."""
+        out = Parameters(model)
+        out._values.update({k: v for k, v in self._values.items() if k in out._values})
+        return out
+
+    @property
+    def hash(self) -> str:
+        h = hashlib.sha256()
+        for key in sorted(self._values):
+            h.update(repr(key).encode() + self._values[key].tobytes())
+        return h.hexdigest()[:16]
+
+
+@dataclass
+class State:
+    """What moves, for a batch of W worlds.
+
+    Attributes:
+        x, v: [N, W, 3] positions [m] and velocities [m/s].
+        a: [N, W, 3] accelerations of the last force evaluation [m/s^2].
+        angles: [C + Q, W] continuous hinge angles, creases first [rad].
+        memory: [M, W] extra state of the effects.
+        work: [E, W] work done so far by each effect that exchanges it [J].
+        step: number of steps taken; -1 before the first force evaluation.
+        status: [2, W] step and node at which a world failed, -1 while it is sound.
+    """
+
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    angles: np.ndarray
+    memory: np.ndarray
+    work: np.ndarray
+    step: int
+    status: np.ndarray
+
+    @classmethod
+    def at_rest(cls, model: Model, worlds: int = 1, position: np.ndarray | None = None) -> "State":
+        """The reference state, or that of given positions ([N, 3] or [N, W, 3]), without motion."""
+        start = model.position if position is None else np.asarray(position, float)
+        if start.ndim == 2:
+            start = start[:, None, :]
+        x = np.array(np.broadcast_to(start, (len(model.position), worlds, 3)))
+        effects = [get(e) for e in model.effects]
+        rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
+        hinges = np.concatenate([model.creases, model.bends])
+        angles = dihedral_angles(x, hinges)
+        return cls(x=x, v=np.zeros_like(x), a=np.zeros_like(x), angles=angles, memory=np.zeros((rows, worlds)),
+                   work=np.zeros((len(effects), worlds)), step=-1, status=np.full((2, worlds), -1, np.int32))  # fmt: skip
+
+    def copy(self) -> "State":
+        return State(*(v.copy() if isinstance(v, np.ndarray) else v for v in (getattr(self, f.name) for f in fields(self))))
+
+    @property
+    def worlds(self) -> int:
+        return self.x.shape[1]
+
+
+def dihedral_angles(x: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+    """Fold angles in (-pi, pi] [rad] of hinges [H, 4] at positions [N, ..., 3]: shape [H, ...]."""
+    if len(hinges) == 0:
+        return np.zeros((0, *x.shape[1:-1]))
+    i, j, k, m = (x[hinges[:, c]] for c in range(4))
+    e = k - j
+    n1, n2 = np.cross(i - j, e), np.cross(e, m - j)
+    length = np.linalg.norm(e, axis=-1)
+    return np.arctan2((np.cross(n1, n2) * e).sum(-1) / length, (n1 * n2).sum(-1))

@@ -1,0 +1,188 @@
+"""A batch of worlds on a device: the arrays behind the kernels, and the three things asked of them."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.solve.compose import compose
+
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Forces and energies of one instant, by effect.
+
+    Attributes:
+        forces: effect name -> [N, W, 3] force on each node [N].
+        energies: effect name -> [W] potential energy [J], for effects that have one.
+        kinetic: [W] kinetic energy [J].
+        angles: [C + Q, W] continuous hinge angles [rad].
+        gaps: [K, W] height of each contact point above the ground [m].
+    """
+
+    forces: dict[str, np.ndarray]
+    energies: dict[str, np.ndarray]
+    kinetic: np.ndarray
+    angles: np.ndarray
+    gaps: np.ndarray
+
+
+def default_threads() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Batch:
+    """Model, parameters, drive and state of W worlds as device arrays.
+
+    Args:
+        model, parameters, drive, state: what to simulate; the state's worlds give W.
+        device: warp device, "cpu" or "cuda:0".
+        threads: on the CPU, how many threads share the worlds (default: all cores). Results do not depend on it.
+
+    Raises:
+        InputError: parameters or drive for another number of worlds, too few electrode groups, no such device.
+    """
+
+    def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State, *, device: str = "cpu",
+                 threads: int | None = None):  # fmt: skip
+        try:
+            self.device = wp.get_device(device)
+        except (ValueError, RuntimeError):
+            known = ", ".join(d.alias for d in wp.get_devices())
+            raise InputError("there is no such device", field="device", value=device, allowed=known) from None
+        self.model, self.program = model, compose(model.effects)
+        self.worlds = state.worlds
+        self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
+        # rows a multiple of 4 KiB apart would all fall into one cache set
+        self._stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
+        self.step = state.step
+
+        def constant(a, dtype):
+            return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
+
+        groups = len(drive.signals) - 14
+        if len(model.electrodes) and model.electrodes.max(initial=0) >= groups:
+            raise InputError("the drive has too few electrode groups", field="voltage", value=groups,
+                             allowed=f">= {int(model.electrodes.max()) + 1}")  # fmt: skip
+        hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
+        buffer, layout = self._pack(parameters, drive)
+        times, values = drive.samples()
+        sizes = [(e, m) for e in self.program.effects for m in e.memory]
+        rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
+        self._constants = [
+            constant(model.free, wp.vec3d), constant(model.bars.reshape(-1, 2), wp.vec2i), constant(hinges, wp.vec4i),
+            constant(model.electrodes, wp.int32), constant(model.triangles.reshape(-1, 3), wp.vec3i),
+            constant(model.contacts.reshape(-1, 3), wp.vec3i), constant(model.contact_weights.reshape(-1, 3), wp.vec3d),
+            constant(model.contact_offsets, wp.float64), constant(model.contact_axes.reshape(-1, 3), wp.vec3d),
+            len(model.creases), constant(buffer, wp.float64), constant(layout, wp.int32),
+            constant(times, wp.float64), constant(values, wp.float64), constant(rows[:-1] if len(sizes) else [0], wp.int32),
+        ]  # fmt: skip
+        self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
+        self._f = wp.zeros_like(self._x)
+        self._angles, self._memory, self._work = (
+            self._upload(s, wp.float64) for s in (state.angles, state.memory, state.work)
+        )
+        self._status = self._upload(state.status, wp.int32)
+        self._mass = parameters["inertia", "mass"]
+
+    def _pack(self, parameters: Parameters, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
+        """All parameters in one buffer, and per slot its offset and its strides over entities and over worlds."""
+        waves = drive.slots()
+        blocks, layout, offset = [], [], 0
+        for owner, name in self.program.slots:
+            a = waves[name] if owner == "drive" else parameters[owner, name]
+            worlds, knots = a.shape[1], int(np.prod(a.shape[2:]))
+            if worlds not in (1, self.worlds):
+                raise InputError("a parameter is given for another number of worlds than the state has",
+                                 field=f"{owner}.{name}", value=worlds, allowed=f"1 or {self.worlds}")  # fmt: skip
+            blocks.append(np.ascontiguousarray(a, float).ravel())
+            layout.append((offset, worlds * knots, knots if worlds > 1 else 0))
+            offset += a.size
+        return np.concatenate(blocks), np.array(layout, np.int32)
+
+    def _upload(self, a: np.ndarray, dtype) -> wp.array:
+        tail = a.shape[2:]
+        padded = np.zeros((max(len(a), 1), self._stride, *tail), a.dtype)
+        padded[: len(a), : self.worlds] = a
+        return wp.array(padded, dtype=dtype, device=self.device)
+
+    def _download(self, a: wp.array, rows: int) -> np.ndarray:
+        return a.numpy()[:rows, : self.worlds].copy()
+
+    def _launch(self, kernel: wp.Kernel, outputs: list):
+        """Runs a kernel over all worlds, split over threads on the CPU (a launch releases the interpreter lock)."""
+        inputs = [*self._constants, self._x, self._v, self._angles, self._memory]
+
+        def run(lo: int, hi: int):
+            wp.launch(kernel, dim=hi - lo, inputs=[*inputs, *(lo if o is _FIRST else o for o in outputs)],
+                      device=self.device)  # fmt: skip
+
+        if self.threads == 1:
+            run(0, self.worlds)
+        else:
+            wp.load_module(kernel.module, device=self.device)  # compile before the threads meet
+            cuts = np.linspace(0, self.worlds, self.threads + 1).astype(int)
+            with ThreadPoolExecutor(self.threads) as pool:
+                list(pool.map(run, cuts[:-1], cuts[1:]))
+
+    def advance(self, steps: int, dt: float, speed_limit: float):
+        """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""
+        self._launch(self.program.rollout, [self._a, self._f, self._work, self._status, _FIRST, self.step, steps,
+                                            wp.float64(dt), wp.float64(speed_limit)])  # fmt: skip
+        self.step = max(self.step, 0) + steps
+
+    def total_force(self, time: float) -> np.ndarray:
+        """Sum of all effects on every node, [N, W, 3] [N], at the state's positions and velocities."""
+        self._launch(self.program.total, [self._f, _FIRST, wp.float64(time)])
+        return self._download(self._f, len(self.model.position))
+
+    def evaluate(self, time: float) -> Evaluation:
+        """Forces and energies by effect at time [s]."""
+        m, effects = self.model, self.program.effects
+        n, k = len(m.position), len(m.contacts)
+        forces = wp.zeros((len(effects), n, self._stride), dtype=wp.vec3d, device=self.device)
+        energies = wp.zeros((len(effects), self._stride), dtype=wp.float64, device=self.device)
+        gaps = wp.full((max(k, 1), self._stride), np.inf, dtype=wp.float64, device=self.device)
+        self._launch(self.program.evaluate, [forces, energies, gaps, _FIRST, wp.float64(time)])
+        f, e, x = forces.numpy()[:, :, : self.worlds], self._download(energies, len(effects)), self._download(self._v, n)
+        return Evaluation(
+            forces={effect.name: f[i] for i, effect in enumerate(effects)},
+            energies={effect.name: e[i] for i, effect in enumerate(effects) if effect.energy is not None},
+            kinetic=0.5 * (self._mass * (x**2).sum(-1)).sum(0),
+            angles=self._download(self._angles, len(m.creases) + len(m.bends)),
+            gaps=self._download(gaps, k),
+        )
+
+    def place(self, x: np.ndarray, angles: np.ndarray):
+        """Overwrites positions [N, W, 3] and the angles from which they are continued [C + Q, W]."""
+        self._x.assign(self._upload(x, wp.vec3d))
+        self._angles.assign(self._upload(angles, wp.float64))
+
+    def state(self) -> State:
+        """The present state, copied to the host."""
+        m = self.model
+        n, rows = len(m.position), sum(d.size * m.count(e.family) for e in self.program.effects for d in e.memory)
+        return State(
+            x=self._download(self._x, n), v=self._download(self._v, n), a=self._download(self._a, n),
+            angles=self._download(self._angles, len(m.creases) + len(m.bends)),
+            memory=self._download(self._memory, rows), work=self._download(self._work, len(self.program.effects)),
+            step=self.step, status=self._download(self._status, 2),
+        )  # fmt: skip
+
+
+_FIRST = object()
+"""Placeholder for the first world of a launch."""
+
+
+def forces(model: Model, parameters: Parameters, drive: Drive, state: State, time: float, **options) -> Evaluation:
+    """Forces and energies of a state, one named array per effect."""
+    return Batch(model, parameters, drive, state, **options).evaluate(time)
+
+

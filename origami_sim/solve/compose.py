@@ -1,0 +1,499 @@
+"""Writes the kernels of a set of effects: the fused rollout, and the same laws reported effect by effect.
+
+A rollout runs the whole time loop of one world in one thread. Its body is the list of laws that are switched on, each
+called with the arguments that it names, so that an effect costs nothing when it is off and nobody maintains a kernel
+by hand. The source is composed as text (see `Program.source`), compiled once per set of effects and cached by warp.
+"""
+
+import functools
+import hashlib
+import linecache
+from dataclasses import dataclass
+
+import warp as wp
+
+from origami_sim import kinematics
+from origami_sim.effects import CONTACTS, HINGES, Effect, get
+
+FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
+"""First drive channel of each quantity; voltages of further electrode groups follow."""
+
+FIXED_SLOTS = (
+    ("inertia", "mass"),
+    ("plane", "tilt"), ("plane", "azimuth"), ("plane", "height"), ("plane", "reach"),
+    ("drive", "offset"), ("drive", "amplitude"), ("drive", "angular_frequency"), ("drive", "phase"), ("drive", "scale"),
+)  # fmt: skip
+"""Parameters that every model has besides those of its effects."""
+
+_ARGUMENTS = """
+    mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
+    electrodes: wp.array(dtype=wp.int32), triangles: wp.array(dtype=wp.vec3i),
+    contacts: wp.array(dtype=wp.vec3i), weights: wp.array(dtype=vec3), offsets: wp.array(dtype=scalar),
+    axes: wp.array(dtype=vec3), crease_count: int,
+    P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
+    series_times: wp.array(dtype=scalar), series_values: wp.array2d(dtype=scalar),
+    memory_rows: wp.array(dtype=wp.int32),
+    X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
+    memory: wp.array2d(dtype=scalar),
+"""
+
+_ROLLOUT_HEAD = """
+@wp.kernel(enable_backward=False)
+def rollout({arguments}
+    A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
+    status: wp.array2d(dtype=wp.int32),
+    first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
+):
+    w = first_world + wp.tid()
+    if status[0, w] >= 0:
+        return
+{hoist}
+    half_dt = scalar(0.5) * dt
+    limit = speed_limit * speed_limit
+    fastest = int(-1)
+    # one pass more than steps: at the start of a run the first pass only finds the acceleration
+    begin = int(0)
+    if first_step < 0:
+        begin = int(-1)
+    start = wp.max(first_step, 0)
+    for s in range(begin, steps):
+        h = dt
+        half = half_dt
+        if s < 0:
+            h = scalar(0.0)
+            half = scalar(0.0)
+        time = dt * scalar(start + s + 1)
+        # kick and drift; v becomes the prediction of the velocity at the end of the step
+        for n in range(mask.shape[0]):
+            ahead = V[n, w] + half * A[n, w]
+            X[n, w] = X[n, w] + h * ahead
+            V[n, w] = ahead + half * A[n, w]
+            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+{body}
+        # second kick, with the new acceleration
+        for n in range(mask.shape[0]):
+            new = wp.cw_mul(mask[n], F[n, w]) / {mass}
+            V[n, w] = V[n, w] + half * (new - A[n, w])
+            A[n, w] = new
+            speed = wp.dot(V[n, w], V[n, w])
+            if not (speed <= limit):  # also true for nan
+                fastest = n
+        if fastest >= 0:
+            status[0, w] = start + s + 1
+            status[1, w] = fastest
+            break
+"""
+
+_EVALUATE_HEAD = """
+@wp.kernel(enable_backward=False)
+def evaluate({arguments}
+    forces: wp.array3d(dtype=vec3), energies: wp.array2d(dtype=scalar), gaps: wp.array2d(dtype=scalar),
+    first_world: int, time: scalar,
+):
+    w = first_world + wp.tid()
+    h = scalar(0.0)
+{hoist}
+{body}
+"""
+
+_TOTAL_HEAD = """
+@wp.kernel(enable_backward=False)
+def total({arguments}
+    F: wp.array2d(dtype=vec3), first_world: int, time: scalar,
+):
+    w = first_world + wp.tid()
+    h = scalar(0.0)
+    for n in range(mask.shape[0]):
+        F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+{hoist}
+{body}
+"""
+
+
+@wp.func
+def wave(
+    P: wp.array(dtype=wp.float64), layout: wp.array2d(dtype=wp.int32), first: int, k: int, w: int,
+    series_times: wp.array(dtype=wp.float64), series_values: wp.array2d(dtype=wp.float64), t: wp.float64,
+):  # fmt: skip
+    """Drive channel k at time t: offset + amplitude sin(omega t + phase) + scale * sampled series."""
+    value = P[layout[first, 0] + k * layout[first, 1] + w * layout[first, 2]]
+    amplitude = P[layout[first + 1, 0] + k * layout[first + 1, 1] + w * layout[first + 1, 2]]
+    if amplitude != wp.float64(0.0):
+        omega = P[layout[first + 2, 0] + k * layout[first + 2, 1] + w * layout[first + 2, 2]]
+        phase = P[layout[first + 3, 0] + k * layout[first + 3, 1] + w * layout[first + 3, 2]]
+        value += amplitude * wp.sin(omega * t + phase)
+    knots = series_times.shape[0]
+    if knots > 1:
+        scale = P[layout[first + 4, 0] + k * layout[first + 4, 1] + w * layout[first + 4, 2]]
+        if scale != wp.float64(0.0):
+            i = wp.clamp(wp.lower_bound(series_times, t), 1, knots - 1)
+            t0 = series_times[i - 1]
+            s = wp.clamp((t - t0) / (series_times[i] - t0), wp.float64(0.0), wp.float64(1.0))
+            value += scale * (series_values[k, i - 1] + s * (series_values[k, i] - series_values[k, i - 1]))
+    return value
+
+
+class _Text:
+    """Lines of source at a current depth."""
+
+    def __init__(self, depth: int):
+        self.depth, self.lines = depth, []
+
+    def __call__(self, line: str = "", shift: int = 0):
+        self.lines.append("    " * (self.depth + shift) + line if line else "")
+
+    def __str__(self):
+        return "\n".join(self.lines)
+
+
+@dataclass(frozen=True)
+class Program:
+    """The compiled kernels of an ordered set of effects.
+
+    Attributes:
+        effects: the effects, in the order of their summation.
+        slots: (owner, parameter) of every parameter slot of the buffer.
+        source: the kernels as text.
+        rollout, evaluate, total: warp kernels.
+    """
+
+    effects: tuple[Effect, ...]
+    slots: tuple[tuple[str, str], ...]
+    source: str
+    rollout: wp.Kernel
+    evaluate: wp.Kernel
+    total: wp.Kernel
+
+
+class _Composer:
+    def __init__(self, effects: tuple[Effect, ...]):
+        self.effects = effects
+        self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
+        self.index = {s: i for i, s in enumerate(self.slots)}
+        self.drives = {d for e in effects for d in e.drives}
+
+    def family(self, *names: str) -> list[Effect]:
+        return [e for e in self.effects if e.family in names]
+
+    def number(self, effect: Effect) -> int:
+        return self.effects.index(effect)
+
+    def value(self, owner: str, name: str, entity: str) -> str:
+        i = self.index[owner, name]
+        return f"P[o{i} + {entity} * e{i}]"
+
+    def hoist(self) -> str:
+        """Parameter addresses of this world, read once."""
+        t = _Text(1)
+        for i, (owner, _) in enumerate(self.slots):
+            if owner != "drive":
+                t(f"o{i} = layout[{i}, 0] + w * layout[{i}, 2]")
+                t(f"e{i} = layout[{i}, 1]")
+        for i, (e, m) in enumerate((e, m) for e in self.effects for m in e.memory):
+            t(f"m_{e.name}_{m.name} = memory_rows[{i}]")
+        if self.family(*CONTACTS):
+            tilt, azimuth = self.value("plane", "tilt", "0"), self.value("plane", "azimuth", "0")
+            t(f"up = kinematics.plane_normal({tilt}, {azimuth})")
+            t(f"plane_height = {self.value('plane', 'height', '0')}")
+            t(f"reach = {self.value('plane', 'reach', '0')}")
+        return str(t)
+
+    def channel(self, k: str) -> str:
+        first = self.index["drive", "offset"]
+        return f"wave(P, layout, {first}, {k}, w, series_times, series_values, time)"
+
+    def call(self, effect: Effect, which: str, entity: str) -> str:
+        arguments = effect.arguments if which == "force" else effect.energy_arguments
+        own = {p.name: p for p in effect.parameters}
+        memory = {m.name for m in effect.memory}
+        given = []
+        for name in arguments:
+            if name in own:
+                slot = self.index[effect.name, name]
+                table = own[name].knots > 1
+                given.append(f"o{slot} + {entity} * e{slot}" if table else self.value(effect.name, name, entity))
+            elif name in memory:
+                given.append(f"{effect.name}_{name}")
+            elif name == "buffer":
+                given.append("P")
+            elif name == "dt":
+                given.append("h")
+            else:
+                given.append(name)
+        return f"{effect.name}_{which}({', '.join(given)})"
+
+    def apply_law(self, t: _Text, effect: Effect, entity: str, mode: str, result: str):
+        """Calls a force law with its memory read before and, in a rollout, written after."""
+        outputs = [result]
+        writes = []
+        for m in effect.memory:
+            row = f"m_{effect.name}_{m.name} + {m.size} * {entity}"
+            local = f"{effect.name}_{m.name}"
+            if m.size == 1:
+                t(f"{local} = memory[{row}, w]")
+                writes.append(f"memory[{row}, w] = {local}_new")
+            else:
+                t(f"{local} = vec3(memory[{row}, w], memory[{row} + 1, w], memory[{row} + 2, w])")
+                writes += [f"memory[{row} + {i}, w] = {local}_new[{i}]" for i in range(3)]
+            outputs.append(f"{local}_new")
+        t(f"{', '.join(outputs)} = {self.call(effect, 'force', entity)}")
+        if mode == "rollout":
+            for line in writes:
+                t(line)
+
+    def add_energy(self, t: _Text, effect: Effect, entity: str, mode: str):
+        if mode == "evaluate" and effect.energy is not None:
+            i = self.number(effect)
+            t(f"energies[{i}, w] = energies[{i}, w] + {self.call(effect, 'energy', entity)}")
+
+    def add_work(self, t: _Text, effect: Effect, power: str, mode: str):
+        if mode == "rollout" and effect.exchanges_work:
+            t(f"work_{effect.name} += h * ({power})")
+
+    def scatter(self, t: _Text, effect: Effect, node: str, force: str, mode: str):
+        """Adds to the node: to the effect's own array when reporting, to the sum otherwise."""
+        target = f"forces[{self.number(effect)}, {node}, w]" if mode == "evaluate" else f"F[{node}, w]"
+        t(f"{target} = {target} + {force}")
+
+    def body(self, mode: str) -> str:
+        """The force evaluation. Modes: 'rollout', 'total' (summed) and 'evaluate' (by effect)."""
+        t = _Text(2 if mode == "rollout" else 1)
+        if "field" in self.drives:
+            t(f"uniform_field = vec3({', '.join(self.channel(str(FIELD + i)) for i in range(3))})")
+        if "gradient" in self.drives:
+            t(f"gradient = wp.mat33d({', '.join(self.channel(str(GRADIENT + i)) for i in range(9))})")
+        if "temperature" in self.drives:
+            t(f"temperature = {self.channel(str(TEMPERATURE))}")
+        if "load" in self.drives:
+            t(f"load = {self.channel(str(LOAD))}")
+        for e in self.effects:
+            if mode == "rollout" and e.exchanges_work:
+                t(f"work_{e.name} = scalar(0.0)")
+        self._nodes(t, mode)
+        self._bars(t, mode)
+        for family in HINGES:
+            self._hinges(t, mode, family)
+        self._triangles(t, mode)
+        self._contacts(t, mode)
+        for i, e in enumerate(self.effects):
+            if mode == "rollout" and e.exchanges_work:
+                t(f"work[{i}, w] = work[{i}, w] + work_{e.name}")
+        return str(t)
+
+    def _nodes(self, t: _Text, mode: str):
+        effects = self.family("node")
+        if not effects:
+            return
+        t("for n in range(mask.shape[0]):")
+        t.depth += 1
+        t(f"mass = {self.value('inertia', 'mass', 'n')}")
+        t("x = X[n, w]")
+        t("v = V[n, w]")
+        for e in effects:
+            i = self.number(e)
+            self.apply_law(t, e, "n", mode, f"F{i}")
+            self.add_energy(t, e, "n", mode)
+            self.scatter(t, e, "n", f"F{i}", mode)
+            self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
+        t.depth -= 1
+
+    def _bars(self, t: _Text, mode: str):
+        effects = self.family("bar")
+        if not effects:
+            return
+        t("for b in range(bars.shape[0]):")
+        t.depth += 1
+        t("p = bars[b][0]")
+        t("q = bars[b][1]")
+        t("span = X[q, w] - X[p, w]")
+        t("length = wp.length(span)")
+        t("along = span / length")
+        if any("rate" in e.arguments or e.exchanges_work for e in effects):
+            t("rate = wp.dot(along, V[q, w] - V[p, w])")
+        if mode != "evaluate":
+            t("tension = scalar(0.0)")
+        for e in effects:
+            i = self.number(e)
+            self.apply_law(t, e, "b", mode, f"T{i}")
+            self.add_energy(t, e, "b", mode)
+            self.add_work(t, e, f"-T{i} * rate", mode)
+            if mode == "evaluate":
+                self.scatter(t, e, "p", f"T{i} * along", mode)
+                self.scatter(t, e, "q", f"-T{i} * along", mode)
+            else:
+                t(f"tension += T{i}")
+        if mode != "evaluate":
+            t("pull = tension * along")
+            t("F[p, w] = F[p, w] + pull")
+            t("F[q, w] = F[q, w] - pull")
+        t.depth -= 1
+
+    def _hinges(self, t: _Text, mode: str, family: str):
+        effects = self.family(family)
+        if not effects:
+            return
+        # rows of hinges: creases first, then bending lines; parameters count within their family
+        count, shift = ("crease_count", "0") if family == "crease" else ("hinges.shape[0] - crease_count", "crease_count")
+        t(f"for c in range({count}):")
+        t.depth += 1
+        t(f"r = c + {shift}")
+        for i, node in enumerate("ijkl"):
+            t(f"{node} = hinges[r][{i}]")
+        t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
+        t("angle = kinematics.unwrap(g.angle, angles[r, w])")
+        t("angles[r, w] = angle")
+        if any("rate" in e.arguments or e.exchanges_work for e in effects):
+            t("rate = " + " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl"))
+        if any("voltage" in e.drives for e in effects):
+            t(f"voltage = {self.channel(f'{VOLTAGE} + electrodes[r]')}")
+        if mode != "evaluate":
+            t("moment = scalar(0.0)")
+        for e in effects:
+            i = self.number(e)
+            self.apply_law(t, e, "c", mode, f"M{i}")
+            self.add_energy(t, e, "c", mode)
+            self.add_work(t, e, f"M{i} * rate", mode)
+            if mode == "evaluate":
+                for node in "ijkl":
+                    self.scatter(t, e, node, f"M{i} * g.g{node}", mode)
+            else:
+                t(f"moment += M{i}")
+        if mode != "evaluate":
+            for node in "ijkl":
+                t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
+        t.depth -= 1
+
+    def _triangles(self, t: _Text, mode: str):
+        effects = self.family("triangle")
+        if not effects:
+            return
+        t("for c in range(triangles.shape[0]):")
+        t.depth += 1
+        for i in (1, 2, 3):
+            t(f"n{i} = triangles[c][{i - 1}]")
+            t(f"x{i} = X[n{i}, w]")
+            t(f"v{i} = V[n{i}, w]")
+        if "field" in self.drives:
+            local = "uniform_field"
+            if "gradient" in self.drives:
+                local += " + gradient * ((x1 + x2 + x3) / scalar(3.0))"
+            t(f"field = {local}")
+        for e in effects:
+            i = self.number(e)
+            self.apply_law(t, e, "c", mode, f"R{i}")
+            self.add_energy(t, e, "c", mode)
+            for k in (1, 2, 3):
+                self.scatter(t, e, f"n{k}", f"kinematics.corner(R{i}, {k - 1})", mode)
+            if e.exchanges_work:
+                corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
+                self.add_work(t, e, " + ".join(corners), mode)
+        t.depth -= 1
+
+    def _contacts(self, t: _Text, mode: str):
+        effects = self.family(*CONTACTS)
+        if not effects:
+            return
+        t("for c in range(contacts.shape[0]):")
+        t.depth += 1
+        for i in (1, 2, 3):
+            t(f"n{i} = contacts[c][{i - 1}]")
+        t("share = weights[c]")
+        t("off = offsets[c]")
+        t("at = share[0] * X[n1, w] + share[1] * X[n2, w] + share[2] * X[n3, w]")
+        t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
+        t("at = at + off * patch.n")
+        t("gap = wp.dot(up, at) - plane_height")
+        if mode == "evaluate":
+            t("gaps[c, w] = gap")
+        t("if gap < reach:")
+        t.depth += 1
+        # velocity of the contact point: d(normal) = -sum (n . dx_i) grad_i
+        t("velocity = share[0] * V[n1, w] + share[1] * V[n2, w] + share[2] * V[n3, w]")
+        t(
+            "velocity = velocity - off * ("
+            + " + ".join(f"wp.dot(patch.n, V[n{i}, w]) * patch.g{i}" for i in (1, 2, 3))
+            + ")"
+        )
+        t("rate = wp.dot(up, velocity)")
+        t("normal_load = scalar(0.0)")
+        t("push = vec3(scalar(0.0), scalar(0.0), scalar(0.0))")
+        for e in self.family("contact"):
+            i = self.number(e)
+            self.apply_law(t, e, "c", mode, f"N{i}")
+            self.add_energy(t, e, "c", mode)
+            t(f"normal_load += wp.max(N{i}, scalar(0.0))")
+            self.add_work(t, e, f"N{i} * rate", mode)
+            self._contact_force(t, e, f"N{i} * up", mode)
+        tangents = self.family("tangent")
+        if tangents:
+            # the coefficient may depend on the direction in which the foot slides or is about to slide
+            t("normal = up")
+            t("velocity = velocity - up * rate")
+            t("speed = wp.length(velocity)")
+            if self.family("coefficient"):
+                t("axis = kinematics.unit_or_zero(" + " + ".join(f"axes[c][{i - 1}] * X[n{i}, w]" for i in (1, 2, 3)) + ")")
+                row = f"m_{tangents[0].name}_{tangents[0].memory[0].name} + 3 * c"
+                t(f"strain = vec3(memory[{row}, w], memory[{row} + 1, w], memory[{row} + 2, w])")
+                t("direction = kinematics.unit_or_zero(strain + velocity * h)")
+            t("coefficient = scalar(0.0)")
+            for e in self.family("coefficient"):
+                i = self.number(e)
+                self.apply_law(t, e, "c", mode, f"C{i}")
+                t(f"coefficient += C{i}")
+            for e in tangents:
+                i = self.number(e)
+                self.apply_law(t, e, "c", mode, f"S{i}")
+                self.add_work(t, e, f"wp.dot(S{i}, velocity)", mode)
+                self._contact_force(t, e, f"S{i}", mode)
+        if mode != "evaluate":
+            for i in (1, 2, 3):
+                t(f"F[n{i}, w] = F[n{i}, w] + share[{i - 1}] * push - (off * wp.dot(push, patch.g{i})) * patch.n")
+        t.depth -= 1
+        resets = [m for e in tangents for m in e.memory]
+        if resets and mode == "rollout":
+            t("else:")
+            for e in tangents:
+                for m in e.memory:
+                    for k in range(m.size):
+                        t(f"memory[m_{e.name}_{m.name} + {m.size} * c + {k}, w] = scalar(0.0)", 1)
+        t.depth -= 1
+
+    def _contact_force(self, t: _Text, effect: Effect, force: str, mode: str):
+        if mode != "evaluate":
+            t(f"push = push + {force}")
+            return
+        t(f"part = {force}")
+        for i in (1, 2, 3):
+            self.scatter(t, effect, f"n{i}", f"share[{i - 1}] * part - (off * wp.dot(part, patch.g{i})) * patch.n", mode)
+
+    def source(self) -> str:
+        arguments, hoist = _ARGUMENTS, self.hoist()
+        mass = self.value("inertia", "mass", "n")
+        return "\n".join(
+            (
+                _ROLLOUT_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("rollout"), mass=mass),
+                _EVALUATE_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("evaluate")),
+                _TOTAL_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("total")),
+            )
+        )
+
+
+@functools.cache
+def compose(names: tuple[str, ...]) -> Program:
+    """The program of these effects. Raises InputError for an unknown effect."""
+    effects = tuple(get(n) for n in names)
+    composer = _Composer(effects)
+    source = composer.source()
+    module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+    filename = f"<{module}>"
+    # warp reads the source of a kernel through inspect, which looks here first
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    scope = {
+        "__name__": module, "wp": wp, "scalar": wp.float64, "vec3": wp.vec3d, "kinematics": kinematics, "wave": wave,
+    }  # fmt: skip
+    for e in effects:
+        scope[f"{e.name}_force"] = e.force
+        if e.energy is not None:
+            scope[f"{e.name}_energy"] = e.energy
+    exec(compile(source, filename, "exec"), scope)
+    return Program(effects, composer.slots, source, scope["rollout"], scope["evaluate"], scope["total"])

@@ -1,0 +1,170 @@
+"""Dynamics: leapfrog rollouts of a batch of worlds, with energies, work and failures by world."""
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.solve.batch import Batch, Evaluation
+from origami_sim.solve.timestep import TimeStep, stable_step
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A world that went unstable: which, when, where and why."""
+
+    world: int
+    time: float
+    node: int
+    cause: str
+
+    def __str__(self):
+        return f"world {self.world} went unstable at t = {self.time:.6g} s at node {self.node}: {self.cause}"
+
+
+@dataclass
+class Trajectory:
+    """Frames of a run.
+
+    Attributes:
+        times: [F] times of the frames [s].
+        x, v: [F, N, W, 3] positions [m] and velocities [m/s].
+        angles: [F, C + Q, W] continuous hinge angles, creases first [rad].
+        energies: [F, W] by effect [J], with "kinetic". work: [F, W] by effect since the start [J].
+        gaps: [F, K, W] heights of the contact points [m].
+        contact_forces: [F, N, W, 3] sum of the contact effects [N].
+        failures: worlds that went unstable; their later frames repeat the last state.
+        dt: step [s]. step: how it was chosen. state: final state, from which a run can be continued.
+        wall: seconds that the solver took.
+    """
+
+    model: Model
+    parameters: Parameters
+    drive: Drive
+    times: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    angles: np.ndarray
+    energies: dict[str, np.ndarray]
+    work: dict[str, np.ndarray]
+    gaps: np.ndarray
+    contact_forces: np.ndarray
+    failures: list[Failure]
+    dt: float
+    step: TimeStep
+    state: State
+    wall: float = 0.0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def creases(self) -> np.ndarray:
+        """Fold angles of the creases [F, C, W] [rad], valley positive."""
+        return self.angles[:, : len(self.model.creases)]
+
+    def centre_of_mass(self) -> np.ndarray:
+        """[F, W, 3] [m]."""
+        m = self.parameters["inertia", "mass"][None, :, :, None]
+        return (m * self.x).sum(1) / m.sum(1)
+
+    def energy_balance(self) -> np.ndarray:
+        """Energy less the work that was fed in, [F, W] [J]; constant up to the integrator's error."""
+        total = self.energies["kinetic"].copy()
+        for name in self.model.effects:
+            effect = get(name)
+            if effect.exchanges_work:
+                total -= self.work[name]
+            else:
+                total += self.energies[name]
+        return total
+
+
+def simulate(
+    model: Model, parameters: Parameters, drive: Drive | None = None, *, duration: float, rate: float = 60.0,
+    dt: float | None = None, state: State | None = None, device: str = "cpu", threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:  # fmt: skip
+    """Simulates all worlds that the parameters and the drive describe.
+
+    Velocity-Verlet (kick, drift, kick), second order and symplectic without damping; forces that depend on velocity
+    see its second-order prediction. Worlds are independent and their results do not depend on the batch.
+
+    Args:
+        duration: simulated time [s]. rate: frames per second.
+        dt: step [s]; default SAFETY times the stability limit of the stiffest element.
+        state: where to start (default: the reference state at rest); its worlds must match.
+        device: "cpu" or "cuda:0". threads: CPU threads (default all cores).
+        progress: called with the fraction done.
+
+    Raises:
+        InputError: duration or rate not positive, a step above the limit, a drive that ends early, worlds that differ.
+    """
+    drive = drive or Drive()
+    for name, value in (("duration", duration), ("rate", rate)):
+        if not (value > 0 and np.isfinite(value)):
+            raise InputError("a run needs a positive number", field=name, value=value, allowed="> 0")
+    chosen = stable_step(model, parameters)
+    if dt is not None and not 0 < dt <= chosen.limit:
+        raise InputError("the time step is above the stability limit" if dt > 0 else "the time step must be positive",
+                         field="dt", value=dt, allowed=f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}")  # fmt: skip
+    frame_time = 1.0 / rate
+    substeps = max(1, int(np.ceil(frame_time / min(dt or chosen.dt, frame_time) * (1 - 1e-12))))
+    step = frame_time / substeps
+    frames = round(duration * rate)
+    if state is None:
+        worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()))
+        state = State.at_rest(model, worlds)
+    first = max(state.step, 0)
+    drive.require((first * step if state.step > 0 else 0.0) + frames * frame_time)
+    batch = Batch(model, parameters, drive, state, device=device, threads=threads)
+    lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
+    speed_limit = 0.5 * lengths.min(initial=1.0) / step
+
+    contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
+    record: list[tuple[State, Evaluation]] = []
+    began = clock.perf_counter()
+    for i in range(frames + 1):
+        batch.advance(substeps if i else 0, step, speed_limit)  # no steps: only the first force evaluation
+        record.append((batch.state(), batch.evaluate(batch.step * step)))
+        if progress:
+            progress(i / frames)
+    wall = clock.perf_counter() - began
+
+    last = record[-1][0]
+    failures = [
+        Failure(int(w), float(last.status[0, w] * step), int(last.status[1, w]), _cause(model, last, int(w), step, chosen))
+        for w in np.flatnonzero(last.status[0] >= 0)
+    ]
+    zero = np.zeros((len(model.position), last.worlds, 3))
+    return Trajectory(
+        model=model, parameters=parameters, drive=drive, times=(first + np.arange(frames + 1) * substeps) * step,
+        x=np.stack([s.x for s, _ in record]), v=np.stack([s.v for s, _ in record]),
+        angles=np.stack([e.angles for _, e in record]),
+        energies={
+            "kinetic": np.stack([e.kinetic for _, e in record]),
+            **{n: np.stack([e.energies[n] for _, e in record]) for n in record[0][1].energies},
+        },
+        work={n: np.stack([s.work[i] for s, _ in record]) for i, n in enumerate(model.effects)},
+        gaps=np.stack([e.gaps for _, e in record]),
+        contact_forces=np.stack([sum((e.forces[c] for c in contact), zero) for _, e in record]),
+        failures=failures, dt=step, step=chosen, state=last, wall=wall,
+    )  # fmt: skip
+
+
+def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) -> str:
+    """Why a world failed: the most strained bar of the state in which it stopped."""
+    x = state.x[:, world]
+    now = np.linalg.norm(x[model.bars[:, 1]] - x[model.bars[:, 0]], axis=-1)
+    rest = np.linalg.norm(model.position[model.bars[:, 1]] - model.position[model.bars[:, 0]], axis=-1)
+    strain = np.abs(now / rest - 1)
+    margin = f"dt = {dt:.3g} s, limit {step.limit:.3g} s set by {step.cause} in the reference state"
+    if not np.all(np.isfinite(strain)):
+        return f"a position is not a number ({margin})"
+    if len(strain) and strain.max() > 0.05:
+        worst = int(strain.argmax())
+        return f"bar {worst} strained by {strain[worst]:.0%} ({margin}); take a smaller step or a smaller load"
+    return f"the node moves more than half the shortest bar in one step ({margin}); take a smaller step"

@@ -1,0 +1,95 @@
+"""The largest stable time step of the explicit solver, from the stiffest element."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from origami_sim.effects import CONTACTS, HINGES, get
+from origami_sim.model import Model, Parameters
+
+SAFETY = 0.8
+"""Fraction of the stability limit that is used unless a step is given."""
+
+
+@dataclass(frozen=True)
+class TimeStep:
+    """A stable step and the reason for it.
+
+    Attributes:
+        limit: bound on stable steps over all worlds [s].
+        dt: the step recommended, SAFETY * limit [s].
+        node: node that limits it. cause: the element at that node which contributes most.
+    """
+
+    limit: float
+    dt: float
+    node: int
+    cause: str
+
+    def __str__(self):
+        return f"dt = {self.dt:.3g} s ({SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause})"
+
+
+def _gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes [n, k] of the elements of a family and the norms of their coordinate's gradient there [n, k]."""
+    x = model.position
+    if family == "bar":
+        return model.bars, np.ones(model.bars.shape)
+    if family in HINGES:
+        h = model.creases if family == "crease" else model.bends
+        i, j, k, m = (x[h[:, c]] for c in range(4))
+        e = k - j
+        ee = (e**2).sum(-1)
+        n1, n2 = np.cross(i - j, e), np.cross(e, m - j)
+        gi = n1 * (np.sqrt(ee) / (n1**2).sum(-1))[:, None]
+        gl = n2 * (np.sqrt(ee) / (n2**2).sum(-1))[:, None]
+        ai, al = ((i - j) * e).sum(-1) / ee, ((m - j) * e).sum(-1) / ee
+        gj = -(1 - ai)[:, None] * gi - (1 - al)[:, None] * gl
+        gk = -ai[:, None] * gi - al[:, None] * gl
+        return h, np.stack([np.linalg.norm(g, axis=-1) for g in (gi, gj, gk, gl)], axis=1)
+    if family in CONTACTS:
+        a, b, c = (x[model.contacts[:, i]] for i in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+        slopes = np.stack([np.linalg.norm(s, axis=-1) / area for s in (c - b, a - c, b - a)], axis=1)
+        return model.contacts, np.abs(model.contact_weights) + np.abs(model.contact_offsets)[:, None] * slopes
+    raise KeyError(family)
+
+
+def stable_step(model: Model, parameters: Parameters) -> TimeStep:
+    """Bound on the step by the row sums of the mass-scaled stiffness and damping (a block Gershgorin bound).
+
+    With lambda_i = sum over elements of k |g_i| sum_j |g_j| / m_i, every frequency is below sqrt(max lambda); central
+    differences are then stable for dt <= 2 / omega (sqrt(1 + zeta^2) - zeta).
+    """
+    n, worlds = len(model.position), parameters.worlds
+    free = model.free.any(axis=1)
+    sums = {"stiffness": np.zeros((n, worlds)), "damping": np.zeros((n, worlds))}
+    largest = np.zeros((n, worlds))
+    cause = np.full((n, worlds), "", dtype=object)
+    for name in model.effects:
+        effect = get(name)
+        for kind in ("stiffness", "damping"):
+            slope = getattr(effect, kind)
+            if slope is None or effect.family not in ("bar", *HINGES, *CONTACTS) or not model.count(effect.family):
+                continue
+            nodes, norms = _gradient_norms(model, effect.family)
+            norms = norms * free[nodes]
+            k = np.asarray(slope(parameters.of(name)))
+            k = np.broadcast_to(k, (len(nodes), worlds))
+            for c in range(nodes.shape[1]):
+                row = k * (norms[:, c] * norms.sum(1))[:, None]
+                np.add.at(sums[kind], nodes[:, c], row)
+                for e in np.flatnonzero((row > largest[nodes[:, c]]).any(1)) if kind == "stiffness" else ():
+                    at = nodes[e, c]
+                    more = row[e] > largest[at]
+                    largest[at][more] = row[e][more]
+                    cause[at][more] = f"{model.name(effect.family, int(e))} ({name})"
+    mass = np.broadcast_to(parameters["inertia", "mass"], (n, worlds))
+    omega = np.sqrt(sums["stiffness"] / mass) * free[:, None]
+    rate = sums["damping"] / mass * free[:, None]
+    with np.errstate(divide="ignore"):
+        # the damping is taken with a prediction of the velocity, whose limit lies at half the usual one
+        limits = 2.0 / (rate + np.sqrt(rate**2 + omega**2))
+    i, w = np.unravel_index(np.argmin(limits), limits.shape)
+    limit = float(limits[i, w])
+    return TimeStep(limit=limit, dt=SAFETY * limit, node=int(i), cause=str(cause[i, w]) or "damping")
