@@ -2,5 +2,5 @@
 
 import warp as _warp
 
-_warp.config.quiet = True
+_warp.config.log_level = _warp.LOG_ERROR
 _warp.config.enable_backward = False

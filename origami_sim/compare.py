@@ -16,13 +16,8 @@ from origami_sim.recording.units import quantity, with_prefix
 PARTING_WINDOW = 5
 """Consecutive values of which the median residual must exceed the threshold."""
 
-_INK, _RECORDED, _SIMULATED, _PARTING, _BAND = (
-    "#333333",
-    "#000000",
-    "#d55e00",
-    "#0072b2",
-    "#d9d9d9",
-)  # Okabe and Ito's colours
+# the colour-blind safe colours of Okabe and Ito, and greys
+_INK, _RECORDED, _SIMULATED, _PARTING, _BAND = "#333333", "#000000", "#d55e00", "#0072b2", "#d9d9d9"
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +173,10 @@ def compare(recording: Recording, predicted: Mapping[str, np.ndarray], *, thresh
     20 q(threshold)^3, with q the upper tail: 5e-19 at 5, 2e-4 at 2. The residual of an oscillation may shrink below
     the threshold again later, as it changes sign.
 
-    Two warnings. Noise that is correlated over more than five frames parts sooner than stated. And a bias below the
-    threshold never parts, however long it lasts: compare the rms residual with the noise.
+    Three warnings. A simulation that starts from a measured rate drifts off by that rate's error within milliseconds:
+    fit the initial state before calling an early parting physics. Noise that is correlated over more
+    than five frames parts sooner than stated. And a bias below the threshold never parts, however long it lasts:
+    compare the rms residual with the noise.
 
     Args:
         recording: the recording.

@@ -1,0 +1,49 @@
+"""Crease patterns: read them from FOLD, SVG and meshes, build them, triangulate them."""
+
+from pathlib import Path
+
+from ..errors import InputError
+from .build import cross, grid, kresling, miura, strip, waterbomb
+from .crease_pattern import ASSIGNMENTS, Pattern
+from .fold import read_fold, write_fold
+from .mesh import read_mesh, write_mesh
+from .svg import read_svg
+from .topology import open_cuts
+from .triangulate import Triangulation, hinge_angles, triangulate
+
+__all__ = [
+    "ASSIGNMENTS",
+    "Pattern",
+    "Triangulation",
+    "cross",
+    "grid",
+    "hinge_angles",
+    "kresling",
+    "miura",
+    "open_cuts",
+    "read_fold",
+    "read_mesh",
+    "read_pattern",
+    "read_svg",
+    "strip",
+    "triangulate",
+    "waterbomb",
+    "write_fold",
+    "write_mesh",
+]
+
+READERS = {".fold": read_fold, ".svg": read_svg, ".obj": read_mesh, ".stl": read_mesh}
+
+
+def read_pattern(path) -> Pattern:
+    """Read a crease pattern by the file's suffix, with the defaults of its reader.
+
+    Raises:
+        InputError: unknown suffix, missing file, or what the reader refuses.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in READERS:
+        raise InputError("unknown pattern format", file=path, field="suffix", value=suffix, allowed=", ".join(READERS))
+    if not Path(path).is_file():
+        raise InputError("no such file", file=path)
+    return READERS[suffix](path)

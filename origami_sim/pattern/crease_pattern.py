@@ -8,7 +8,7 @@ ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 """FOLD 1.2 edge assignments: border, mountain, valley, flat, unassigned, cut, join."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Pattern:
     """A polygon mesh with crease assignments.
 
@@ -49,3 +49,15 @@ class Pattern:
     @property
     def edge_count(self) -> int:
         return len(self.edges)
+
+    def edges_assigned(self, letters: str) -> np.ndarray:
+        """Return the indices of the edges whose assignment is one of `letters`, ascending, int64."""
+        return np.array([e for e, letter in enumerate(self.assignments) if letter in letters], dtype=np.int64)
+
+    def equals(self, other: "Pattern") -> bool:
+        """Tell whether both patterns hold the same data to the last bit; `notes` are not compared."""
+        arrays = ("vertices", "edges", "fold_angles", "stiffness", "rest_angles", "thickness")
+        lists = ("faces", "assignments", "materials", "extra")
+        return all(np.array_equal(getattr(self, n), getattr(other, n), equal_nan=n != "edges") for n in arrays) and all(
+            getattr(self, n) == getattr(other, n) for n in lists
+        )

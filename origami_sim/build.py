@@ -1,0 +1,424 @@
+"""From a crease pattern to a Model: thickness, materials, creases, magnets, feet and supports."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from scipy.optimize import nnls
+
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.materials import MATERIALS, layered_rigidity, material
+from origami_sim.model import Model, Parameters, dihedral_angles
+from origami_sim.pattern import Pattern, triangulate
+
+MEMBRANE_POISSON = 1.0 / 3.0
+"""The only Poisson's ratio that bars along triangle edges reproduce in shear."""
+
+
+class Sheet:
+    """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
+
+    Args:
+        pattern: crease pattern; its own thickness, materials, stiffness and rest angles are used where given.
+        thickness: of all panels [m]. material: name in `MATERIALS`. modulus, density: override it [Pa], [kg/m^3].
+        triangulation: "center" (a node in the middle of each polygon; gives rectangles, parallelograms and triangles
+            exactly the mass, centre of mass and inertia of the panel) or "diagonal" (fewer nodes; the masses of a
+            panel sit at its corners, which is right for finely divided sheets).
+        membrane: factor on the membrane stiffness; below 1 it buys a longer time step (keep strains under a percent).
+        membrane_damping: dashpots in the bars, as a ratio of critical.
+
+    Raises:
+        InputError: unknown material, thickness or modulus not positive, faces that cannot be triangulated.
+    """
+
+    def __init__(
+        self, pattern: Pattern, *, thickness: float, material: str = "pdms", modulus: float | None = None,
+        density: float | None = None, triangulation: str = "diagonal", membrane: float = 1.0,
+        membrane_damping: float = 0.02,
+    ):  # fmt: skip
+        self.pattern = pattern
+        self.mesh = triangulate(pattern, triangulation)
+        faces = pattern.face_count
+        self._names = [m or material for m in pattern.materials]
+        chosen = [_material(n, i) for i, n in enumerate(self._names)]
+        self.thickness = np.where(np.isnan(pattern.thickness), thickness, pattern.thickness)
+        self.modulus = np.array([modulus or m.modulus for m in chosen])
+        self.density = np.array([density or m.density for m in chosen])
+        self.poisson = np.array([m.poisson for m in chosen])
+        for name, value in (
+            ("thickness", self.thickness), ("modulus", self.modulus), ("density", self.density),
+            ("membrane", np.array([membrane])),
+        ):  # fmt: skip
+            if not np.all(value > 0) or not np.all(np.isfinite(value)):
+                raise InputError("a panel property must be positive", field=name, value=float(value.min()), allowed="> 0")
+        if membrane_damping < 0:
+            raise InputError("a damping ratio cannot be negative", field="membrane_damping", value=membrane_damping)
+        self.membrane, self.membrane_damping = membrane, membrane_damping
+        self._rigidity = np.full(faces, np.nan)
+        self._patches: list[dict] = [{} for _ in range(faces)]
+        self._lumps: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+        self._extra_mass = np.zeros(len(self.mesh.vertices))
+        self._free = np.ones((len(self.mesh.vertices), 3))
+        self._contacts: list[tuple[int, np.ndarray, float, np.ndarray, str]] = []
+        self._settings: list[tuple[str, str, object, object]] = []
+        self._effects = ["bars"]
+        self._viscous_creases: tuple[float, float] = (0.0, 0.0)
+        a, b, c = (self.mesh.vertices[self.mesh.triangles[:, k]] for k in range(3))
+        self._area_vector = 0.5 * np.cross(b - a, c - a)
+        self.area = np.linalg.norm(self._area_vector, axis=1)
+        self._crease_stiffness = pattern.stiffness[self.mesh.crease_edge]
+        self._rest = np.where(
+            np.isnan(pattern.rest_angles[self.mesh.crease_edge]),
+            dihedral_angles(self.mesh.vertices, self.mesh.creases),
+            pattern.rest_angles[self.mesh.crease_edge],
+        )
+        self._electrodes = np.zeros(len(self.mesh.creases) + len(self.mesh.bends), np.int32)
+
+    # what a designer states ------------------------------------------------------------------------------------
+
+    def on(self, *effects: str) -> "Sheet":
+        """Switches effects on."""
+        for e in effects:
+            get(e)
+            if e not in self._effects:
+                self._effects.append(e)
+        return self
+
+    def set(self, effect: str, entities=None, **parameters) -> "Sheet":
+        """Switches an effect on and sets parameters for all entities of its family, or for some."""
+        self.on(effect)
+        self._settings += [(effect, name, value, entities) for name, value in parameters.items()]
+        return self
+
+    def crease(self, creases=None, *, stiffness=None, rest_angle=None, loss_time: float | None = None,
+               damping_ratio: float | None = None) -> "Sheet":  # fmt: skip
+        """Elastic creases, with a Kelvin-Voigt loss if asked for.
+
+        Args:
+            creases: indices (default: all). stiffness: [N m/rad]. rest_angle: [rad].
+            loss_time: beta [s], viscosity = beta * stiffness (tan delta = beta omega), for all creases.
+            damping_ratio: instead of loss_time, a ratio of critical for the crease with the lighter panel swinging.
+        """
+        self.on("crease")
+        index = np.arange(len(self.mesh.creases)) if creases is None else np.atleast_1d(creases)
+        if stiffness is not None:
+            if np.any(np.asarray(stiffness) < 0):
+                raise InputError("a crease stiffness cannot be negative", field="stiffness", value=stiffness, allowed=">= 0")
+            self._crease_stiffness[index] = stiffness
+        if rest_angle is not None:
+            self._rest[index] = rest_angle
+        if loss_time is not None or damping_ratio is not None:
+            self._viscous_creases = (loss_time or 0.0, damping_ratio or 0.0)
+            self.on("crease_viscosity")
+        return self
+
+    def panel(self, panels, *, rigidity: float) -> "Sheet":
+        """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
+        self._rigidity[np.atleast_1d(panels)] = rigidity
+        return self
+
+    def patch(self, panel: int, *, thickness: float, poling: Sequence[float] = (0, 0, 0), size: Sequence[float] | None = None,
+              centre: Sequence[float] | None = None, material: str = "mae", remanence: float | None = None,
+              density: float | None = None, side: int = 1) -> "Sheet":  # fmt: skip
+        """Bonds a rectangular patch, magnetised if its material is, on one side of a panel.
+
+        Args:
+            panel: face index. thickness: of the patch [m].
+            poling: direction of the remanence in the reference state (any length); zero for no magnet.
+            size: extent along x and y in the reference state [m] (default: the panel's bounding box).
+            centre: its middle in the reference state [m] (default: the panel's centroid).
+            remanence: [T], default the material's. side: +1 on the top, -1 below.
+        """
+        m = _material(material, panel)
+        nodes = self._nodes_of(panel)
+        box = self.mesh.vertices[nodes]
+        size = np.asarray(size if size is not None else np.ptp(box, axis=0)[:2], float)
+        if thickness <= 0 or np.any(size <= 0):
+            raise InputError("a patch needs positive dimensions", field="patch", value=[thickness, *size], allowed="> 0 m")
+        self._patches[panel] = {
+            "thickness": float(thickness), "size": size, "material": m, "side": side,
+            "centre": np.asarray(centre, float) if centre is not None else self._centroid(panel),
+            "density": density or m.density,
+        }  # fmt: skip
+        direction = np.asarray(poling, float)
+        if np.linalg.norm(direction) > 0:
+            self.magnetise(panel, remanence=m.remanence if remanence is None else remanence,
+                           volume=thickness * size[0] * size[1], poling=direction)  # fmt: skip
+        return self
+
+    def magnetise(self, panel: int, *, remanence: float, volume: float, poling: Sequence[float]) -> "Sheet":
+        """Remanence [T] of a volume of magnet [m^3] spread over a panel, along `poling` in the reference state."""
+        d = np.asarray(poling, float)
+        d = d / np.linalg.norm(d)
+        for t in self._triangles_of(panel):
+            normal = self._area_vector[t] / self.area[t]
+            a, b = self._edge_weights(t, d)
+            scale = np.linalg.norm(d - normal * (d @ normal)) or 1.0
+            self.set("magnetic_torque", [t], remanence=remanence, volume=volume * self._share(panel, t),
+                     poling_1=a / scale, poling_2=b / scale, poling_n=float(np.clip(d @ normal, -1, 1)))  # fmt: skip
+        return self
+
+    def rigid_body(self, panel: int, *, mass: float, centre: Sequence[float], inertia: float) -> "Sheet":
+        """Gives a panel the mass [kg], centre of mass [m] and in-plane second moment [kg m^2] of a measured body.
+
+        `inertia` is that about an axis through the centre of mass across the panel's longer side.
+        """
+        self._lumps[panel] = (mass, np.asarray(centre, float), np.array([inertia, 0.0]))
+        return self
+
+    def mass(self, nodes, mass: float) -> "Sheet":
+        """Adds point masses [kg]."""
+        self._extra_mass[np.atleast_1d(nodes)] += mass
+        return self
+
+    def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
+        """Holds panels or nodes along the named axes."""
+        index = [*nodes, *(n for p in panels for n in self._nodes_of(p))]
+        for a in axes:
+            self._free[index, "xyz".index(a)] = 0.0
+        return self
+
+    def gravity(self, acceleration: Sequence[float] = (0.0, 0.0, -9.80665)) -> "Sheet":
+        """Weight of sheet and patches; acceleration [m/s^2]."""
+        gx, gy, gz = acceleration
+        self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
+        if any(self._patches):
+            self.set("eccentric_weight", gravity_x=gx, gravity_y=gy, gravity_z=gz)
+        return self
+
+    def contact(self, panel: int, point: Sequence[float], *, offset: float = 0.0, axis: Sequence[float] = (1, 0, 0),
+                name: str | None = None) -> int:  # fmt: skip
+        """Adds a point that can touch the ground and returns its index.
+
+        Args:
+            panel: face that carries it. point: position in the reference state [m], in the panel's plane.
+            offset: height above the mid-plane along the panel's normal [m]; negative below.
+            axis: the body's forward direction in the reference state, for directional friction.
+        """
+        p, d = np.asarray(point, float), np.asarray(axis, float)
+        best, weights = None, None
+        for t in self._triangles_of(panel):
+            w = self._barycentric(t, p)
+            if best is None or w.min() > weights.min():
+                best, weights = t, w
+        if best is None or weights.min() < -1e-6:
+            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=list(point))
+        a, b = self._edge_weights(best, d)
+        self._contacts.append((best, weights, offset, np.array([-a - b, a, b]), name or f"contact {len(self._contacts)}"))
+        return len(self._contacts) - 1
+
+    def electrode(self, group: int, *, creases=()) -> "Sheet":
+        """Assigns creases to an electrode group."""
+        self._electrodes[np.atleast_1d(creases)] = group
+        return self
+
+    # the model --------------------------------------------------------------------------------------------------
+
+    def build(self) -> tuple[Model, Parameters]:
+        """The model and its parameters."""
+        mesh = self.mesh
+        missing = np.flatnonzero(np.isnan(self._crease_stiffness))
+        if len(missing) and "crease" in self._effects:
+            raise InputError("a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)")
+        if len(mesh.bends):
+            self.on("panel_bending")
+        if self.membrane_damping > 0:
+            self.on("bar_viscosity")
+        tri = np.array([c[0] for c in self._contacts], int)
+        model = Model(
+            position=mesh.vertices, free=self._free, bars=mesh.bars.astype(np.int32),
+            creases=mesh.creases.reshape(-1, 4).astype(np.int32), bends=mesh.bends.reshape(-1, 4).astype(np.int32),
+            triangles=mesh.triangles.astype(np.int32), triangle_panel=mesh.triangle_face.astype(np.int32),
+            contacts=mesh.triangles[tri].reshape(-1, 3).astype(np.int32),
+            contact_weights=np.array([c[1] for c in self._contacts]).reshape(-1, 3),
+            contact_offsets=np.array([c[2] for c in self._contacts], float),
+            contact_axes=np.array([c[3] for c in self._contacts]).reshape(-1, 3),
+            electrodes=self._electrodes, effects=tuple(self._effects),
+            names={"contact": tuple(c[4] for c in self._contacts)},
+        )  # fmt: skip
+        p = Parameters(model)
+        mass = self._node_masses()
+        p.set("inertia", "mass", mass)
+        lengths = np.linalg.norm(mesh.vertices[mesh.bars[:, 1]] - mesh.vertices[mesh.bars[:, 0]], axis=1)
+        stiffness = self.membrane * self._bar_sections() / lengths
+        p.set("bars", "rest_length", lengths).set("bars", "stiffness", stiffness)
+        if self.membrane_damping > 0:
+            reduced = 1.0 / (1.0 / mass[mesh.bars]).sum(1)
+            p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))
+        if "crease" in self._effects:
+            p.set("crease", "stiffness", self._crease_stiffness).set("crease", "rest_angle", self._rest)
+        if "crease_viscosity" in self._effects:
+            p.set("crease_viscosity", "viscosity", self._crease_viscosity(mass))
+        if len(mesh.bends):
+            p.set("panel_bending", "stiffness", self._bend_stiffness())
+            p.set("panel_bending", "rest_angle", dihedral_angles(mesh.vertices, mesh.bends))
+        if "eccentric_weight" in self._effects:
+            for panel, patch in enumerate(self._patches):
+                for t in self._triangles_of(panel) if patch else ():
+                    share = self._share(panel, t)
+                    offset = patch["side"] * 0.5 * (self.thickness[panel] + patch["thickness"])
+                    p.set("eccentric_weight", "mass", self._patch_mass(patch) * share, [t])
+                    p.set("eccentric_weight", "offset", offset, [t])
+        for effect, name, value, entities in self._settings:
+            p.set(effect, name, value, entities)
+        if "adhesion" in self._effects:
+            p.set("plane", "reach", p["adhesion", "reach"].max())
+        return model, p
+
+    # geometry -----------------------------------------------------------------------------------------------------
+
+    def _triangles_of(self, panel: int) -> np.ndarray:
+        if not 0 <= panel < self.pattern.face_count:
+            raise InputError("there is no such panel", field="panel", value=panel, allowed=f"0 to {self.pattern.face_count - 1}")
+        return np.flatnonzero(self.mesh.triangle_face == panel)
+
+    def _nodes_of(self, panel: int) -> np.ndarray:
+        return np.unique(self.mesh.triangles[self._triangles_of(panel)])
+
+    def _share(self, panel: int, triangle: int) -> float:
+        return float(self.area[triangle] / self.area[self._triangles_of(panel)].sum())
+
+    def _centroid(self, panel: int) -> np.ndarray:
+        t = self._triangles_of(panel)
+        centres = self.mesh.vertices[self.mesh.triangles[t]].mean(axis=1)
+        return (self.area[t, None] * centres).sum(0) / self.area[t].sum()
+
+    def _edge_weights(self, triangle: int, direction: np.ndarray) -> tuple[float, float]:
+        """a, b with the in-plane part of `direction` = a (x2 - x1) + b (x3 - x1)."""
+        x1, x2, x3 = self.mesh.vertices[self.mesh.triangles[triangle]]
+        (a, b), *_ = np.linalg.lstsq(np.stack([x2 - x1, x3 - x1], axis=1), direction, rcond=None)
+        return float(a), float(b)
+
+    def _barycentric(self, triangle: int, point: np.ndarray) -> np.ndarray:
+        x1 = self.mesh.vertices[self.mesh.triangles[triangle, 0]]
+        a, b = self._edge_weights(triangle, point - x1)
+        return np.array([1 - a - b, a, b])
+
+    # mechanics ----------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _patch_mass(patch: dict) -> float:
+        return float(patch["density"] * patch["thickness"] * patch["size"].prod())
+
+    def _bar_sections(self) -> np.ndarray:
+        """E A of each bar [N]: every triangle gives its edges A = 2 S t / ((1 - nu) sum L)."""
+        mesh = self.mesh
+        index = {tuple(b): i for i, b in enumerate(mesh.bars.tolist())}
+        out = np.zeros(len(mesh.bars))
+        for t, nodes in enumerate(mesh.triangles.tolist()):
+            panel = mesh.triangle_face[t]
+            patch = self._patches[panel]
+            membrane = self.modulus[panel] * self.thickness[panel]
+            if patch:
+                membrane += patch["material"].modulus * patch["thickness"]
+            edges = [tuple(sorted((nodes[k], nodes[(k + 1) % 3]))) for k in range(3)]
+            perimeter = sum(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b]) for a, b in edges)
+            for e in edges:
+                out[index[e]] += 2 * self.area[t] * membrane / ((1 - MEMBRANE_POISSON) * perimeter)
+        return out
+
+    def rigidity(self, panel: int) -> float:
+        """Bending rigidity per width of a panel with its patch [N m]."""
+        if not np.isnan(self._rigidity[panel]):
+            return float(self._rigidity[panel])
+        layers = [(self.thickness[panel], self.modulus[panel] / (1 - self.poisson[panel] ** 2))]
+        patch = self._patches[panel]
+        if patch:
+            layers.append((patch["thickness"], patch["material"].plane_modulus))
+        return layered_rigidity(layers)
+
+    def _bend_stiffness(self) -> np.ndarray:
+        mesh = self.mesh
+        by_edge: dict[tuple[int, int], list[int]] = {}
+        for t, nodes in enumerate(mesh.triangles.tolist()):
+            for k in range(3):
+                a, b = sorted((nodes[k], nodes[(k + 1) % 3]))
+                by_edge.setdefault((a, b), []).append(t)
+        out = np.zeros(len(mesh.bends))
+        for q, (_, j, k, _) in enumerate(mesh.bends.tolist()):
+            pair = by_edge[min(j, k), max(j, k)]
+            span = np.linalg.norm(mesh.vertices[k] - mesh.vertices[j])
+            out[q] = self.rigidity(int(mesh.bend_face[q])) * span**2 / self.area[pair].sum()
+        return out
+
+    def _node_masses(self) -> np.ndarray:
+        mesh, out = self.mesh, self._extra_mass.copy()
+        for panel in range(self.pattern.face_count):
+            nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
+            patch = self._patches[panel]
+            sheet = self.density[panel] * self.thickness[panel] * self.area[triangles]
+            centred = len(nodes) > len(self.pattern.faces[panel])
+            if panel not in self._lumps and not centred:
+                extra = self._patch_mass(patch) if patch else 0.0
+                for t, m in zip(triangles, sheet, strict=True):
+                    out[mesh.triangles[t]] += (m + extra * self._share(panel, t)) / 3
+                continue
+            out[nodes] += self._lumped(panel, nodes, triangles, sheet, patch)
+        bad = np.flatnonzero(out <= 0)
+        if len(bad):
+            raise InputError("a node has no mass", field=f"node {bad[0]}", allowed="> 0 kg")
+        return out
+
+    def _lumped(self, panel: int, nodes: np.ndarray, triangles: np.ndarray, sheet: np.ndarray, patch: dict) -> np.ndarray:
+        """Node masses >= 0 that have the panel's mass, centre of mass and second moments."""
+        x = self.mesh.vertices
+        normal = self._area_vector[triangles].sum(0)
+        normal /= np.linalg.norm(normal)
+        corners = x[list(self.pattern.faces[panel])]
+        sides = np.roll(corners, -1, axis=0) - corners
+        e1 = sides[np.argmax(np.linalg.norm(sides, axis=1))]
+        e1 = e1 / np.linalg.norm(e1)
+        frame = np.stack([e1, np.cross(normal, e1)])
+        origin = self._centroid(panel)
+        y = (x[nodes] - origin) @ frame.T
+        if panel in self._lumps:
+            mass, centre, (inertia, _) = self._lumps[panel]
+            c = (centre - origin) @ frame.T
+            target = np.array([mass, mass * c[0], mass * c[1], inertia + mass * c[0] ** 2, np.nan, mass * c[0] * c[1]])
+        else:
+            target = np.zeros(6)
+            for t, m in zip(triangles, sheet, strict=True):
+                p = (x[self.mesh.triangles[t]] - origin) @ frame.T
+                # exact for a uniform triangle: a twelfth at each corner, the rest at the centroid
+                target += _moments(np.vstack([p, p.mean(0)]), m * np.array([1 / 12, 1 / 12, 1 / 12, 3 / 4]))
+            if patch:
+                half = patch["size"] / 2
+                grid = np.array([[sx, sy, 0.0] for sx in (-1, 1) for sy in (-1, 1)]) * np.append(half, 0) + patch["centre"]
+                points = (np.vstack([grid, patch["centre"]]) - origin) @ frame.T
+                weights = np.array([1 / 12] * 4 + [2 / 3])  # exact for a uniform rectangle
+                target += _moments(points, self._patch_mass(patch) * weights)
+        given = ~np.isnan(target)
+        matrix = np.stack([_moments(p[None], np.ones(1)) for p in y], axis=1)[given]
+        size = np.abs(y).max()
+        scale = np.array([1, 1 / size, 1 / size, 1 / size**2, 1 / size**2, 1 / size**2])[given]
+        floor = 0.01 * target[0] / len(nodes)  # no node without inertia
+        rest = target[given] - matrix @ np.full(len(nodes), floor)
+        solution, residual = nnls(matrix * scale[:, None], rest * scale)
+        if panel in self._lumps and residual > 1e-6 * target[0]:
+            raise InputError("no non-negative node masses have this mass, centre and inertia", field=f"panel {panel}",
+                             value=float(residual), allowed="a body whose masses lie within its panel")  # fmt: skip
+        return solution + floor
+
+    def _crease_viscosity(self, mass: np.ndarray) -> np.ndarray:
+        loss_time, ratio = self._viscous_creases
+        if not ratio:
+            return loss_time * self._crease_stiffness
+        x, out = self.mesh.vertices, np.zeros(len(self.mesh.creases))
+        for c, (i, j, k, m) in enumerate(self.mesh.creases.tolist()):
+            along = (x[k] - x[j]) / np.linalg.norm(x[k] - x[j])
+            arms = [mass[n] * np.linalg.norm(np.cross(x[n] - x[j], along)) ** 2 for n in (i, m)]
+            out[c] = 2 * ratio * np.sqrt(self._crease_stiffness[c] * min(arms))
+        return out
+
+
+def _moments(points: np.ndarray, masses: np.ndarray) -> np.ndarray:
+    """m, m y1, m y2, m y1^2, m y2^2, m y1 y2 of points [n, 2], summed."""
+    a, b = points[:, 0], points[:, 1]
+    return np.array([masses.sum(), (masses * a).sum(), (masses * b).sum(), (masses * a * a).sum(),
+                     (masses * b * b).sum(), (masses * a * b).sum()])  # fmt: skip
+
+
+def _material(name: str, panel: int):
+    if name not in MATERIALS:
+        raise InputError("unknown material", field=f"panel {panel}", value=name, allowed=", ".join(MATERIALS))
+    return material(name)

@@ -1,0 +1,237 @@
+"""Read and write crease patterns as FOLD 1.2 (https://github.com/edemaine/fold).
+
+Angles are degrees in the file and radians in a `Pattern`; coordinates and thickness are in the file's `frame_unit`.
+Our own keys: `edges_osim:stiffness` [N m/rad], `edges_osim:restAngle` [deg], `faces_osim:thickness` [frame_unit] and
+`faces_osim:material`.
+"""
+
+import json
+
+import numpy as np
+
+from ..errors import InputError
+from .assemble import assemble
+from .checks import check_edges, check_vertices
+from .crease_pattern import ASSIGNMENTS, Pattern
+from .files import read_bytes, write_atomic
+from .fold_json import Frame, parse_json, resolve_frame
+from .planar import check_planar_graph, drop_holes, planar_faces
+from .topology import edge_key
+from .units import metres_per
+
+OWN_KEYS = (
+    "vertices_coords",
+    "edges_vertices",
+    "edges_assignment",
+    "edges_foldAngle",
+    "edges_osim:stiffness",
+    "edges_osim:restAngle",
+    "faces_vertices",
+    "faces_osim:thickness",
+    "faces_osim:material",
+)
+"""Keys that become fields of `Pattern`; every other key goes to `extra`."""
+ORIENTATION_KEYS = ("faces_edges", "faces_faces", "edges_faces", "vertices_faces", "faceOrders")
+"""Derived keys that a reversed face makes wrong."""
+PLANARITY_TOLERANCE = 1e-4
+"""Distance from the common plane, relative to the pattern's size, up to which faces are derived."""
+RADIANS_PER_DEGREE = np.pi / 180.0
+
+
+def read_fold(path, *, frame=0) -> Pattern:
+    """Read a FOLD file; what had to be defaulted or derived is told in `notes`.
+
+    Args:
+        path: the file.
+        frame: 0 for the key frame, k for the k-th of `file_frames`, with inheritance.
+
+    Returns:
+        The pattern in metres and radians. Keys without a meaning here are kept in `extra`; `write_fold` writes them
+        back.
+
+    Raises:
+        InputError: naming the file, field, value and what is allowed.
+    """
+    return fold_pattern(parse_json(read_bytes(path), file=path), frame=frame, file=path)
+
+
+def fold_pattern(document: dict, *, frame=0, file=None) -> Pattern:
+    """Turn parsed FOLD into a `Pattern`; see `read_fold`. `file` is named in errors."""
+    keys = resolve_frame(document, frame, file=file)
+    data, notes = Frame(keys, file), []
+    if keys.get("frame_unit") is None:
+        keys["frame_unit"] = "unit"
+    if keys["frame_unit"] == "unit":
+        notes.append("frame_unit is not given: coordinates are taken as metres.")
+    scale = metres_per(keys["frame_unit"], file=file, field="frame_unit")
+
+    vertices = data.coordinates() * scale
+    check_vertices(vertices, file=file)
+    edges, faces = data.loops("edges_vertices", size=2), data.loops("faces_vertices")
+    if not edges and not faces:
+        raise InputError(
+            "neither edges nor faces given", file=file, field="edges_vertices", allowed="at least one face"
+        )
+    count = len(edges or ())
+    letters = data.choices("edges_assignment", count, ASSIGNMENTS)
+    fold_angles = _angles(data, "edges_foldAngle", count)
+    rest_angles = _angles(data, "edges_osim:restAngle", count)
+    stiffness = data.numbers("edges_osim:stiffness", count, 0.0, np.inf, "0 or more [N m/rad]")
+    _note_angles(letters, fold_angles, notes)
+    if not edges:
+        notes.append("edges_vertices is not given: edges are the sides of the faces.")
+    if not faces:
+        faces = _derived_faces(vertices, edges, letters, notes, file)
+    thickness = data.numbers(
+        "faces_osim:thickness", len(faces), 0.0, np.inf, "a thickness above 0, in frame_unit", open_low=True
+    )
+    pattern = assemble(
+        vertices,
+        faces,
+        edges=edges,
+        assignments=letters,
+        fold_angles=fold_angles,
+        stiffness=stiffness,
+        rest_angles=rest_angles,
+        thickness=None if thickness is None else thickness * scale,
+        materials=data.names("faces_osim:material", len(faces)),
+        notes=notes,
+        extra=_extra(document, keys, frame, notes),
+        file=file,
+    )
+    _fit_extra(pattern, faces, count)
+    return pattern
+
+
+def _angles(data, field, count):
+    degrees = data.numbers(field, count, -180.0, 180.0, "-180 to 180 degrees")
+    return None if degrees is None else degrees * RADIANS_PER_DEGREE
+
+
+def _note_angles(letters, fold_angles, notes) -> None:
+    if letters is None:
+        return
+    angles = np.full(len(letters), np.nan) if fold_angles is None else fold_angles
+    missing = sum(letter in ("M", "V") and np.isnan(angle) for letter, angle in zip(letters, angles, strict=True))
+    if missing:
+        notes.append(f"{missing} mountain or valley edges have no fold angle: left open.")
+    for e, (letter, angle) in enumerate(zip(letters, angles, strict=True)):
+        if (letter == "M" and angle > 0) or (letter == "V" and angle < 0):
+            notes.append(f"edge {e} is '{letter}' but its fold angle is {np.degrees(angle):+g} deg: both kept.")
+
+
+def _derived_faces(vertices, edges, letters, notes, file):
+    """Return the bounded faces of the planar graph of a flat pattern."""
+    pairs = np.array(edges, dtype=np.int64)
+    check_edges(vertices, pairs, file=file)
+    size = np.ptp(vertices, axis=0).max()
+    centred = vertices - vertices.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2] if len(vertices) > 2 else np.eye(3)
+    if np.abs(centred @ axes[2]).max() > PLANARITY_TOLERANCE * size:
+        raise InputError(
+            "the pattern is not flat, so its faces cannot be derived",
+            file=file,
+            field="faces_vertices",
+            allowed="faces_vertices given, or all vertices in one plane",
+        )
+    points = centred @ _plane_axes(axes[2]).T
+    check_planar_graph(points, pairs, file=file)
+    found = planar_faces(points, pairs, file=file)
+    borders = {edge_key(*pair) for pair, letter in zip(edges, letters or [], strict=False) if letter == "B"}
+    faces, holes = drop_holes(found, borders)
+    if not faces:
+        raise InputError(
+            "the edges enclose no face", file=file, field="edges_vertices", allowed="at least one closed face"
+        )
+    notes.append(f"faces_vertices is not given: {len(faces)} faces derived from the edges.")
+    if holes:
+        notes.append(f"{holes} regions enclosed by border edges alone were taken as holes.")
+    return faces
+
+
+def _plane_axes(normal) -> np.ndarray:
+    """Return [2, 3] right-handed axes of a plane, such that its normal points up; x and y for the xy plane."""
+    normal = normal * (-1.0 if normal[np.argmax(np.abs(normal))] < 0 else 1.0)
+    guide = np.eye(3)[0] if abs(normal[0]) < 0.9 else np.eye(3)[1]
+    first = guide - (guide @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first)])
+
+
+def _extra(document, keys, frame, notes) -> dict:
+    extra = {key: value for key, value in document.items() if key.startswith("file_") and key != "file_spec"}
+    extra |= {key: value for key, value in keys.items() if key not in OWN_KEYS}
+    if frame != 0:
+        extra = {k: v for k, v in extra.items() if k not in ("file_frames", "frame_parent", "frame_inherit")}
+        notes.append(f"frame {frame} was read on its own: the other frames of the file are not kept.")
+    return extra
+
+
+def _fit_extra(pattern, faces, edge_count) -> None:
+    """Lengthen unknown per-edge lists for edges that were added; drop lists that a reversed face made wrong."""
+    added = pattern.edge_count - edge_count
+    if edge_count and added:
+        for key, value in pattern.extra.items():
+            if key.startswith("edges_") and isinstance(value, list) and len(value) == edge_count:
+                pattern.extra[key] = value + [None] * added
+    if [tuple(face) for face in faces] != pattern.faces:
+        dropped = [key for key in ORIENTATION_KEYS if pattern.extra.pop(key, None) is not None]
+        if dropped:
+            pattern.notes.append(f"{', '.join(dropped)} dropped, because faces were reversed.")
+
+
+def write_fold(pattern: Pattern, path) -> None:
+    """Write a FOLD 1.2 file, atomically, with the keys kept in `extra`; reading it back gives the same pattern.
+
+    Coordinates are in `pattern.extra['frame_unit']`, in metres if that is not there.
+
+    Raises:
+        InputError: the file cannot be written, or `extra` holds what JSON cannot.
+    """
+    document = pattern_fold(pattern)
+    try:
+        lines = [f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in document.items()]
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"the pattern cannot be written as JSON: {error}", file=path, field="extra") from None
+    write_atomic(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode("ascii"))
+
+
+def pattern_fold(pattern: Pattern) -> dict:
+    """Return a pattern as a FOLD document; see `write_fold`."""
+    extra = {"frame_unit": "m"} | pattern.extra
+    scale = metres_per(extra["frame_unit"], field="frame_unit")
+    flat = not pattern.vertices[:, 2].any()
+    coordinates = _divided(pattern.vertices[:, :2] if flat else pattern.vertices, scale)
+    document = {
+        "file_spec": 1.2,
+        **extra,
+        "vertices_coords": coordinates.tolist(),
+        "edges_vertices": pattern.edges.tolist(),
+        "edges_assignment": list(pattern.assignments),
+        "faces_vertices": [list(map(int, face)) for face in pattern.faces],
+    }
+    optional = {
+        "edges_foldAngle": _degrees(pattern.fold_angles),
+        "edges_osim:stiffness": pattern.stiffness,
+        "edges_osim:restAngle": _degrees(pattern.rest_angles),
+        "faces_osim:thickness": _divided(pattern.thickness, scale),
+    }
+    for key, values in optional.items():
+        if not np.isnan(values).all():
+            document[key] = [None if np.isnan(value) else value for value in values.tolist()]
+    if any(name is not None for name in pattern.materials):
+        document["faces_osim:material"] = list(pattern.materials)
+    return document
+
+
+def _degrees(angles) -> np.ndarray:
+    return np.clip(_divided(angles, RADIANS_PER_DEGREE), -180.0, 180.0)
+
+
+def _divided(values, factor) -> np.ndarray:
+    """Return values / factor, chosen among its neighbours so that multiplying by `factor` gives `values` back."""
+    result = np.asarray(values / factor, dtype=np.float64)
+    rounded = np.array([float(f"{x:.14g}") for x in result.ravel()]).reshape(result.shape)
+    for candidate in (np.nextafter(result, np.inf), np.nextafter(result, -np.inf), rounded):
+        result = np.where(candidate * factor == values, candidate, result)
+    return result

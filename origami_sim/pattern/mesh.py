@@ -1,0 +1,100 @@
+"""Crease patterns from triangle meshes (OBJ, STL) and meshes back to files, by trimesh."""
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from ..errors import InputError
+from .assemble import assemble
+from .crease_pattern import Pattern
+from .files import read_bytes, write_atomic
+from .polygon import clip_ears, project
+from .triangulate import hinge_angles, triangulate
+from .units import metres_per
+
+FORMATS = (".obj", ".stl")
+COPLANAR = 1e-4
+"""Fold angle [rad] below which two triangles are one flat panel (STL stores single precision)."""
+
+
+def read_mesh(path, *, unit="m") -> Pattern:
+    """Read an OBJ or STL file as a pattern in its rest shape.
+
+    Every triangle becomes a face. An edge between coplanar triangles is 'F'; any other one is 'U', with the signed
+    fold angle of the mesh (valley positive) as rest angle. STL vertices at the same place are merged; OBJ vertices
+    keep their numbers.
+
+    Args:
+        path: the file, .obj or .stl.
+        unit: length unit of the coordinates, which the formats do not tell.
+
+    Raises:
+        InputError: unreadable or empty mesh, unknown suffix or unit, or anything `checks` refuses.
+    """
+    suffix = _suffix(path)
+    scale = metres_per(unit)
+    read_bytes(path)
+    try:
+        mesh = trimesh.load(str(path), file_type=suffix[1:], process=False, force="mesh", skip_materials=True)
+    except Exception as error:  # a third-party parser: whatever it trips over is the file's fault
+        raise InputError(f"cannot read the mesh ({type(error).__name__}: {str(error)[:120]})", file=path) from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise InputError("no triangles in the mesh", file=path)
+    vertices, triangles = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    if suffix == ".stl":
+        vertices, triangles = _merged(vertices, triangles)
+    notes = [f"the format has no unit: coordinates are taken in '{unit}'."]
+    faces = [tuple(map(int, face)) for face in triangles]
+    pattern = assemble(vertices * scale, faces, file=path)
+    notes += [note for note in pattern.notes if "without an assignment" not in note]
+    pattern.notes[:] = notes
+    split = triangulate(pattern)
+    for e, angle in zip(split.crease_edge, hinge_angles(pattern.vertices, split.creases), strict=True):
+        if abs(angle) < COPLANAR:
+            pattern.assignments[e], pattern.fold_angles[e] = "F", 0.0
+        else:
+            pattern.rest_angles[e] = angle
+    return pattern
+
+
+def _suffix(path) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError("unknown mesh format", file=path, field="suffix", value=suffix, allowed=", ".join(FORMATS))
+    return suffix
+
+
+def _merged(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
+    """Merge vertices at exactly the same place, numbered by first appearance."""
+    _, first, index = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[index.reshape(-1)][triangles]
+
+
+def write_mesh(vertices, faces, path) -> None:
+    """Write a mesh as OBJ or STL, atomically; polygons are split into triangles.
+
+    Args:
+        vertices: [N, 3] positions [m].
+        faces: loops of 3 or more vertex indices.
+        path: the file, .obj or .stl.
+
+    Raises:
+        InputError: unknown suffix, a face that cannot be split, or a file that cannot be written.
+    """
+    suffix = _suffix(path)
+    vertices = np.asarray(vertices, dtype=np.float64)
+    triangles = []
+    for f, face in enumerate(faces):
+        loop = [int(v) for v in face]
+        pieces = [(0, 1, 2)] if len(loop) == 3 else clip_ears(project(vertices[loop])[0], loop)
+        if pieces is None:
+            raise InputError("face cannot be triangulated", field=f"faces[{f}]", value=loop, allowed="simple polygons")
+        triangles += [[loop[n] for n in piece] for piece in pieces]
+    mesh = trimesh.Trimesh(vertices=vertices, faces=np.array(triangles).reshape(-1, 3), process=False)
+    options = {"digits": 12, "include_normals": False, "header": None} if suffix == ".obj" else {}
+    data = mesh.export(file_type=suffix[1:], **options)
+    write_atomic(path, data.encode() if isinstance(data, str) else bytes(data))

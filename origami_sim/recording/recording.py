@@ -1,0 +1,201 @@
+"""What was measured: channels over time with noise, drive and attachment, whatever wrote the file."""
+
+from dataclasses import dataclass, field, replace
+from math import comb
+
+import numpy as np
+
+from origami_sim.errors import InputError
+
+CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "panel_angle": ("angle", (1,)),
+    "crease_angle": ("angle", (1,)),
+    "marker": ("length", (3,)),
+    "marker_2d": ("length", (2,)),
+    "tip_displacement": ("length", (1, 2, 3)),
+    "force": ("force", (1, 2, 3)),
+}
+"""Dimension and allowed component counts of each kind of channel.
+
+- panel_angle: absolute rotation of a panel about the hinge axis.
+- crease_angle: fold angle between the two panels of a crease.
+- marker: point on the body, 3D. marker_2d: the same in a camera plane, in metres.
+- tip_displacement, force: one component or a vector.
+"""
+
+DIFFERENCE_ORDER = 6
+"""Order of the differences from which the noise is estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured quantity.
+
+    Attributes:
+        name: channel name, shared with the simulation's observer.
+        kind: a key of `CHANNEL_KINDS`.
+        values: (n,) or (n, d) measured values [SI]; nan where the tracker lost it.
+        unit: SI unit of `values`.
+        noise: standard deviation of one measured value (of one component of a vector) [SI].
+        attachment: what on the model is observed, e.g. {"panel": "arm1"} or {"panel": 0, "point": [x, y, z]}.
+    """
+
+    name: str
+    kind: str
+    values: np.ndarray
+    unit: str
+    noise: float
+    attachment: dict = field(default_factory=dict)
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether the channel measures an angle."""
+        return CHANNEL_KINDS[self.kind][0] == "angle"
+
+
+@dataclass(frozen=True, eq=False)
+class DriveChannel:
+    """One known input that was applied while recording.
+
+    Attributes:
+        name: drive channel name.
+        values: series (n,) or (n, d), or a constant () or (d,) [SI].
+        unit: SI unit of `values`.
+        constant: whether `values` holds throughout instead of per frame.
+    """
+
+    name: str
+    values: np.ndarray
+    unit: str
+    constant: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Channels of one measurement, on one time base.
+
+    Attributes:
+        name: name of the recording.
+        times: (n,) strictly increasing [s]; the step index where the sidecar states no time (load steps).
+        channels: measured channels by name.
+        drive: applied inputs by name; empty for a free motion.
+        metadata: source file and checksum, scene, notes of the lint, and what else the sidecar tells.
+    """
+
+    name: str
+    times: np.ndarray
+    channels: dict[str, Channel]
+    drive: dict[str, DriveChannel] = field(default_factory=dict)
+    metadata: dict = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for channel in self.channels.values():
+            if channel.kind not in CHANNEL_KINDS:
+                raise InputError(
+                    f"channel '{channel.name}' has an unknown kind",
+                    field="kind",
+                    value=channel.kind,
+                    allowed=", ".join(CHANNEL_KINDS),
+                )
+            if len(channel.values) != len(self.times):
+                raise InputError(
+                    f"channel '{channel.name}' has {len(channel.values)} values but there are {len(self.times)} times"
+                )
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames n."""
+        return len(self.times)
+
+    def window(self, t0: float, t1: float) -> "Recording":
+        """The frames with t0 <= t <= t1 [s], on the same time axis (not shifted to zero, not resampled)."""
+        slack = 1e-9 * max(abs(t0), abs(t1))
+        keep = (self.times >= t0 - slack) & (self.times <= t1 + slack)
+        if not keep.any():
+            raise InputError(
+                f"no frame between {t0:g} s and {t1:g} s",
+                field="window",
+                allowed=f"{self.times[0]:g} s to {self.times[-1]:g} s",
+            )
+        return replace(
+            self,
+            times=self.times[keep],
+            channels={k: replace(c, values=c.values[keep]) for k, c in self.channels.items()},
+            drive={k: d if d.constant else replace(d, values=d.values[keep]) for k, d in self.drive.items()},
+        )
+
+
+def estimate_noise(times: np.ndarray, values: np.ndarray) -> float:
+    """Standard deviation of the measurement noise, estimated from the data alone.
+
+    Divided differences of order 6 annihilate every quintic, so that a motion which is smooth over seven frames
+    vanishes and white noise is left. Each is scaled to unit variance for unit white noise; their median absolute
+    deviation (times 1.4826, the Gaussian factor) ignores the windows in which the motion is not smooth (an impact, a
+    snap). Uneven sampling is exact; windows across a gap (steps differing more than 3 times) are left out.
+
+    The result is at least quantum/sqrt(12) where the readings dwell on quantised levels (a tenth of the steps are zero;
+    the quantum is the smallest repeated nonzero step), because a sensor resting on one count shows no noise at all,
+    and at least the rounding of the numbers.
+
+    What it is not: noise correlated over more than seven frames (drift, a filtered tracker) is not seen, noise that
+    comes in bursts is represented by its median level, and below about ten frames per oscillation the motion leaks in
+    and the estimate is too large.
+
+    Args:
+        times: (n,) strictly increasing times [s].
+        values: (n,) or (n, d) measured values; nan where missing.
+
+    Returns:
+        Standard deviation in the unit of `values`, the root mean square over components.
+    """
+    columns = np.asarray(values, dtype=float).reshape(len(times), -1)
+    estimates = [max(_difference_noise(times, column), _quantum_noise(column)) for column in columns.T]
+    return float(np.sqrt(np.mean(np.square(estimates))))
+
+
+def scaled_differences(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Divided differences of order 6, scaled to the standard deviation of white noise in `values`.
+
+    Args:
+        times: (n,) strictly increasing times [s].
+        values: (n,) measured values; windows that touch a nan are left out.
+
+    Returns:
+        (m,) scaled differences, m <= n - 6. Fewer than seven values lower the order.
+    """
+    order = min(DIFFERENCE_ORDER, len(times) - 1)
+    step = np.diff(times)
+    typical = np.median(step)
+    if np.allclose(step, typical, rtol=1e-6, atol=0.0):
+        weights = [(-1.0) ** k * comb(order, k) / np.sqrt(comb(2 * order, order)) for k in range(order + 1)]
+        scaled = np.convolve(values, weights, mode="valid")
+    else:
+        frames = np.lib.stride_tricks.sliding_window_view((times - times[0]) / typical, order + 1)
+        spans = frames[:, :, None] - frames[:, None, :] + np.eye(order + 1)
+        weight = 1.0 / np.prod(spans, axis=2)
+        weight /= np.linalg.norm(weight, axis=1, keepdims=True)
+        scaled = np.sum(weight * np.lib.stride_tricks.sliding_window_view(values, order + 1), axis=1)
+        steps = np.lib.stride_tricks.sliding_window_view(step, order)
+        even = steps.max(axis=1) <= 3.0 * steps.min(axis=1)
+        if even.any():
+            scaled = scaled[even]
+    return scaled[np.isfinite(scaled)]
+
+
+def _difference_noise(times: np.ndarray, values: np.ndarray) -> float:
+    seen = np.isfinite(values)
+    scaled = scaled_differences(times, values)
+    if scaled.size == 0:  # no seven consecutive frames: difference across the holes
+        scaled = scaled_differences(times[seen], values[seen])
+    rounding = np.finfo(float).eps * np.abs(values[seen]).max(initial=np.finfo(float).tiny)
+    return max(1.4826 * float(np.median(np.abs(scaled))) if scaled.size else 0.0, float(rounding))
+
+
+def _quantum_noise(values: np.ndarray) -> float:
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    rounding = 8.0 * np.finfo(float).eps * np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    moved = np.sort(steps[steps > rounding])
+    if moved.size < 2 or np.count_nonzero(steps <= rounding) < 0.1 * steps.size:
+        return 0.0
+    repeated = np.flatnonzero(np.diff(moved) <= 0.01 * moved[:-1])
+    return float(moved[repeated[0]] / np.sqrt(12.0)) if repeated.size else 0.0

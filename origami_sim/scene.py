@@ -1,0 +1,185 @@
+"""Scenes: a device with its calibration, what it computes and the table that it prints."""
+
+import importlib
+import os
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from origami_sim.errors import InputError
+from origami_sim.recording.units import UNITS
+from origami_sim.solve.dynamics import Trajectory
+
+NAMES = ("box", "crawler", "bifold", "pendulum_chain", "fold_file", "mae_crease")
+"""The scenes that ship with the package."""
+
+_KEYS = {"value", "unit", "range", "choices", "source", "meaning", "uncertainty"}
+_FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One number (or word) of a calibration: SI value, unit, where it comes from and how far it may vary."""
+
+    name: str
+    value: float | str | bool
+    unit: str
+    source: str
+    meaning: str
+    range: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()
+
+
+class Settings(Mapping[str, Setting]):
+    """The settings of a calibration; values are attributes: settings.gap."""
+
+    def __init__(self, settings: Sequence[Setting], file: Path):
+        self._settings = {s.name: s for s in settings}
+        self.file = file
+
+    def __getitem__(self, name: str) -> Setting:
+        return self._settings[name]
+
+    def __iter__(self):
+        return iter(self._settings)
+
+    def __len__(self):
+        return len(self._settings)
+
+    def __getattr__(self, name: str):
+        try:
+            return self.__dict__["_settings"][name].value
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def replace(self, **values) -> "Settings":
+        """A copy with other values (SI), checked against their ranges."""
+        out = []
+        for s in self._settings.values():
+            out.append(_checked(Setting(**{**s.__dict__, "value": values.pop(s.name)}), self.file) if s.name in values else s)
+        for name in values:
+            raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
+        return Settings(out, self.file)
+
+    def override(self, assignments: Sequence[str]) -> "Settings":
+        """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI."""
+        values = {}
+        for text in assignments:
+            name, equals, given = text.partition("=")
+            if not equals or name not in self._settings:
+                raise InputError("cannot apply this setting", file=self.file, field=name, value=text,
+                                 allowed="name=value with name one of " + ", ".join(self._settings))  # fmt: skip
+            values[name] = _parse(self._settings[name], given.strip(), self.file)
+        return self.replace(**values)
+
+    def as_dict(self) -> dict:
+        return {n: s.value for n, s in self._settings.items()}
+
+
+def _parse(setting: Setting, text: str, file: Path):
+    if isinstance(setting.value, bool):
+        if text.lower() not in ("true", "false"):
+            raise InputError("not a switch", file=file, field=setting.name, value=text, allowed="true, false")
+        return text.lower() == "true"
+    if isinstance(setting.value, str):
+        return text
+    match = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*(.*)", text)
+    if not match:
+        raise InputError("not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}")
+    number, unit = float(match[1]), match[2]
+    if not unit or unit == setting.unit:
+        return number
+    kind = _FACTORS.get(setting.unit, ("", 1.0))[0]
+    if unit not in _FACTORS or _FACTORS[unit][0] != kind:
+        allowed = ", ".join(UNITS.get(kind, {setting.unit: 1.0}))
+        raise InputError("wrong unit", file=file, field=setting.name, value=unit, allowed=allowed)
+    return number * _FACTORS[unit][1]
+
+
+def _checked(s: Setting, file: Path) -> Setting:
+    if s.choices and s.value not in s.choices:
+        raise InputError("not one of the choices", file=file, field=s.name, value=s.value, allowed=", ".join(s.choices))
+    if isinstance(s.value, (int, float)) and not isinstance(s.value, bool):
+        if not np.isfinite(s.value):
+            raise InputError("not a finite number", file=file, field=s.name, value=s.value)
+        if s.range and not s.range[0] <= s.value <= s.range[1]:
+            raise InputError("out of its range", file=file, field=s.name, value=s.value,
+                             allowed=f"{s.range[0]:g} to {s.range[1]:g} {s.unit}")  # fmt: skip
+    return s
+
+
+def read_calibration(source: str | Path) -> Settings:
+    """Reads a calibration: a TOML file, or the name of one that ships with the package.
+
+    Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
+    `choices` and `uncertainty`.
+
+    Raises:
+        InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = Path(str(resources.files("origami_sim.calibrations") / f"{source}.toml"))
+    try:
+        data = tomllib.loads(path.read_text())
+    except OSError as e:
+        raise InputError(f"cannot be read ({e.strerror})", file=path, allowed="a TOML file or a shipped calibration") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
+        raise InputError(f"is not valid TOML ({e})", file=path) from None
+    settings = []
+    for name, table in data.items():
+        if not isinstance(table, dict) or "value" not in table or not {"unit", "source", "meaning"} <= set(table):
+            raise InputError("a setting needs value, unit, source and meaning", file=path, field=name)
+        unknown = set(table) - _KEYS
+        if unknown:
+            raise InputError("unknown key", file=path, field=f"{name}.{min(unknown)}", allowed=", ".join(sorted(_KEYS)))
+        value = table["value"]
+        if not isinstance(value, (int, float, str, bool)):
+            raise InputError("a setting is a number, a word or a switch", file=path, field=name, value=value)
+        if isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        limits = tuple(table["range"]) if "range" in table else None
+        settings.append(_checked(Setting(name, value, table["unit"], table["source"], table["meaning"], limits,
+                                         tuple(table.get("choices", ()))), path))  # fmt: skip
+    return Settings(settings, path)
+
+
+@dataclass
+class Outcome:
+    """What a scene computed.
+
+    Attributes:
+        trajectory: the run that the replay shows.
+        tables: name -> column -> values. units: column -> unit, for all tables.
+        summary: sentences to print below the tables.
+        numbers: headline numbers by name, for machines.
+    """
+
+    trajectory: Trajectory
+    tables: dict[str, dict[str, np.ndarray | list]]
+    units: dict[str, str] = field(default_factory=dict)
+    summary: list[str] = field(default_factory=list)
+    numbers: dict[str, float] = field(default_factory=dict)
+
+
+Progress = Callable[[float], None]
+
+
+def scene_module(name: str) -> ModuleType:
+    """The module of a shipped scene; raises InputError naming them."""
+    if name not in NAMES:
+        raise InputError("there is no such scene", field="scene", value=name, allowed=", ".join(NAMES))
+    return importlib.import_module(f"origami_sim.scenes.{name}")
+
+
+def recordings_folder() -> Path | None:
+    """Folder of real recordings: $ORIGAMI_RECORDINGS, or shared/recordings beside the checkout; None if absent."""
+    given = os.environ.get("ORIGAMI_RECORDINGS")
+    candidates = [Path(given)] if given else [p / "shared" / "recordings" for p in Path(__file__).resolve().parents[:3]]
+    return next((p for p in candidates if p.is_dir()), None)

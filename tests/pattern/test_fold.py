@@ -1,0 +1,317 @@
+"""FOLD: what is read, defaulted, derived, refused and written back."""
+
+import copy
+import json
+import math
+
+import numpy as np
+import pytest
+
+from origami_sim.errors import InputError
+from origami_sim.pattern import miura, read_fold, read_pattern, write_fold
+from origami_sim.pattern.fold import fold_pattern
+
+SQUARE = {
+    "file_spec": 1.2,
+    "frame_unit": "m",
+    "vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1]],
+    "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]],
+    "edges_assignment": ["B", "B", "B", "B", "V"],
+    "edges_foldAngle": [None, None, None, None, 90],
+    "faces_vertices": [[0, 1, 2], [0, 2, 3]],
+}
+
+
+def square(**changes):
+    document = copy.deepcopy(SQUARE)
+    for key, value in changes.items():
+        if value is None:
+            del document[key]
+        else:
+            document[key.replace("__", ":")] = value
+    return document
+
+
+def test_reads_metres_and_radians():
+    pattern = fold_pattern(square(frame_unit="mm", faces_osim__thickness=[0.5, 1], faces_osim__material=["PET", None]))
+    assert pattern.vertices.shape == (4, 3)
+    np.testing.assert_allclose(pattern.vertices[2], [1e-3, 1e-3, 0])
+    assert pattern.fold_angles[4] == pytest.approx(math.pi / 2)
+    np.testing.assert_allclose(pattern.thickness, [0.5e-3, 1e-3])
+    assert pattern.materials == ["PET", None]
+    assert pattern.notes == []
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("cm", 0.01), ("in", 0.0254), ("ft", 0.3048), ("pt", 0.0254 / 72)])
+def test_units(unit, metres):
+    assert fold_pattern(square(frame_unit=unit)).vertices[1, 0] == pytest.approx(metres)
+
+
+@pytest.mark.parametrize("unit", [None, "unit"])
+def test_missing_unit_is_metre_with_a_note(unit):
+    pattern = fold_pattern(square(frame_unit=unit))
+    assert pattern.vertices[1, 0] == 1.0
+    assert "metres" in pattern.notes[0]
+
+
+def test_custom_edge_keys():
+    pattern = fold_pattern(square(edges_osim__stiffness=[None] * 4 + [0.02], edges_osim__restAngle=[None] * 4 + [-45]))
+    assert pattern.stiffness[4] == 0.02
+    assert pattern.rest_angles[4] == pytest.approx(-math.pi / 4)
+    assert np.isnan(pattern.stiffness[:4]).all()
+
+
+def test_old_spelling_of_fold_angle():
+    document = square(edges_foldAngle=None) | {"edges_foldAngles": [0, 0, 0, 0, 60]}
+    assert fold_pattern(document).fold_angles[4] == pytest.approx(math.pi / 3)
+
+
+def test_missing_angles_open_for_valleys_zero_for_flat():
+    pattern = fold_pattern(square(edges_foldAngle=None))
+    assert np.isnan(pattern.fold_angles).all()
+    assert any("no fold angle" in note for note in pattern.notes)
+    assert fold_pattern(square(edges_foldAngle=None, edges_assignment=list("BBBBF"))).fold_angles[4] == 0.0
+
+
+def test_missing_assignments():
+    pattern = fold_pattern(square(edges_assignment=None))
+    assert pattern.assignments == ["B", "B", "B", "B", "U"]
+    assert any("without an assignment" in note for note in pattern.notes)
+
+
+def test_missing_edges_are_the_sides_of_the_faces():
+    pattern = fold_pattern(square(edges_vertices=None, edges_assignment=None, edges_foldAngle=None))
+    assert pattern.edge_count == 5
+    assert sorted(pattern.assignments) == list("BBBBU")
+
+
+def test_missing_faces_are_derived():
+    pattern = fold_pattern(square(faces_vertices=None))
+    assert sorted(sorted(face) for face in pattern.faces) == [[0, 1, 2], [0, 2, 3]]
+    assert any("derived" in note for note in pattern.notes)
+
+
+def test_derived_faces_in_a_vertical_plane_and_with_loose_ends():
+    document = square(
+        vertices_coords=[[0, 3, 0], [1, 3, 0], [1, 3, 1], [0, 3, 1], [2, 3, 2]],
+        edges_vertices=[*SQUARE["edges_vertices"], [2, 4]],
+        edges_assignment=list("BBBBVF"),
+        edges_foldAngle=None,
+        faces_vertices=None,
+    )
+    pattern = fold_pattern(document)
+    assert pattern.face_count == 2
+    assert any("beside no face" in note for note in pattern.notes)
+
+
+def test_hole_bounded_by_border_edges():
+    ring = [[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2], [1, 2]]
+    edges = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
+    pattern = fold_pattern({"vertices_coords": ring, "edges_vertices": edges, "edges_assignment": list("BBBBBBBBVVVV")})
+    assert pattern.face_count == 4
+    assert any("hole" in note for note in pattern.notes)
+
+
+def test_island_is_refused():
+    ring = [[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2]]
+    edges = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 4]]
+    with pytest.raises(InputError, match="loose inside"):
+        fold_pattern({"vertices_coords": ring, "edges_vertices": edges})
+
+
+def test_faces_are_turned_counter_clockwise():
+    pattern = fold_pattern(square(faces_vertices=[[2, 1, 0], [0, 2, 3]], faces_edges=[[1, 0, 4], [4, 2, 3]]))
+    assert pattern.faces == [(0, 1, 2), (0, 2, 3)]
+    assert any("reversed" in note for note in pattern.notes)
+    assert "faces_edges" not in pattern.extra
+
+
+def test_unlisted_side_is_added_and_unknown_edge_lists_follow():
+    document = square(edges_vertices=SQUARE["edges_vertices"][:4], edges_assignment=list("BBBB"), edges_foldAngle=None)
+    pattern = fold_pattern(document | {"edges_my:colour": [1, 2, 3, 4]})
+    assert pattern.assignments == ["B", "B", "B", "B", "U"]
+    assert pattern.extra["edges_my:colour"] == [1, 2, 3, 4, None]
+
+
+def test_odd_assignments_are_told():
+    pattern = fold_pattern(square(edges_assignment=list("BBMBB")))
+    assert pattern.assignments[4] == "U"
+    assert any("'B' between two faces" in note for note in pattern.notes)
+    assert any("one face only" in note for note in pattern.notes)
+    assert any("but its fold angle" in note for note in fold_pattern(square(edges_assignment=list("BBBBM"))).notes)
+
+
+FRAMED = square() | {
+    "file_author": "A",
+    "file_frames": [
+        {"frame_inherit": True, "frame_parent": 0, "edges_foldAngles": [None] * 4 + [30], "frame_title": "half"},
+        {"frame_inherit": True, "frame_parent": 1, "vertices_coords": [[0, 0], [2, 0], [2, 2], [0, 2]]},
+        {"frame_inherit": True, "frame_parent": 3},
+        {"vertices_coords": [[0, 0]]},
+    ],
+}
+
+
+def test_frames_inherit():
+    pattern = fold_pattern(FRAMED, frame=2)
+    assert pattern.vertices[2, 0] == 2.0
+    assert pattern.fold_angles[4] == pytest.approx(math.radians(30))
+    assert pattern.extra["frame_title"] == "half"
+    assert pattern.extra["file_author"] == "A"
+    assert any("other frames" in note for note in pattern.notes)
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"), [(3, "circle"), (9, "no such frame"), (-1, "no such frame"), (4, "neither edges nor faces")]
+)
+def test_bad_frames(frame, words):
+    with pytest.raises(InputError, match=words):
+        fold_pattern(FRAMED, frame=frame)
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        square(),
+        FRAMED,
+        square(frame_unit="in", file_title="T", other__key={"a": [1, None]}, faces_osim__thickness=[0.1, 0.3]),
+        square(frame_unit=None, faces_vertices=None, edges_assignment=None),
+        square(vertices_coords=[[0, 0, 0], [1 / 3, 0, 0.1], [1.1, 1, 0], [0, 0.7, 0]], frame_unit="pt"),
+    ],
+)
+def test_round_trip(tmp_path, document):
+    source, copied = tmp_path / "a.fold", tmp_path / "b.fold"
+    source.write_text(json.dumps(document))
+    first = read_fold(source)
+    write_fold(first, copied)
+    second = read_fold(copied)
+    assert second.equals(first)
+    written = json.loads(copied.read_text())
+    assert {k: v for k, v in document.items() if k.startswith(("file_", "frame_", "other"))}.items() <= written.items()
+    assert [p.name for p in tmp_path.iterdir() if p.suffix != ".fold"] == []
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.0254, 0.3048, 1e-6])
+def test_many_numbers_survive_the_round_trip(tmp_path, factor):
+    unit = {1e-3: "mm", 0.0254: "in", 0.3048: "ft", 1e-6: "um"}[factor]
+    rng = np.random.default_rng(1)
+    points = np.column_stack([np.arange(200), rng.normal(size=200), rng.normal(size=200)]).round(7)
+    faces = [[3 * n, 3 * n + 1, 3 * n + 2] for n in range(66)]
+    document = {"frame_unit": unit, "vertices_coords": points.tolist(), "faces_vertices": faces}
+    first = fold_pattern(document)
+    first.rest_angles[:] = np.radians(rng.uniform(-180, 180, first.edge_count))
+    write_fold(first, tmp_path / "a.fold")
+    assert read_fold(tmp_path / "a.fold").equals(first)
+
+
+def test_built_pattern_is_written_in_metres(tmp_path):
+    pattern = miura(1, 1, 0.01, 0.02, 1.0, fold_angle=2.0)
+    write_fold(pattern, tmp_path / "a.fold")
+    again = read_fold(tmp_path / "a.fold")
+    np.testing.assert_array_equal(again.vertices, pattern.vertices)
+    np.testing.assert_allclose(again.fold_angles, pattern.fold_angles, rtol=1e-15)
+    assert again.assignments == pattern.assignments
+    assert again.extra == {"frame_unit": "m"}
+
+
+def test_straight_angle_stays_in_range(tmp_path):
+    pattern = fold_pattern(square(edges_foldAngle=[None] * 4 + [180]))
+    pattern.fold_angles[4] = np.nextafter(math.pi, 4)
+    write_fold(pattern, tmp_path / "a.fold")
+    assert read_fold(tmp_path / "a.fold").fold_angles[4] == math.pi
+
+
+BAD = {
+    "vertices missing": square(vertices_coords=None),
+    "not a list .*vertices_coords": square(vertices_coords=5),
+    r"not a point .*vertices_coords\[1\]": square(vertices_coords=[[0, 0], [1], [1, 1], [0, 1]]),
+    "not a finite number .*'x'": square(vertices_coords=[[0, 0], ["x", 0], [1, 1], [0, 1]]),
+    "not a finite number .*True": square(vertices_coords=[[0, 0], [True, 0], [1, 1], [0, 1]]),
+    "not a finite number .*huge": square(vertices_coords=[[0, 0], [10**400, 0], [1, 1], [0, 1]]),
+    "coordinate out of range": square(vertices_coords=[[0, 0], [1e300, 0], [1, 1], [0, 1]]),
+    r"index out of range .*faces_vertices\[1\].*0 to 3": square(faces_vertices=[[0, 1, 2], [0, 2, 7]]),
+    "index out of range .*-1": square(faces_vertices=[[0, 1, 2], [0, 2, -1]]),
+    r"not an index .*edges_vertices\[0\]": square(edges_vertices=[[0, 1.5], [1, 2], [2, 3], [3, 0], [0, 2]]),
+    "bad entry .*edges_vertices": square(edges_vertices=[[0, 1, 2], [1, 2], [2, 3], [3, 0], [0, 2]]),
+    "duplicate vertex in a face": square(faces_vertices=[[0, 1, 2, 0], [0, 2, 3]]),
+    "fewer than 3": square(faces_vertices=[[0, 1], [0, 2, 3]]),
+    "non-manifold": square(
+        vertices_coords=[[0, 0], [1, 0], [1, 1], [0, 1], [2, 5]], faces_vertices=[[0, 1, 2], [0, 2, 3], [0, 2, 4]]
+    ),
+    "zero-area": square(vertices_coords=[[0, 0], [1, 1], [2, 2], [0, 1]]),
+    "zero-length": square(vertices_coords=[[0, 0], [0, 0], [1, 1], [0, 1]]),
+    "edge listed twice": square(edges_vertices=[[0, 1], [1, 0], [2, 3], [3, 0], [0, 2]]),
+    "wrong array length .*edges_assignment.*5 entries": square(edges_assignment=["B"]),
+    "wrong array length .*edges_foldAngle": square(edges_foldAngle=[0]),
+    "unknown letter .*'X'.*B M V F U C J": square(edges_assignment=list("BBBBX")),
+    "out of range .*edges_foldAngle.*-180 to 180": square(edges_foldAngle=[0, 0, 0, 0, 181]),
+    "out of range .*restAngle": square(edges_osim__restAngle=[0, 0, 0, 0, -500]),
+    "out of range .*thickness": square(faces_osim__thickness=[0, 1]),
+    "out of range .*thickness.*-1": square(faces_osim__thickness=[1, -1]),
+    "out of range .*stiffness": square(edges_osim__stiffness=[0, 0, 0, 0, -1]),
+    "not a name": square(faces_osim__material=[3, None]),
+    "unknown length unit .*cubit": square(frame_unit="cubit"),
+    "unknown length unit .*list": square(frame_unit=[1]),
+    "cross or overlap": square(
+        faces_vertices=None,
+        edges_vertices=[[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]],
+        edges_assignment=None,
+        edges_foldAngle=None,
+    ),
+    "not flat": square(faces_vertices=None, vertices_coords=[[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]]),
+    "enclose no face": {"vertices_coords": [[0, 0], [1, 0]], "edges_vertices": [[0, 1]]},
+    "neither edges nor faces": {"vertices_coords": [[0, 0], [1, 0]]},
+    "Moebius": {
+        "vertices_coords": [[math.cos(n), math.sin(n), (n % 2) * 0.5] for n in range(5)],
+        "faces_vertices": [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]],
+    },
+}
+
+
+@pytest.mark.parametrize("words", BAD)
+def test_bad_documents(words):
+    with pytest.raises(InputError, match=words) as error:
+        fold_pattern(BAD[words], file="my.fold")
+    assert str(error.value).startswith("my.fold: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b"{", "malformed JSON"),
+        (b"\xff\xfe", "malformed JSON"),
+        (b"[1]", "not a JSON object"),
+        (b'{"vertices_coords": [[NaN, 0]]}', "JSON does not have"),
+        (b'{"vertices_coords": [[1e999, 0]]}', "not a finite number"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b'{"a": ' + b"1" * 5000 + b"}", "malformed JSON"),
+    ],
+)
+def test_bad_text(tmp_path, text, words):
+    path = tmp_path / "bad.fold"
+    path.write_bytes(text)
+    with pytest.raises(InputError, match=words) as error:
+        read_fold(path)
+    assert str(path) in str(error.value)
+
+
+def test_read_pattern_dispatches(tmp_path):
+    path = tmp_path / "A.FOLD"
+    path.write_text(json.dumps(SQUARE))
+    assert read_pattern(path).face_count == 2
+    with pytest.raises(InputError, match=r"unknown pattern format.*\.fold"):
+        read_pattern(tmp_path / "a.docx")
+    with pytest.raises(InputError, match="no such file"):
+        read_pattern(tmp_path / "none.fold")
+    with pytest.raises(InputError, match="cannot read"):
+        read_fold(tmp_path)
+
+
+def test_writing_what_cannot_be_written(tmp_path):
+    pattern = fold_pattern(square())
+    with pytest.raises(InputError, match="cannot write"):
+        write_fold(pattern, tmp_path / "none" / "a.fold")
+    pattern.extra["odd"] = {1, 2}
+    with pytest.raises(InputError, match="as JSON"):
+        write_fold(pattern, tmp_path / "a.fold")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,201 @@
+"""The step bound against dense eigenvalues of the numerically differentiated forces, and against long runs."""
+
+import numpy as np
+import pytest
+from effects.kit import hinge, hinge_positions, make_model, quiet, start, strip
+
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.timestep import SAFETY, stable_step
+
+RNG = np.random.default_rng(7)
+
+
+def bars_only():
+    model = strip(3)
+    return model, quiet(model, {
+        ("bars", "stiffness"): RNG.uniform(200, 4000, len(model.bars)), ("bars", "rest_length"): rest(model),
+        ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
+    })  # fmt: skip
+
+
+def rest(model):
+    return np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
+
+
+def hinges_only():
+    model = strip(3)
+    return model, quiet(model, {
+        ("crease", "stiffness"): RNG.uniform(1, 5, len(model.creases)),
+        ("panel_bending", "stiffness"): RNG.uniform(1, 9, len(model.bends)),
+        ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
+    })  # fmt: skip
+
+
+def sheet():
+    model, p = bars_only()
+    return model, p.set("crease", "stiffness", 40.0).set("panel_bending", "stiffness", 90.0)
+
+
+def damped_sheet():
+    model, p = sheet()
+    return model, p.set("crease_viscosity", "viscosity", 0.4).set("bar_viscosity", "viscosity", 4.0).set(
+        "mass_damping", "decay_rate", 30.0)  # fmt: skip
+
+
+def viscous_hinges():
+    model, p = hinges_only()
+    return model, p.set("crease_viscosity", "viscosity", 2.0)
+
+
+def drag_only():
+    model = strip(2)
+    return model, quiet(model, {("mass_damping", "decay_rate"): 250.0})
+
+
+def contact():
+    """Three nodes of bars resting on stiff ground with one offset contact point, pressed in."""
+    x = [[0, 0, -0.011], [1, 0, -0.01], [0.2, 0.9, -0.012]]
+    model = make_model(x, bars=[(0, 1), (1, 2), (2, 0)], triangles=[(0, 1, 2)], contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)],
+                       weights=[[1, 0, 0], [1, 0, 0], [0.6, 0.3, 0.1]], offsets=[0, 0, -0.05])  # fmt: skip
+    return model, quiet(model, {
+        ("bars", "stiffness"): 100.0, ("bars", "rest_length"): rest(model), ("inertia", "mass"): 0.02,
+        ("ground", "stiffness"): [[3000.0], [2000.0], [1000.0]], ("plane", "reach"): 0.1,
+    })  # fmt: skip
+
+
+def damped_contact():
+    model, p = contact()
+    return model, p.set("ground", "damping", 2.0)
+
+
+def differentiated(model, parameters):
+    """Mass, stiffness and damping matrices of the free coordinates, by central differences of the total force."""
+    n = model.position.size
+    h = 1e-6 * np.concatenate([np.eye(n), -np.eye(n)])
+    moved = np.moveaxis((model.position.ravel() + h).reshape(2 * n, -1, 3), 0, 1)
+    out = []
+    for x, v in ((moved, None), (None, np.moveaxis(h.reshape(2 * n, -1, 3), 0, 1))):
+        batch = Batch(model, parameters, Drive(), start(model, 2 * n, x=x, v=v))
+        f = np.moveaxis(batch.total_force(0.0), 1, 0).reshape(2 * n, n)
+        slopes = -(f[:n] - f[n:]).T / 2e-6
+        out.append(slopes)
+    free = np.flatnonzero(model.free.ravel())
+    mass = np.repeat(np.broadcast_to(parameters["inertia", "mass"], (len(model.position), 1))[:, 0], 3)[free]
+    return mass, *(m[np.ix_(free, free)] for m in out)
+
+
+def spectral_radius(mass, stiffness, damping, dt):
+    """Of one step: kick, drift and kick, with the damping taken at the velocity predicted from the old acceleration."""
+    n = len(mass)
+    one, k, c = np.eye(n), stiffness / mass[:, None], damping / mass[:, None]
+    drift = np.hstack([one, dt * one, 0.5 * dt**2 * one])
+    predicted = np.hstack([0 * one, one, dt * one])
+    a = -k @ drift - c @ predicted
+    v = np.hstack([0 * one, one, 0.5 * dt * one]) + 0.5 * dt * a
+    return np.abs(np.linalg.eigvals(np.vstack([drift, v, a]))).max()
+
+
+def exact_limit(mass, stiffness, damping, guess):
+    low, high = 0.5 * guess, 4 * guess
+    for _ in range(40):
+        dt = 0.5 * (low + high)
+        # rigid motion has the double root 1, which roundoff splits by its square root
+        low, high = (dt, high) if spectral_radius(mass, stiffness, damping, dt) < 1 + 2e-4 else (low, dt)
+    return low
+
+
+UNDAMPED = [bars_only, hinges_only, sheet, contact]
+DAMPED = [damped_sheet, viscous_hinges, drag_only, damped_contact]
+
+
+@pytest.mark.parametrize("case", UNDAMPED, ids=lambda c: c.__name__)
+def test_limit_is_safe_and_at_most_three_times_too_small(case):
+    model, parameters = case()
+    mass, k, c = differentiated(model, parameters)
+    root = np.sqrt(mass)
+    exact = 2 / np.sqrt(np.linalg.eigvalsh((k + k.T) / 2 / root / root[:, None]).max())
+    limit = stable_step(model, parameters).limit
+    assert np.abs(c).max() < 1e-9
+    assert exact / 3 <= limit <= exact * (1 + 1e-6), limit / exact
+
+
+@pytest.mark.parametrize("case", DAMPED, ids=lambda c: c.__name__)
+def test_limit_with_damping_is_safe_and_at_most_three_times_too_small(case):
+    model, parameters = case()
+    limit = stable_step(model, parameters).limit
+    assert np.isfinite(limit)
+    exact = exact_limit(*differentiated(model, parameters), limit)
+    assert exact / 3 <= limit <= exact * (1 + 1e-3), limit / exact
+
+
+def relaxing():
+    """A hinge held together by its Maxwell branches alone."""
+    model = hinge(0.3, held=(0, 1, 2), bars=())
+    return model, quiet(model, {
+        ("crease_relaxation", "stiffness_1"): 2.0, ("crease_relaxation", "stiffness_2"): 3.0,
+        ("crease_relaxation", "time_1"): 1e3, ("crease_relaxation", "time_2"): 0.5, ("inertia", "mass"): 0.01,
+    })  # fmt: skip
+
+
+def sticking():
+    """A foot held in the plane by its bristle alone."""
+    model, p = contact()
+    free = np.zeros_like(model.position)
+    free[0, :2] = 1
+    model = make_model(model.position, free=free, triangles=[(0, 1, 2)], contacts=[(0, 1, 2)])
+    return model, quiet(model, {
+        ("ground", "stiffness"): 300.0, ("coulomb", "friction_coefficient"): 5.0, ("friction", "stiffness"): 900.0,
+        ("inertia", "mass"): 0.01,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("case", [*UNDAMPED, *DAMPED, relaxing, sticking], ids=lambda c: c.__name__)
+def test_ten_thousand_steps_at_the_limit_stay_bounded(case):
+    model, parameters = case()
+    dt = 0.99 * stable_step(model, parameters).limit
+    v = np.random.default_rng(3).normal(size=model.position.shape) * model.free
+    v -= v.mean(0) * (model.free.min() > 0)  # no drift of the whole
+    run = simulate(model, parameters, dt=dt, duration=10_000 * dt, rate=1 / (100 * dt), state=start(model, v=1e-6 * v / dt))
+    assert not run.failures
+    speed = np.abs(run.v).max((1, 2, 3))
+    assert speed[50:].max() <= 3 * speed[:50].max()
+
+
+def test_default_step_is_a_fraction_of_the_limit_and_names_its_cause():
+    model, parameters = sheet()
+    step = stable_step(model, parameters)
+    assert step.dt == SAFETY * step.limit
+    assert "(bars)" in step.cause
+    assert str(step.node) in str(step) and step.cause in str(step)
+
+
+def test_single_spring_and_dashpot_have_the_closed_form_limit():
+    """dt = 2/omega (sqrt(1 + 4 zeta^2) - 2 zeta) for one free node on one bar."""
+    k, c, m = 50.0, 0.7, 0.02
+    model = make_model([[0, 0, 0], [1, 0, 0]], bars=[(0, 1)], free=[[0, 0, 0], [1, 0, 0]])
+    p = quiet(model, {("bars", "stiffness"): k, ("bar_viscosity", "viscosity"): c, ("inertia", "mass"): m})
+    omega = np.sqrt(k / m)
+    zeta = c / (2 * m * omega)
+    assert stable_step(model, p).limit == pytest.approx(2 / omega * (np.sqrt(1 + 4 * zeta**2) - 2 * zeta), rel=1e-12)
+    assert spectral_radius(np.array([m]), np.array([[k]]), np.array([[c]]), 1.01 * stable_step(model, p).limit) > 1
+
+
+def test_limit_is_that_of_the_worst_world():
+    model, p = bars_only()
+    softer = p.copy().set("bars", "stiffness", p["bars", "stiffness"] * np.array([0.1, 1.0, 0.5]))
+    assert stable_step(model, softer).limit == stable_step(model, p).limit
+
+
+def test_worlds_that_do_not_match_are_named():
+    model, p = bars_only()
+    p.set("bars", "stiffness", np.ones((1, 2))).set("crease", "stiffness", np.ones((1, 3)))
+    with pytest.raises(InputError, match=r"bars\.stiffness|crease\.stiffness"):
+        simulate(model, p, duration=0.1)
+
+
+def test_no_stiffness_means_no_limit():
+    model = make_model(hinge_positions(0.5), bars=[(0, 1)])
+    assert stable_step(model, quiet(model)).limit == np.inf
