@@ -158,6 +158,12 @@ class Parameters:
         """Number of worlds that the arrays describe (1 if none differs)."""
         return max(v.shape[1] for v in self._values.values())
 
+    def world(self, w: int) -> "Parameters":
+        """The parameters of one world: every array has one column."""
+        out = object.__new__(Parameters)
+        out._values = {k: v[:, [w if v.shape[1] > 1 else 0]].copy() for k, v in self._values.items()}
+        return out
+
     def copy(self) -> "Parameters":
         out = object.__new__(Parameters)
         out._values = {k: v.copy() for k, v in self._values.items()}

@@ -35,7 +35,10 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     cells = np.diff(x)
     width = s.rear_width + (s.front_width - s.rear_width) * x / x[-1]
     sheet = Sheet(strip(list(cells), list(width)), thickness=s.thickness, modulus=s.modulus, density=s.density,
-                  membrane=s.membrane, membrane_damping=s.membrane_damping)  # fmt: skip
+                  membrane=s.membrane, membrane_damping=s.membrane_damping,
+                  triangulation="diagonal" if s.guided else "center")  # fmt: skip
+    if s.guided:
+        sheet.fix(nodes=range(2 * len(x)), axes="y")
 
     # bending: the sheet over its width, the bonded sandwich over the patch's width
     plane = s.modulus / (1 - s.poisson**2)
@@ -49,8 +52,8 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     stiffness = 1.0 / (half[:-1] + half[1:])
     # only the bare sheet bends enough to lose energy; the same loss time on the sandwich would only cost time step
     sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=np.minimum(stiffness, bare * width[1:-1] / s.cell) * s.loss_time)
-    for panel, value in enumerate(rigidity / middle):
-        sheet.panel(panel, rigidity=value)
+    # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not
+    sheet.panel(np.arange(len(cells)), rigidity=bonded)
     for number, size, sign, factor in (
         (1, (s.big_length, s.big_width), s.polarity, s.big_moment), (2, (s.small_length, s.small_width), -s.polarity, 1.0),
     ):  # fmt: skip

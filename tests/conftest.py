@@ -1,8 +1,5 @@
 """Fixtures shared by the tests of effects and solvers."""
 
-import sys
-from pathlib import Path
-
 import pytest
 import warp as wp
 

@@ -21,8 +21,9 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     # axial force, positive in tension
     "bar": ("length", "rate", "dt"),
     # moment, positive towards valley (increasing angle); "crease" is a fold line, "bend" a line inside a panel
-    "crease": ("angle", "rate", "dt"),
-    "bend": ("angle", "rate", "dt"),
+    # turn: change of the angle in this step, exact where rate * dt is not
+    "crease": ("angle", "rate", "turn", "dt"),
+    "bend": ("angle", "rate", "turn", "dt"),
     # forces on the three corners, as the rows of a 3 x 3 matrix
     "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "dt"),
     # force on the node
@@ -31,8 +32,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "contact": ("gap", "rate", "dt"),
     # friction coefficient: contributions are added
     "coefficient": ("direction", "speed", "axis", "normal_load", "dt"),
-    # tangential force on the contact point
-    "tangent": ("velocity", "normal", "normal_load", "coefficient", "dt"),
+    # tangential force on the contact point; slip: its tangential displacement in this step
+    "tangent": ("velocity", "slip", "normal", "normal_load", "coefficient", "dt"),
 }
 """Families of entities, and the quantities that each offers to its laws (SI units)."""
 
@@ -88,7 +89,7 @@ class Effect:
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
             the energy, and the time-integrated work otherwise.
         stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
-            bound the time step. None means that the effect never limits it.
+            bound the time step. None means that the effect never limits it. A node's law also finds "mass" there.
         damping: likewise, the slope against the rate.
         formula, source, matters, confused_with, separated_by: prose for the catalogue.
     """

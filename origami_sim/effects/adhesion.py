@@ -1,7 +1,5 @@
 """Pull-off force of a soft foot that sticks to the ground."""
 
-import math
-
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar

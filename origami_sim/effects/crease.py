@@ -26,7 +26,7 @@ EFFECT = Effect(
     conservative=True,
     parameters=(
         Parameter("stiffness", "K", "N m/rad", 0.0, (0.0, math.inf), "rotational stiffness of the whole crease"),
-        Parameter("rest_angle", "theta0", "rad", 0.0, (-math.pi, math.pi), "fold angle without moment, valley positive"),
+        Parameter("rest_angle", "theta0", "rad", 0.0, (-math.pi, math.pi), "angle without moment, valley positive"),
     ),
     stiffness=lambda p: p["stiffness"],
     formula="M = -K (theta - theta0),  K = E' w h^3 / (12 L*),  L* = g + 2 c h for an elastomer bridge of gap g",

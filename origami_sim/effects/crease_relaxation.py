@@ -8,24 +8,25 @@ from origami_sim.effects._effect import Effect, Memory, Parameter, scalar
 
 
 @wp.func
-def branch(q: scalar, rate: scalar, dt: scalar, stiffness: scalar, time: scalar):
-    # exact for a rate that is constant over the step
+def branch(q: scalar, turn: scalar, dt: scalar, stiffness: scalar, time: scalar):
+    # exact for a rate that is constant over the step; the turn, not the rate at its end, keeps it second-order and as
+    # stable as a spring of this stiffness
     r = dt / time
     grow = scalar(1.0) - scalar(0.5) * r
     if r > scalar(1.0e-6):
         grow = (scalar(1.0) - wp.exp(-r)) / r
-    return q * wp.exp(-r) + stiffness * grow * rate * dt
+    return q * wp.exp(-r) + stiffness * grow * turn
 
 
 @wp.func
 def moment(
-    rate: scalar, dt: scalar,
+    turn: scalar, dt: scalar,
     q1: scalar, q2: scalar, q3: scalar,
     stiffness_1: scalar, time_1: scalar, stiffness_2: scalar, time_2: scalar, stiffness_3: scalar, time_3: scalar,
 ):  # fmt: skip
-    p1 = branch(q1, rate, dt, stiffness_1, time_1)
-    p2 = branch(q2, rate, dt, stiffness_2, time_2)
-    p3 = branch(q3, rate, dt, stiffness_3, time_3)
+    p1 = branch(q1, turn, dt, stiffness_1, time_1)
+    p2 = branch(q2, turn, dt, stiffness_2, time_2)
+    p3 = branch(q3, turn, dt, stiffness_3, time_3)
     return -(p1 + p2 + p3), p1, p2, p3
 
 

@@ -6,6 +6,12 @@ import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
 
+STEEPEST = 30.0
+"""Slope at which the barrier goes straight on, in units of its stiffness: as stiff as it gets."""
+
+BEND = math.atan(math.sqrt(STEEPEST))
+"""u at which tan u - u has that slope, tan(u)^2."""
+
 
 @wp.func
 def moment(angle: scalar, stop_stiffness: scalar, stop_angle: scalar):
@@ -14,8 +20,8 @@ def moment(angle: scalar, stop_stiffness: scalar, stop_angle: scalar):
     over = wp.abs(angle) - stop_angle
     if over > scalar(0.0):
         scale = scalar(2.0) / scalar(math.pi) * room
-        u = wp.min(over / scale, scalar(1.5))
-        value = -stop_stiffness * scale * (wp.tan(u) - u)
+        u = wp.min(over / scale, scalar(BEND))
+        value = -stop_stiffness * (scale * (wp.tan(u) - u) + scalar(STEEPEST) * (over - scale * u))
         if angle < scalar(0.0):
             value = -value
     return value
@@ -28,10 +34,10 @@ def energy(angle: scalar, stop_stiffness: scalar, stop_angle: scalar):
     over = wp.abs(angle) - stop_angle
     if over > scalar(0.0):
         scale = scalar(2.0) / scalar(math.pi) * room
-        u = wp.min(over / scale, scalar(1.5))
+        u = wp.min(over / scale, scalar(BEND))
+        beyond = over - scale * u
         value = stop_stiffness * scale * scale * (-wp.log(wp.cos(u)) - scalar(0.5) * u * u)
-        if over / scale > scalar(1.5):
-            value += stop_stiffness * scale * (wp.tan(u) - u) * (over - scale * u)
+        value += stop_stiffness * (scale * (wp.tan(u) - u) * beyond + scalar(0.5) * scalar(STEEPEST) * beyond * beyond)
     return value
 
 
@@ -45,9 +51,9 @@ EFFECT = Effect(
         Parameter("stop_stiffness", "ks", "N m/rad", 0.0, (0.0, math.inf), "scale of the barrier's stiffness"),
         Parameter("stop_angle", "theta_s", "rad", 2.8, (0.1, 3.13), "fold angle, of either sign, where it begins"),
     ),
-    stiffness=lambda p: p["stop_stiffness"] * 30.0,
+    stiffness=lambda p: p["stop_stiffness"] * STEEPEST,
     formula="M = -ks s (tan u - u) sign(theta),  u = (|theta| - theta_s) / s,  s = 2 (pi - theta_s) / pi",
-    source="barrier after Liu & Paulino 2017, made smooth at its onset; straight on beyond u = 1.5",
+    source="barrier after Liu & Paulino 2017, smooth at its onset; straight on beyond slope 30 ks (u = 1.39)",
     matters="folds that close; patches whose edges touch",
     confused_with="stiffening crease",
     separated_by="kink in angle against field; vary the gap",

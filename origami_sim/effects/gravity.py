@@ -28,7 +28,7 @@ EFFECT = Effect(
     ),
     formula="f = m g",
     source="-",
-    matters="1 % of the torque on a box flap at 0.2 T, 20 % at 10 mT; 1.5 times the bending stiffness of the cantilever",
+    matters="1 % of the torque on a box flap at 0.2 T, 20 % at 10 mT; 1.5 times the stiffness of the cantilever",
     confused_with="rest-angle drift, magnetic dipole offset at zero field",
     separated_by="turn the set-up by 90 and 180 degrees",
 )

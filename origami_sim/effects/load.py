@@ -24,7 +24,7 @@ EFFECT = Effect(
     energy=energy,
     conservative=True,
     parameters=tuple(
-        Parameter(f"force_{a}", f"F{a}", "N", 0.0, (-math.inf, math.inf), f"force along {a} at unit load") for a in "xyz"
+        Parameter(f"force_{a}", f"F{a}", "N", 0.0, (-math.inf, math.inf), f"force on {a} at unit load") for a in "xyz"
     ),
     formula="f = load(t) F",
     source="dead load",

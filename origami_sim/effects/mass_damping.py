@@ -17,6 +17,7 @@ EFFECT = Effect(
     family="node",
     force=force,
     parameters=(Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, math.inf), "rate at which free motion decays"),),
+    damping=lambda p: p["decay_rate"] * p["mass"],
     formula="f = -alpha m v",
     source="Rayleigh damping, mass part",
     matters="brings a model to rest; above 1 /s it visibly brakes free flight, which air does not",

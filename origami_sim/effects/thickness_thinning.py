@@ -34,7 +34,7 @@ def moment(
     first: scalar, hinge_length: scalar, width: scalar, constraint: scalar, side: scalar,
     neutral: scalar,
 ):  # fmt: skip
-    m, u = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
+    m, _ = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
                   constraint, side, neutral)  # fmt: skip
     return m
 
@@ -45,7 +45,7 @@ def energy(
     first: scalar, hinge_length: scalar, width: scalar, constraint: scalar, side: scalar,
     neutral: scalar,
 ):  # fmt: skip
-    m, u = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
+    _, u = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
                   constraint, side, neutral)  # fmt: skip
     return u
 

@@ -13,7 +13,6 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.compose import compose
 
 
-
 @dataclass(frozen=True)
 class Evaluation:
     """Forces and energies of one instant, by effect.
@@ -82,7 +81,8 @@ class Batch:
             constant(model.contacts.reshape(-1, 3), wp.vec3i), constant(model.contact_weights.reshape(-1, 3), wp.vec3d),
             constant(model.contact_offsets, wp.float64), constant(model.contact_axes.reshape(-1, 3), wp.vec3d),
             len(model.creases), constant(buffer, wp.float64), constant(layout, wp.int32),
-            constant(times, wp.float64), constant(values, wp.float64), constant(rows[:-1] if len(sizes) else [0], wp.int32),
+            constant(times, wp.float64), constant(values, wp.float64),
+            constant(rows[:-1] if len(sizes) else [0], wp.int32),
         ]  # fmt: skip
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = wp.zeros_like(self._x)
@@ -151,11 +151,12 @@ class Batch:
         energies = wp.zeros((len(effects), self._stride), dtype=wp.float64, device=self.device)
         gaps = wp.full((max(k, 1), self._stride), np.inf, dtype=wp.float64, device=self.device)
         self._launch(self.program.evaluate, [forces, energies, gaps, _FIRST, wp.float64(time)])
-        f, e, x = forces.numpy()[:, :, : self.worlds], self._download(energies, len(effects)), self._download(self._v, n)
+        f, v = forces.numpy()[:, :, : self.worlds], self._download(self._v, n)
+        e = self._download(energies, len(effects))
         return Evaluation(
             forces={effect.name: f[i] for i, effect in enumerate(effects)},
             energies={effect.name: e[i] for i, effect in enumerate(effects) if effect.energy is not None},
-            kinetic=0.5 * (self._mass * (x**2).sum(-1)).sum(0),
+            kinetic=0.5 * (self._mass * (v**2).sum(-1)).sum(0),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
             gaps=self._download(gaps, k),
         )

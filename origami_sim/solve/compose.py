@@ -78,6 +78,7 @@ def rollout({arguments}
             speed = wp.dot(V[n, w], V[n, w])
             if not (speed <= limit):  # also true for nan
                 fastest = n
+                limit = wp.max(limit, speed)
         if fastest >= 0:
             status[0, w] = start + s + 1
             status[1, w] = fastest
@@ -189,8 +190,8 @@ class _Composer:
             if owner != "drive":
                 t(f"o{i} = layout[{i}, 0] + w * layout[{i}, 2]")
                 t(f"e{i} = layout[{i}, 1]")
-        for i, (e, m) in enumerate((e, m) for e in self.effects for m in e.memory):
-            t(f"m_{e.name}_{m.name} = memory_rows[{i}]")
+        for i, (owner, name) in enumerate((e.name, m.name) for e in self.effects for m in e.memory):
+            t(f"m_{owner}_{name} = memory_rows[{i}]")
         if self.family(*CONTACTS):
             tilt, azimuth = self.value("plane", "tilt", "0"), self.value("plane", "azimuth", "0")
             t(f"up = kinematics.plane_normal({tilt}, {azimuth})")
@@ -333,7 +334,9 @@ class _Composer:
         if not effects:
             return
         # rows of hinges: creases first, then bending lines; parameters count within their family
-        count, shift = ("crease_count", "0") if family == "crease" else ("hinges.shape[0] - crease_count", "crease_count")
+        count, shift = "crease_count", "0"
+        if family == "bend":
+            count, shift = "hinges.shape[0] - crease_count", "crease_count"
         t(f"for c in range({count}):")
         t.depth += 1
         t(f"r = c + {shift}")
@@ -341,6 +344,8 @@ class _Composer:
             t(f"{node} = hinges[r][{i}]")
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("angle = kinematics.unwrap(g.angle, angles[r, w])")
+        if any("turn" in e.arguments for e in effects):
+            t("turn = angle - angles[r, w]" if mode == "rollout" else "turn = scalar(0.0)")
         t("angles[r, w] = angle")
         if any("rate" in e.arguments or e.exchanges_work for e in effects):
             t("rate = " + " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl"))
@@ -430,11 +435,20 @@ class _Composer:
             t("normal = up")
             t("velocity = velocity - up * rate")
             t("speed = wp.length(velocity)")
+            t("slip = velocity * h")
+            if mode == "rollout":
+                # the step was made with the velocity at its middle, half a kick behind the prediction
+                t("kick = share[0] * A[n1, w] + share[1] * A[n2, w] + share[2] * A[n3, w]")
+                kicks = " + ".join(f"wp.dot(patch.n, A[n{i}, w]) * patch.g{i}" for i in (1, 2, 3))
+                t(f"kick = kick - off * ({kicks})")
+                t("slip = slip - (kick - up * wp.dot(up, kick)) * (half * h)")
             if self.family("coefficient"):
-                t("axis = kinematics.unit_or_zero(" + " + ".join(f"axes[c][{i - 1}] * X[n{i}, w]" for i in (1, 2, 3)) + ")")
+                ahead = " + ".join(f"axes[c][{i - 1}] * X[n{i}, w]" for i in (1, 2, 3))
+                t(f"ahead = {ahead}")
+                t("axis = kinematics.unit_or_zero(ahead - up * wp.dot(up, ahead))")
                 row = f"m_{tangents[0].name}_{tangents[0].memory[0].name} + 3 * c"
                 t(f"strain = vec3(memory[{row}, w], memory[{row} + 1, w], memory[{row} + 2, w])")
-                t("direction = kinematics.unit_or_zero(strain + velocity * h)")
+                t("direction = kinematics.unit_or_zero(strain + slip)")
             t("coefficient = scalar(0.0)")
             for e in self.family("coefficient"):
                 i = self.number(e)
@@ -464,7 +478,8 @@ class _Composer:
             return
         t(f"part = {force}")
         for i in (1, 2, 3):
-            self.scatter(t, effect, f"n{i}", f"share[{i - 1}] * part - (off * wp.dot(part, patch.g{i})) * patch.n", mode)
+            at_node = f"share[{i - 1}] * part - (off * wp.dot(part, patch.g{i})) * patch.n"
+            self.scatter(t, effect, f"n{i}", at_node, mode)
 
     def source(self) -> str:
         arguments, hoist = _ARGUMENTS, self.hoist()

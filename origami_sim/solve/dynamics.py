@@ -109,8 +109,9 @@ def simulate(
             raise InputError("a run needs a positive number", field=name, value=value, allowed="> 0")
     chosen = stable_step(model, parameters)
     if dt is not None and not 0 < dt <= chosen.limit:
-        raise InputError("the time step is above the stability limit" if dt > 0 else "the time step must be positive",
-                         field="dt", value=dt, allowed=f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}")  # fmt: skip
+        what = "the time step is above the stability limit" if dt > 0 else "the time step must be positive"
+        allowed = f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}"
+        raise InputError(what, field="dt", value=dt, allowed=allowed)
     frame_time = 1.0 / rate
     substeps = max(1, int(np.ceil(frame_time / min(dt or chosen.dt, frame_time) * (1 - 1e-12))))
     step = frame_time / substeps
@@ -136,8 +137,9 @@ def simulate(
 
     last = record[-1][0]
     failures = [
-        Failure(int(w), float(last.status[0, w] * step), int(last.status[1, w]), _cause(model, last, int(w), step, chosen))
-        for w in np.flatnonzero(last.status[0] >= 0)
+        Failure(w, float(s * step), int(n), _cause(model, last, w, step, chosen))
+        for w, (s, n) in enumerate(last.status.T)
+        if s >= 0
     ]
     zero = np.zeros((len(model.position), last.worlds, 3))
     return Trajectory(
@@ -162,7 +164,7 @@ def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) ->
     rest = np.linalg.norm(model.position[model.bars[:, 1]] - model.position[model.bars[:, 0]], axis=-1)
     strain = np.abs(now / rest - 1)
     margin = f"dt = {dt:.3g} s, limit {step.limit:.3g} s set by {step.cause} in the reference state"
-    if not np.all(np.isfinite(strain)):
+    if not np.all(np.isfinite(x)):
         return f"a position is not a number ({margin})"
     if len(strain) and strain.max() > 0.05:
         worst = int(strain.argmax())

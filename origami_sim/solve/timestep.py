@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from origami_sim.effects import CONTACTS, HINGES, get
+from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 
 SAFETY = 0.8
@@ -27,12 +28,15 @@ class TimeStep:
     cause: str
 
     def __str__(self):
-        return f"dt = {self.dt:.3g} s ({SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause})"
+        limit = f"{SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause}"
+        return f"dt = {self.dt:.3g} s ({limit})"
 
 
 def _gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
     """Nodes [n, k] of the elements of a family and the norms of their coordinate's gradient there [n, k]."""
     x = model.position
+    if family == "node":
+        return np.arange(len(x))[:, None], np.ones((len(x), 1))
     if family == "bar":
         return model.bars, np.ones(model.bars.shape)
     if family in HINGES:
@@ -59,9 +63,17 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     """Bound on the step by the row sums of the mass-scaled stiffness and damping (a block Gershgorin bound).
 
     With lambda_i = sum over elements of k |g_i| sum_j |g_j| / m_i, every frequency is below sqrt(max lambda); central
-    differences are then stable for dt <= 2 / omega (sqrt(1 + zeta^2) - zeta).
+    differences are then stable for dt <= 2 / omega (sqrt(1 + 4 zeta^2) - 2 zeta), with the damping taken at a predicted
+    velocity.
+
+    Raises:
+        InputError: parameters for different numbers of worlds.
     """
     n, worlds = len(model.position), parameters.worlds
+    for owner, name in parameters:
+        if (given := parameters[owner, name].shape[1]) not in (1, worlds):
+            raise InputError("parameters are given for different numbers of worlds", field=f"{owner}.{name}",
+                             value=given, allowed=f"1 or {worlds}")  # fmt: skip
     free = model.free.any(axis=1)
     sums = {"stiffness": np.zeros((n, worlds)), "damping": np.zeros((n, worlds))}
     largest = np.zeros((n, worlds))
@@ -70,11 +82,12 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
         effect = get(name)
         for kind in ("stiffness", "damping"):
             slope = getattr(effect, kind)
-            if slope is None or effect.family not in ("bar", *HINGES, *CONTACTS) or not model.count(effect.family):
+            if slope is None or effect.family == "triangle" or not model.count(effect.family):
                 continue
+            nodes_own = {"mass": parameters["inertia", "mass"]} if effect.family == "node" else {}
             nodes, norms = _gradient_norms(model, effect.family)
             norms = norms * free[nodes]
-            k = np.asarray(slope(parameters.of(name)))
+            k = np.asarray(slope({**nodes_own, **parameters.of(name)}))
             k = np.broadcast_to(k, (len(nodes), worlds))
             for c in range(nodes.shape[1]):
                 row = k * (norms[:, c] * norms.sum(1))[:, None]

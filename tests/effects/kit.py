@@ -73,7 +73,7 @@ def hinge(angle=0.0, *, held=(), **options) -> Model:
     return make_model(x, free=free, **{**HINGE, **options})
 
 
-def strip(n=4, *, effects=ALL, height=0.0) -> Model:
+def strip(n=4, *, effects=ALL, height=0.0, electrodes=None) -> Model:
     """n square panels in a row, each cut by a bending line, creases between them, contact points under all."""
     x = np.array([[i, j, height] for i in range(n + 1) for j in (0.0, 1.0)], float)
     triangles, bars, creases, bends = [], {(0, 1)}, [], []
@@ -88,7 +88,7 @@ def strip(n=4, *, effects=ALL, height=0.0) -> Model:
     return make_model(
         x, bars=sorted(bars), creases=creases, bends=bends, triangles=triangles, contacts=contacts,
         weights=[[1 / 3, 1 / 3, 1 / 3], [0.2, 0.3, 0.5], [0.6, 0.3, 0.1]], offsets=[-0.05, 0.1, -0.02],
-        axes=[[-1.0, 1, 0]] * 3, effects=effects, electrodes=np.arange(len(creases) + len(bends)) % 2,
+        axes=[[-1.0, 1, 0]] * 3, effects=effects, electrodes=electrodes,
     )  # fmt: skip
 
 

@@ -1,0 +1,679 @@
+"""Statics: tangent, equilibrium and continuation, for any set of effects.
+
+Only the total force is asked of the laws. The tangent K = -dF/dx comes from differences of it: nodes that share no
+neighbour cannot disturb each other's forces, so they are moved in the same world (colouring of the squared coupling
+graph: Curtis, Powell & Reid 1974), and one launch over some hundred worlds gives the whole sparse matrix.
+
+Velocities are zero: rate laws vanish, and memory (bristles of the friction, relaxation) keeps its value of the given
+state. Frozen bristles push back with a constant force, so friction holds no node in place here.
+"""
+
+import math
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from origami_sim.drive import Drive, Signal
+from origami_sim.effects import CONTACTS, get
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.solve.batch import Batch
+
+STEP = 2e-4
+"""Step of the differences over the smallest length of the elements at a node."""
+
+STENCIL = np.array([1.0, -1.0, 2.0, -2.0])
+WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0]) / 12.0
+"""Central differences of fourth order: truncation STEP^4, rounding eps / STEP, near 1e-12 of the stiffest element."""
+
+NEUTRAL = 1e-10
+"""Eigenvalues below this share of the largest stiffness count as zero: a mode that nothing holds or loads."""
+
+NULL_SHIFT = 1e-11
+"""Shift of every tangent, over the largest stiffness: keeps free rigid motions solvable."""
+
+DENSE = 600
+"""Up to so many degrees of freedom eigenvalues are found densely."""
+
+FURTHEST = 1e4
+"""Range of the path parameter, in both directions."""
+
+
+@dataclass
+class Equilibrium:
+    """An equilibrium, or where the search for it stopped.
+
+    Attributes:
+        state: one world at rest, from which a simulation can start.
+        angles: [C + Q] continuous hinge angles, creases first [rad].
+        residual: largest unbalanced force on a free node's axis [N]. tolerance: what was asked for [N].
+        iterations: tangents evaluated. history: residual before each of them [N].
+        converged: whether the residual is below the tolerance.
+        stable: whether every eigenvalue of the tangent on the free axes is positive or zero.
+        eigenvalues: lowest eigenvalues of the tangent [N/m], ascending (its real parts if it is unsymmetric).
+        neutral: how many of them are zero: rigid motions, mechanisms, the edge of stability.
+        mode: [N, 3] shape of the lowest one, largest component 1.
+        reactions: [N, 3] forces that the supports exert on held axes [N].
+        message: what happened, in a sentence. wall: time that it took [s].
+    """
+
+    state: State
+    angles: np.ndarray
+    residual: float
+    tolerance: float
+    iterations: int
+    history: np.ndarray
+    converged: bool
+    stable: bool
+    eigenvalues: np.ndarray
+    neutral: int
+    mode: np.ndarray
+    reactions: np.ndarray
+    message: str
+    wall: float = 0.0
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [N, 3] [m]."""
+        return self.state.x[:, 0]
+
+
+@dataclass
+class Path:
+    """Equilibria along a load path, in the order in which they were found.
+
+    Attributes:
+        factor: [P] path parameter. arc: [P] arc length, dimensionless.
+        x: [P, N, 3] positions [m]. angles: [P, C + Q] continuous hinge angles [rad].
+        stable: [P] whether the point is stable at a held factor. negative: [P] number of negative eigenvalues.
+        lowest: [P] lowest eigenvalue of the tangent [N/m].
+        limit_points: indices of the points where the factor is largest or smallest (found to the tolerance).
+        branch_points: indices after which the number of negative eigenvalues changes without a limit point.
+        reached: whether the path came to its end. message: why it ended. wall: time that it took [s].
+    """
+
+    factor: np.ndarray
+    arc: np.ndarray
+    x: np.ndarray
+    angles: np.ndarray
+    stable: np.ndarray
+    negative: np.ndarray
+    lowest: np.ndarray
+    limit_points: np.ndarray
+    branch_points: np.ndarray
+    reached: bool
+    message: str
+    start: State = field(repr=False)
+    wall: float = 0.0
+
+    def state(self, i: int) -> State:
+        """The i-th point as a state at rest of one world."""
+        return _resting(self.start, self.x[i], self.angles[i])
+
+
+def tangent(
+    model: Model, parameters: Parameters, drive: Drive | None = None, *, time: float = 0.0, state: State | None = None,
+    world: int = 0,
+) -> sp.csr_array:  # fmt: skip
+    """Tangent stiffness K = -dF/dx at a state [3 N, 3 N] [N/m], row 3 n + axis; columns of held axes are empty.
+
+    Raises:
+        InputError: no such world, a drive that ends before `time`.
+    """
+    system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
+    return system.tangent(x, angles, time)
+
+
+def equilibrium(
+    model: Model, parameters: Parameters, drive: Drive | None = None, *, time: float = 0.0, state: State | None = None,
+    world: int = 0, tolerance: float = 1e-10, max_iterations: int = 300, unstable: bool = False,
+) -> Equilibrium:  # fmt: skip
+    """Finds the equilibrium that a state settles into, with the drive held at its value at one instant.
+
+    Newton with a tangent that is shifted until it is positive definite, so that steps go downhill and leave saddles
+    (at an unstable equilibrium it is pushed off along the lowest mode and goes on). A step turns and strains no element
+    by more than a half, else it is shortened. It is not asked to lower the residual at once: where panels are stiffer
+    than creases by many decades every useful step stretches bars and the next one relaxes them, and a monotone search
+    would creep along that valley. Only if half the iterations did not suffice, steps are damped by the natural
+    monotonicity test, |K^-1 (F(x + a p) - linear model)| <= a |p| / 2, which breaks cycles (Deuflhard 2011, Newton
+    Methods for Nonlinear Problems, ch. 3).
+
+    Args:
+        time: instant of the drive [s].
+        state: where to start (default: the reference state); its memory is kept, its velocities are not.
+        world: which world of parameters, drive and state to solve.
+        tolerance: largest unbalanced force over the largest force of any one effect.
+        unstable: take the nearest equilibrium of any kind (plain Newton directions) instead of a stable one.
+
+    Returns:
+        The equilibrium. If it was not found, `converged` is False and `message` says why; nothing is raised.
+
+    Raises:
+        InputError: a tolerance or iteration count that is not positive, no such world, no free node, a drive that
+            ends before `time`.
+    """
+    _positive(tolerance=tolerance, max_iterations=max_iterations)
+    began = clock.perf_counter()
+    system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
+    found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    found.wall = clock.perf_counter() - began
+    return found
+
+
+def continuation(
+    model: Model, parameters: Parameters, drive: Drive, *, base: Drive | None = None, time: float = 0.0,
+    start: float = 0.0, end: float = 1.0, step: float | None = None, move: float | None = None,
+    state: State | None = None, world: int = 0, tolerance: float = 1e-10, max_points: int = 200,
+    stop: Callable[[float, np.ndarray], bool] | None = None,
+) -> Path:  # fmt: skip
+    """Follows equilibria under proportional loading, through limit points.
+
+    Every channel of the drive is base + factor (drive - base), at one instant; `base` is no drive unless given, so
+    that the factor scales fields, voltages and loads. It may turn back and become negative. Pseudo-arclength
+    continuation with tangent predictor and orthogonal corrector (Keller 1977; Crisfield 1981); limit points are found
+    by bisection of the tangent's factor component.
+
+    Args:
+        drive, base: the drives at factor 1 and 0. time: instant at which both are taken [s].
+        start, end: factors. The path starts with the equilibrium nearest to `state` at `start`, in the direction of
+            `end`, and ends where it reaches `end`.
+        step: largest change of the factor from point to point (default: a twentieth of the range).
+        move: largest move of a node from point to point [m] (default: a tenth of the median bar).
+        stop: called with factor and positions [N, 3] of every point; True ends the path.
+
+    Raises:
+        InputError: numbers that are not positive, start equal to end, factors beyond 1e4, no such world.
+    """
+    began = clock.perf_counter()
+    span = abs(end - start)
+    if not (span > 0 and max(abs(start), abs(end)) < FURTHEST):
+        raise InputError("a path needs a finite start and another end", field="end", value=end,
+                         allowed=f"not {start}, within +-{FURTHEST:g}")  # fmt: skip
+    _positive(tolerance=tolerance, max_points=max_points, step=step or 1.0, move=move or 1.0)
+    worlds = [_fixed(d, time, world) for d in (base or Drive(), drive)]
+    system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
+    tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
+    path = tracer.follow(x, angles, start, end, max_points, stop)
+    path.wall = clock.perf_counter() - began
+    return path
+
+
+def _positive(**values):
+    for name, value in values.items():
+        if not (value > 0 and math.isfinite(value)):
+            raise InputError("statics needs a positive number", field=name, value=value, allowed="> 0")
+
+
+def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_System", np.ndarray, np.ndarray]:
+    """The system of one world, and its positions [N, 3] and angles [H] to start from."""
+    worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()), state.worlds if state else 1)
+    if not 0 <= world < worlds:
+        raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
+    drive.require(time)
+    one = State.at_rest(model) if state is None else _worlds(state, np.array([world if state.worlds > 1 else 0]))
+    if not np.all(np.isfinite(one.x)):
+        raise InputError("a position must be finite", field="state.x", value=float("nan"))
+    if not np.any(model.free):
+        raise InputError("statics needs a node that is free to move", field="free", value=0)
+    system = _System(
+        model, parameters.world(world if parameters.worlds > 1 else 0), fixed or _fixed(drive, time, world), one
+    )
+    return system, one.x[:, 0], one.angles[:, 0]
+
+
+def _worlds(state: State, index: np.ndarray) -> State:
+    """These worlds of a state, copied; an index may repeat."""
+    names = ("x", "v", "a", "angles", "memory", "work", "status")
+    return State(**{n: getattr(state, n)[:, index] for n in names}, step=state.step)
+
+
+def _resting(state: State, x: np.ndarray, angles: np.ndarray) -> State:
+    """The state with these positions [N, 3] and angles [H], without motion."""
+    out = state.copy()
+    out.x, out.angles = x[:, None].copy(), angles[:, None].copy()
+    out.v, out.a, out.status = np.zeros_like(out.x), np.zeros_like(out.x), np.full((2, 1), -1, np.int32)
+    return out
+
+
+def _fixed(drive: Drive, time: float, world: int) -> Drive:
+    """The drive of one world, held at its value at one instant."""
+    out = Drive()
+    values = {n: np.atleast_1d(s(time)) for n, s in drive.signals.items()}
+    out.signals = {n: Signal(offset=float(v[world if len(v) > 1 else 0])) for n, v in values.items()}
+    return out
+
+
+def _line(base: Drive, drive: Drive) -> Drive:
+    """base + t (drive - base), for t within +-FURTHEST."""
+    t = np.array([-FURTHEST, 0.0, FURTHEST])
+    out, zero = Drive(), Signal()
+    names = dict.fromkeys([*base.signals, *drive.signals])
+    ends = {n: tuple(d.signals.get(n, zero).offset for d in (base, drive)) for n in names}
+    out.signals = {n: Signal(offset=a, times=t, values=t, scale=b - a) for n, (a, b) in ends.items()}
+    return out
+
+
+class _Factor:
+    """Sparse factors of a shifted tangent. `definite`: every pivot is positive, which for a symmetric matrix means that
+    it is positive definite."""
+
+    def __init__(self, k: sp.csc_array):
+        self.definite, self.solve = False, None
+        try:
+            self._lu = spla.splu(k, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError:  # exactly singular
+            return
+        self.definite = np.array_equal(self._lu.perm_r, self._lu.perm_c) and bool(np.all(self._lu.U.diagonal() > 0))
+        self.solve = self._lu.solve
+
+
+class _System:
+    """Forces and tangents of one world as functions of its positions.
+
+    Args:
+        model, parameters, drive: one world of each. state: [N, 1, 3], gives the memory.
+    """
+
+    def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State):
+        self.model, self.state = model, _resting(state, state.x[:, 0], state.angles[:, 0])
+        self.free = np.flatnonzero(model.free.ravel())
+        self._one = Batch(model, parameters, drive, self.state)
+        n = len(model.position)
+        rows, columns = self._couplings()
+        self._rows, self._columns = rows, columns
+        apart = rows < columns
+        self.edges = np.stack([rows[apart], columns[apart]], axis=1)
+        lengths = np.linalg.norm(np.diff(model.position[self.edges], axis=1)[:, 0], axis=-1)
+        self.size = float(np.linalg.norm(np.ptp(model.position, axis=0))) or 1.0
+        self.length = float(np.median(lengths[lengths > 0])) if np.any(lengths > 0) else self.size
+        self._steps = STEP * self._smallest(lengths)
+        self._colours = self._colour(n)
+        worlds = 3 * (self._colours.max(initial=0) + 1) * len(STENCIL)
+        tiled = _worlds(self.state, np.zeros(worlds, int))
+        self._many = Batch(model, parameters, drive, tiled)
+        self._shape = (n, worlds // 3 // len(STENCIL), 3, len(STENCIL), 3)
+
+    # --- forces
+
+    def force(self, x: np.ndarray, angles: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Total force [N, 3] and the angles continued from the given ones [H]."""
+        self._one.place(x[:, None], angles[:, None])
+        f = self._one.total_force(time)[:, 0]
+        return f, self._one.state().angles[:, 0] if len(angles) else angles
+
+    def scale(self, x: np.ndarray, angles: np.ndarray, time: float) -> float:
+        """Largest force of any one effect on any axis of any node [N]."""
+        self._one.place(x[:, None], angles[:, None])
+        return max((float(np.abs(f).max(initial=0.0)) for f in self._one.evaluate(time).forces.values()), default=0.0)
+
+    def by_factor(self, x: np.ndarray, angles: np.ndarray, time: float, h: float) -> np.ndarray:
+        """dF/dt [N, 3] at fixed positions."""
+        return sum(w * self.force(x, angles, time + s * h)[0] for s, w in zip(STENCIL, WEIGHTS, strict=True)) / h
+
+    # --- tangent
+
+    def _couplings(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the pairs of nodes of which one feels the other, each node with itself."""
+        m, families = self.model, {get(e).family for e in self.model.effects}
+        groups = [np.arange(len(m.position))[:, None]]
+        for family, elements in (("bar", m.bars), ("crease", m.creases), ("bend", m.bends), ("triangle", m.triangles)):
+            if family in families:
+                groups.append(elements)
+        if families & set(CONTACTS):
+            groups.append(m.contacts)
+        pairs = [np.stack(np.broadcast_arrays(g[:, :, None], g[:, None, :])).reshape(2, -1) for g in groups]
+        both = np.unique(np.concatenate(pairs, axis=1).astype(np.int64), axis=1)
+        return both[0], both[1]
+
+    def _smallest(self, lengths: np.ndarray) -> np.ndarray:
+        """Smallest edge or height of the elements at each node [N] [m]."""
+        m = self.model
+        out = np.full(len(m.position), self.length)
+        for c in (0, 1):
+            np.minimum.at(out, self.edges[:, c], np.where(lengths > 0, lengths, self.length))
+        hinges = np.concatenate([m.creases, m.bends]).reshape(-1, 4)
+        corners = np.concatenate([hinges[:, [1, 2, 0]], hinges[:, [1, 2, 3]], m.triangles.reshape(-1, 3)])
+        a, b, c = (m.position[corners[:, i]] for i in range(3))
+        longest = np.max([np.linalg.norm(e, axis=-1) for e in (b - a, c - b, a - c)], axis=0)
+        height = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / np.where(longest > 0, longest, 1.0)
+        for i in range(3):
+            np.minimum.at(out, corners[:, i], np.where(height > 0, height, self.length))
+        return out
+
+    def _colour(self, n: int) -> np.ndarray:
+        """Colour of each node: two of one colour have no neighbour in common."""
+        near = sp.csr_array((np.ones(len(self._rows), np.int32), (self._rows, self._columns)), shape=(n, n))
+        clash = sp.csr_array(near.T @ near)
+        movable = self.model.free.any(axis=1)
+        colours = np.full(n, -1)
+        for i in np.argsort(-np.diff(clash.indptr), kind="stable"):
+            if movable[i]:
+                taken = set(colours[clash.indices[clash.indptr[i] : clash.indptr[i + 1]]])
+                colours[i] = next(c for c in range(n) if c not in taken)
+        return colours
+
+    def tangent(self, x: np.ndarray, angles: np.ndarray, time: float) -> sp.csr_array:
+        """K = -dF/dx [3 N, 3 N] [N/m]."""
+        n = len(x)
+        moved = np.flatnonzero(self._colours >= 0)
+        moves = np.zeros(self._shape)
+        for axis in range(3):
+            moves[moved, self._colours[moved], axis, :, axis] = self._steps[moved, None] * STENCIL
+        worlds = moves.shape[1] * moves.shape[2] * moves.shape[3]
+        placed = x[:, None] + moves.reshape(n, worlds, 3)
+        self._many.place(placed, np.repeat(angles[:, None], worlds, axis=1))
+        f = self._many.total_force(time).reshape(self._shape)
+        slopes = -np.einsum("ncasb,s->ncab", f, WEIGHTS)  # [row node, colour, axis moved, axis of force]
+        of = self._colours[self._columns] >= 0
+        rows, columns = self._rows[of], self._columns[of]
+        blocks = slopes[rows, self._colours[columns]] / self._steps[columns, None, None]
+        i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
+        j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * blocks.astype(np.int64)
+        k = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(3 * n, 3 * n))
+        return k @ sp.diags_array(self.model.free.ravel().astype(float), format="csr")
+
+    def reduced(self, x: np.ndarray, angles: np.ndarray, time: float) -> tuple[sp.csc_array, float, bool]:
+        """Tangent on the free axes, its largest entry [N/m] and whether it is symmetric (then made exactly so)."""
+        k = sp.csc_array(self.tangent(x, angles, time)[self.free][:, self.free])
+        largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
+        skew = abs(k - k.T)
+        symmetric = float(skew.max()) <= 1e-8 * largest
+        return sp.csc_array(0.5 * (k + k.T)) if symmetric else k, largest, symmetric
+
+    def spectrum(
+        self, k: sp.csc_array, largest: float, symmetric: bool, count: int = 8
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest eigenvalues [N/m] and the mode [N, 3] of the lowest."""
+        n = k.shape[0]
+        if n <= DENSE:
+            values, vectors = np.linalg.eigh(k.toarray()) if symmetric else np.linalg.eig(k.toarray())
+        else:
+            shift = self._definite(k, largest, 0.0)[1]
+            if symmetric:
+                values, vectors = spla.eigsh(k, k=count, sigma=-2 * shift, which="LM")
+            else:
+                values, vectors = spla.eigs(k, k=count, sigma=-2 * shift, which="LM")
+        order = np.argsort(values.real)[:count]
+        mode = np.zeros(self.model.position.size)
+        mode[self.free] = vectors[:, order[0]].real
+        peak = mode[np.abs(mode).argmax()]
+        return values.real[order], (mode / (peak or 1.0)).reshape(-1, 3)
+
+    @staticmethod
+    def _definite(k: sp.csc_array, largest: float, least: float) -> tuple[_Factor, float]:
+        """Factors of k + shift, with the shift raised from `least` until they are positive definite."""
+        eye = sp.eye_array(k.shape[0], format="csc")
+        shift = max(least, NULL_SHIFT * largest)
+        factor = _Factor(k + shift * eye)
+        raised = False
+        while not factor.definite:
+            raised, shift = True, 4.0 * shift
+            factor = _Factor(k + shift * eye)
+        if raised:  # away from the edge, so that the weakest direction does not take the whole step
+            shift *= 2.0
+            factor = _Factor(k + shift * eye)
+        return factor, shift
+
+    # --- equilibrium
+
+    def reach(self, x: np.ndarray, d: np.ndarray) -> float:
+        """Largest share of a move d [N, 3] that turns and strains no element by more than a half."""
+        apart = np.linalg.norm(x[self.edges[:, 1]] - x[self.edges[:, 0]], axis=-1)
+        change = np.linalg.norm(d[self.edges[:, 1]] - d[self.edges[:, 0]], axis=-1)
+        share = min(1.0, float(np.min(0.5 * apart / np.maximum(change, 1e-300), initial=1.0)))
+        return min(share, self.size / max(float(np.linalg.norm(d, axis=-1).max()), 1e-300))
+
+    def spread(self, p: np.ndarray) -> np.ndarray:
+        """A vector on the free axes as [N, 3]."""
+        out = np.zeros(self.model.position.size)
+        out[self.free] = p
+        return out.reshape(-1, 3)
+
+    def noise(self, x: np.ndarray, largest: float) -> float:
+        """Rounding error of the forces [N]."""
+        return 8 * np.finfo(float).eps * largest * float(np.abs(x).max())
+
+    def settle(self, x, angles, time, tolerance, max_iterations, unstable) -> Equilibrium:
+        """See `equilibrium`."""
+        history: list[float] = []
+        shift, pushes, message, converged = 0.0, 0, "", False
+        f, angles = self.force(x, angles, time)
+        while True:
+            r = f.ravel()[self.free]
+            residual = float(np.abs(r).max())
+            history.append(residual)
+            k, largest, symmetric = self.reduced(x, angles, time)
+            target = max(tolerance * self.scale(x, angles, time), self.noise(x, largest))
+            if not np.all(np.isfinite(k.data)) or not np.isfinite(residual):
+                message = f"a force is not a number at node {int(np.argmax(~np.isfinite(f).all(axis=1)))}"
+                break
+            if residual <= target:
+                x, f, angles = self._polished(x, f, angles, time, k, largest)
+                residual = float(np.abs(f.ravel()[self.free]).max())
+                values, mode = self.spectrum(k, largest, symmetric)
+                if unstable or values[0] >= -NEUTRAL * largest or pushes == 4 or len(history) >= max_iterations:
+                    converged = True
+                    break
+                pushes += 1
+                x = x + 0.02 * self.length * mode * self.reach(x, 0.02 * self.length * mode)
+                f, angles = self.force(x, angles, time)
+                continue
+            if len(history) >= max_iterations:
+                message = f"no equilibrium within {max_iterations} iterations"
+                break
+            damped = len(history) > max_iterations // 2
+            taken = self._newton(x, f, angles, time, k, largest, shift, unstable, damped)
+            if taken is None:
+                message = "no step brings the forces closer to balance; a law may have a jump here"
+                break
+            x, f, angles, shift = taken
+        if message:
+            values, mode = np.full(1, np.nan), np.zeros_like(x)
+            net = np.abs(f.sum(axis=0)).max()
+            if self.model.free.all() and net > max(target, 1e-6 * abs(residual)):
+                message += f"; nothing holds the body against a net force of {net:.3g} N"
+            message += f" (residual {residual:.3g} N at node {self._worst(f)}, asked for {target:.3g} N)."
+        neutral = int((np.abs(values) <= NEUTRAL * largest).sum())
+        stable = converged and bool(values[0] >= -NEUTRAL * largest)
+        if converged:
+            kind = "stable" if stable else "unstable"
+            message = f"{kind} equilibrium after {len(history)} iterations, residual {residual:.3g} N"
+            message += f", {neutral} neutral modes." if neutral else "."
+        return Equilibrium(
+            state=_resting(self.state, x, angles), angles=angles, residual=residual, tolerance=target,
+            iterations=len(history), history=np.array(history), converged=converged, stable=stable, eigenvalues=values,
+            neutral=neutral, mode=mode, reactions=np.where(self.model.free > 0, 0.0, -f), message=message,
+        )  # fmt: skip
+
+    def _worst(self, f: np.ndarray) -> int:
+        return int(self.free[np.abs(f.ravel()[self.free]).argmax()] // 3)
+
+    def _polished(self, x, f, angles, time, k, largest):
+        """One more Newton step where it helps: the residual is small, but soft modes may still be off."""
+        factor = _Factor(k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc"))
+        if factor.solve:
+            d = self.spread(factor.solve(f.ravel()[self.free]))
+            if np.all(np.isfinite(d)) and np.abs(d).max() <= 1e-3 * self.length:
+                new, turned = self.force(x + d, angles, time)
+                if np.abs(new.ravel()[self.free]).max() <= np.abs(f.ravel()[self.free]).max():
+                    return x + d, new, turned
+        return x, f, angles
+
+    def _newton(self, x, f, angles, time, k, largest, shift, unstable, damped):
+        """One step: new positions, forces, angles and the shift to begin with next time; None if none helps."""
+        r = f.ravel()[self.free]
+        if unstable:
+            factor, shift = _Factor(k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc")), 0.0
+            if not factor.solve:
+                return None
+        else:
+            factor, shift = self._definite(k, largest, shift / 16)
+        for _ in range(8):
+            p = factor.solve(r)
+            d = self.spread(p)
+            full = share = self.reach(x, d)
+            while share > 1e-3 * full:
+                new, turned = self.force(x + share * d, angles, time)
+                rest = new.ravel()[self.free]
+                off = math.inf
+                if np.all(np.isfinite(rest)) and np.abs(turned - angles).max(initial=0.0) < 1.0:
+                    # what the linear model, F - share K p, misses
+                    missed = factor.solve(rest - r + share * (k @ p)) if damped else np.zeros(1)
+                    off = float(np.linalg.norm(missed) / (share * np.linalg.norm(p)))
+                if off <= 0.5:
+                    return x + share * d, new, turned, shift
+                share *= min(0.5, max(0.1, 0.35 / off))
+            if unstable:
+                return None
+            factor, shift = self._definite(k, largest, 64 * max(shift, NULL_SHIFT * largest))
+        return None
+
+
+@dataclass
+class _Point:
+    factor: float
+    x: np.ndarray
+    angles: np.ndarray
+    k: sp.csc_array
+    largest: float
+    symmetric: bool
+    tx: np.ndarray
+    tf: float
+    arc: float = 0.0
+    iterations: int = 0
+
+
+class _Tracer:
+    """Pseudo-arclength continuation; lengths in units of the median bar, factors in units of the span."""
+
+    def __init__(self, system: _System, span: float, step: float, move: float, tolerance: float):
+        self.system, self.span, self.step, self.move, self.tolerance = system, span, step, move, tolerance
+        self.mx, self.mf = 1.0 / system.length**2, 1.0 / span**2
+
+    def _bordered(self, k: sp.csc_array, largest: float, by: np.ndarray, tx: np.ndarray, tf: float):
+        """Factors of [[K, -dF/dfactor], [t]] with the last row scaled to the tangent's size."""
+        free = self.system.free
+        weight = largest * self.system.length
+        row = np.append(tx.ravel()[free] * self.mx, tf * self.mf) * weight
+        shifted = k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc")
+        column = sp.csc_array(-by.ravel()[free][:, None])
+        whole = sp.block_array([[shifted, column], [sp.csc_array(row[None, :-1]), np.array([[row[-1]]])]], format="csc")
+        try:
+            return spla.splu(whole), weight
+        except RuntimeError:
+            return None, weight
+
+    def correct(self, x, angles, factor, tx, tf, arc=0.0) -> _Point | None:
+        """Solves for the equilibrium on the plane through (x, factor) with normal t; None if it does not converge."""
+        s, last = self.system, math.inf
+        h = 1e-3 * self.span
+        for iteration in range(10):
+            f, angles = s.force(x, angles, factor)
+            k, largest, symmetric = s.reduced(x, angles, factor)
+            if not (np.all(np.isfinite(f)) and np.all(np.isfinite(k.data))):
+                return None
+            by = s.by_factor(x, angles, factor, h)
+            lu, weight = self._bordered(k, largest, by, tx, tf)
+            if lu is None:
+                return None
+            residual = float(np.abs(f.ravel()[s.free]).max())
+            if residual <= max(self.tolerance * s.scale(x, angles, factor), s.noise(x, largest)):
+                t = lu.solve(np.append(np.zeros(len(s.free)), weight))
+                new_x, new_f = s.spread(t[:-1]), float(t[-1])
+                size = math.sqrt(self.mx * (new_x**2).sum() + self.mf * new_f**2)
+                if not (np.isfinite(size) and size > 0):
+                    return None
+                return _Point(factor, x, angles, k, largest, symmetric, new_x / size, new_f / size, arc, iteration)
+            d = lu.solve(np.append(f.ravel()[s.free], 0.0))
+            dx, df = s.spread(d[:-1]), float(d[-1])
+            size = math.sqrt(self.mx * (dx**2).sum() + self.mf * df**2)
+            if not np.isfinite(size) or size > 0.7 * last or s.reach(x, dx) < 1.0:
+                return None
+            last = size
+            x, factor = x + dx, factor + df
+        return None
+
+    def ahead(self, p: _Point, sigma: float) -> _Point | None:
+        """The point at arc length sigma beyond p."""
+        x, factor = p.x + sigma * p.tx, p.factor + sigma * p.tf
+        if abs(factor) >= FURTHEST:
+            return None
+        return self.correct(x, p.angles, factor, p.tx, p.tf, p.arc + sigma)
+
+    def largest(self, p: _Point) -> float:
+        """Longest step that keeps to the limits on factor and moves."""
+        return min(self.step / max(abs(p.tf), 1e-300), self.move / max(np.linalg.norm(p.tx, axis=-1).max(), 1e-300))
+
+    def limit(self, a: _Point, b: _Point) -> _Point | None:
+        """The limit point between two points: the tangent's factor component vanishes (Illinois method)."""
+        low, high, fl, fh, side, best = 0.0, b.arc - a.arc, a.tf, b.tf, 0, None
+        for _ in range(12):
+            sigma = (low * fh - high * fl) / (fh - fl)
+            best = self.ahead(a, sigma)
+            if best is None or abs(best.tf) < 1e-7 * abs(a.tf - b.tf):
+                break
+            if (best.tf > 0) == (fl > 0):
+                low, fl, fh, side = sigma, best.tf, fh / 2 if side == 1 else fh, 1
+            else:
+                high, fh, fl, side = sigma, best.tf, fl / 2 if side == -1 else fl, -1
+        return best
+
+    def follow(self, x, angles, start, end, max_points, stop) -> Path:
+        """See `continuation`."""
+        s, sign = self.system, math.copysign(1.0, end - start)
+        first = s.settle(x, angles, start, self.tolerance, 200, True)
+        point = None
+        if first.converged:
+            point = self.correct(first.x, first.angles, start, np.zeros_like(x), sign)
+        if point is None:
+            message = f"there is no starting point: {first.message}"
+            return self._path([], [], False, message)
+        points, limits, reached = [point], [], False
+        ease, message = 1.0, f"the path has {max_points} points without reaching its end."
+        while len(points) < max_points:
+            sigma = ease * self.largest(point)
+            new = self.ahead(point, sigma)
+            sharp = new is not None and self.mx * (new.tx * point.tx).sum() + self.mf * new.tf * point.tf < 0.7
+            if new is None or (sharp and ease > 1e-2):
+                ease *= 0.5
+                if ease < 1e-5:
+                    message = f"the path cannot be followed beyond the factor {point.factor:.6g}."
+                    break
+                continue
+            if new.tf * point.tf < 0:
+                peak = self.limit(point, new)
+                if peak is not None:
+                    limits.append(len(points))
+                    points.append(peak)
+            if (new.factor - end) * sign >= 0:
+                share = (end - point.factor) / (new.factor - point.factor)
+                guess = point.x + share * (new.x - point.x)
+                new = self.correct(guess, point.angles, end, np.zeros_like(x), sign, point.arc + share * sigma) or new
+                reached, message = True, f"the path reached the factor {new.factor:.6g}."
+            points.append(new)
+            point = new
+            if not reached and stop is not None and stop(point.factor, point.x):
+                reached, message = True, f"the path was stopped at the factor {point.factor:.6g}."
+            if reached:
+                break
+            ease = min(1.0, ease * (1.6 if new.iterations <= 3 else 1.0))
+        return self._path(points, limits, reached, message)
+
+    def _path(self, points: list[_Point], limits: list[int], reached: bool, message: str) -> Path:
+        s, n = self.system, self.system.model.position.shape[0]
+        spectra = [s.spectrum(p.k, p.largest, p.symmetric)[0] for p in points]
+        negative = np.array([(v < -NEUTRAL * p.largest).sum() for v, p in zip(spectra, points, strict=True)], int)
+        near = {i + d for i in limits for d in (-1, 0)}
+        branches = [i for i in range(len(points) - 1) if negative[i] != negative[i + 1] and i not in near]
+        return Path(
+            factor=np.array([p.factor for p in points]), arc=np.array([p.arc for p in points]),
+            x=np.array([p.x for p in points]).reshape(-1, n, 3),
+            angles=np.array([p.angles for p in points]).reshape(len(points), -1), stable=negative == 0,
+            negative=negative,
+            lowest=np.array([v[0] for v in spectra]), limit_points=np.array(limits, int),
+            branch_points=np.array(branches, int), reached=reached, message=message, start=s.state,
+        )  # fmt: skip
