@@ -247,7 +247,7 @@ class Sheet:
             p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))
         if "crease" in self._effects:
             p.set("crease", "stiffness", self._crease_stiffness).set("crease", "rest_angle", self._rest)
-        if "crease_viscosity" in self._effects:
+        if any(self._viscous_creases):
             p.set("crease_viscosity", "viscosity", self._crease_viscosity(mass))
         if len(mesh.bends):
             p.set("panel_bending", "stiffness", self._bend_stiffness())

@@ -76,7 +76,7 @@ class Run:
 def save_run(
     path: str | Path, trajectory: Trajectory, *, scene: str,
     tables: Mapping[str, Mapping[str, Sequence | np.ndarray]] | None = None, units: Mapping[str, str] | None = None,
-    settings: Mapping[str, Any] | None = None, replay: bool = True, world: int = 0,
+    settings: Mapping[str, Any] | None = None, replay: Mapping[str, Any] | bool = True,
 ) -> Run:  # fmt: skip
     """Writes a run folder. It appears complete or not at all; an earlier run there is replaced only then.
 
@@ -87,7 +87,7 @@ def save_run(
         tables: name -> column -> values, all columns of a table equally long.
         units: column -> unit, for all tables; absent or "" for plain numbers and words.
         settings: JSON values to be kept in the manifest; "seed" and "overrides" (a mapping) get keys of their own.
-        replay: whether to write the replay too. world: the world that it shows.
+        replay: whether to write the replay too, or options for it (world, magnets, arms, tip, recording, title).
 
     Raises:
         InputError: the folder cannot be written, is a file or is not a run; a table whose columns differ in length or
@@ -110,8 +110,9 @@ def save_run(
             for name, sheet in sheets.items():
                 (work / TABLES).mkdir(exist_ok=True)
                 pq.write_table(sheet, work / TABLES / f"{name}.parquet")
-            if replay:
-                write_replay(work / REPLAY, trajectory, world=world, title=scene)
+            if replay is not False:
+                options = replay if isinstance(replay, Mapping) else {}
+                write_replay(work / REPLAY, trajectory, **{"title": scene, **options})
             (work / MANIFEST).write_text(text, encoding="utf-8")
             _exchange(work, target)
         finally:
@@ -430,11 +431,12 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
                              allowed=f"{(count, nodes, worlds, 3)}")  # fmt: skip
     state = {f.name: arrays[f"state.{f.name}"] for f in fields(State)}
     state["step"] = int(state["step"])
+    step = manifest["time_step"]
     return Trajectory(
         model=model, parameters=parameters, drive=drive, **frames, energies=energies, work=work,
         failures=[Failure(**f) for f in manifest["failures"]], dt=float(manifest["dt"]),
-        step=TimeStep(**{n: float(v) if n in ("limit", "dt") else v for n, v in manifest["time_step"].items()}), state=State(**state), wall=float(manifest["wall"]),
-        notes=list(manifest["notes"]),
+        step=TimeStep(float(step["limit"]), float(step["dt"]), int(step["node"]), str(step["cause"])),
+        state=State(**state), wall=float(manifest["wall"]), notes=list(manifest["notes"]),
     )  # fmt: skip
 
 

@@ -32,8 +32,10 @@ def stations(s: Settings) -> tuple[np.ndarray, np.ndarray]:
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     x, owner = stations(s)
-    cells = np.diff(x)
     width = s.rear_width + (s.front_width - s.rear_width) * x / x[-1]
+    if s.heading < 0:  # turned by 180 degrees about z
+        x, owner, width = x[-1] - x[::-1], owner[::-1], width[::-1]
+    cells = np.diff(x)
     sheet = Sheet(strip(list(cells), list(width)), thickness=s.thickness, modulus=s.modulus, density=s.density,
                   membrane=s.membrane, membrane_damping=s.membrane_damping,
                   triangulation="diagonal" if s.guided else "center")  # fmt: skip
@@ -51,22 +53,23 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     half = 0.5 * cells / rigidity
     stiffness = 1.0 / (half[:-1] + half[1:])
     # only the bare sheet bends enough to lose energy; the same loss time on the sandwich would only cost time step
-    sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=np.minimum(stiffness, bare * width[1:-1] / s.cell) * s.loss_time)
+    lossy = stiffness if s.patch_loss else np.minimum(stiffness, bare * width[1:-1] / s.cell)
+    sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=lossy * s.loss_time)
     # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not
-    sheet.panel(np.arange(len(cells)), rigidity=bonded)
+    sheet.panel(np.arange(len(cells)), rigidity=bonded * (s.twist if s.guided else 1.0))
     for number, size, sign, factor in (
         (1, (s.big_length, s.big_width), s.polarity, s.big_moment), (2, (s.small_length, s.small_width), -s.polarity, 1.0),
     ):  # fmt: skip
         inside = np.flatnonzero(owner == number)
         for panel in inside:
-            sheet.patch(int(panel), thickness=s.patch_thickness, size=(cells[panel], size[1]), poling=(sign, 0, 0),
+            sheet.patch(int(panel), thickness=s.patch_thickness, size=(cells[panel], size[1]), poling=(s.heading * sign, 0, 0),
                         remanence=s.remanence * factor, density=s.patch_density)  # fmt: skip
 
     # feet at both ends, belly everywhere: two points per station share the ground's stiffness
     last = len(cells) - 1
     feet, ends = [], ((0, x[0], width[0]), (last, x[-1], width[-1]))
     for panel, at, w in ends:
-        feet += [sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height, name=f"foot at x = {at:.3f}")
+        feet += [sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height, axis=(s.heading, 0, 0), name=f"foot at x = {at:.3f}")
                  for y in (-1, 1)]  # fmt: skip
         sheet.mass([2 * (panel + (panel == last)), 2 * (panel + (panel == last)) + 1], s.foot_mass / 2)
     for k in range(1, len(x) - 1):
@@ -81,6 +84,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     sheet.gravity((0, 0, -s.gravity))
     model, parameters = sheet.build()
+    if not s.patch_height:
+        model = model.with_effects(without=("eccentric_weight",))
+        parameters = parameters.for_model(model)
     model.position[:, 2] = s.thickness / 2 + s.foot_height
     return model, parameters, Drive(field=(0, 0, sine(s.field, s.frequency)))
 

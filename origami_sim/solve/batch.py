@@ -156,7 +156,8 @@ class Batch:
         return Evaluation(
             forces={effect.name: f[i] for i, effect in enumerate(effects)},
             energies={effect.name: e[i] for i, effect in enumerate(effects) if effect.energy is not None},
-            kinetic=0.5 * (self._mass * (v**2).sum(-1)).sum(0),
+            # summed node by node, because the order in which sum() adds depends on the number of worlds
+            kinetic=0.5 * np.cumsum(self._mass * (v**2).sum(-1), axis=0)[-1],
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
             gaps=self._download(gaps, k),
         )

@@ -78,7 +78,7 @@ def rollout({arguments}
             speed = wp.dot(V[n, w], V[n, w])
             if not (speed <= limit):  # also true for nan
                 fastest = n
-                limit = wp.max(limit, speed)
+                limit = wp.max(speed, limit)  # so that the fastest is named
         if fastest >= 0:
             status[0, w] = start + s + 1
             status[1, w] = fastest

@@ -164,8 +164,8 @@ def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) ->
     rest = np.linalg.norm(model.position[model.bars[:, 1]] - model.position[model.bars[:, 0]], axis=-1)
     strain = np.abs(now / rest - 1)
     margin = f"dt = {dt:.3g} s, limit {step.limit:.3g} s set by {step.cause} in the reference state"
-    if not np.all(np.isfinite(x)):
-        return f"a position is not a number ({margin})"
+    if not np.all(np.isfinite([x, state.v[:, world]])):
+        return f"a position or a velocity is not a number ({margin})"
     if len(strain) and strain.max() > 0.05:
         worst = int(strain.argmax())
         return f"bar {worst} strained by {strain[worst]:.0%} ({margin}); take a smaller step or a smaller load"

@@ -12,6 +12,7 @@ import math
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,10 +29,11 @@ STEP = 2e-4
 
 STENCIL = np.array([1.0, -1.0, 2.0, -2.0])
 WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0]) / 12.0
-"""Central differences of fourth order: truncation STEP^4, rounding eps / STEP, near 1e-12 of the stiffest element."""
+"""Central differences of fourth order: truncation STEP^4, rounding eps / STEP, entries near 1e-12 of the largest."""
 
-NEUTRAL = 1e-10
-"""Eigenvalues below this share of the largest stiffness count as zero: a mode that nothing holds or loads."""
+NEUTRAL = 1e-12
+"""Eigenvalues below this share of the largest stiffness count as zero: a mode that nothing holds or loads (for rigid
+motions they come out near 1e-16)."""
 
 NULL_SHIFT = 1e-11
 """Shift of every tangent, over the largest stiffness: keeps free rigid motions solvable."""
@@ -89,7 +91,8 @@ class Path:
     Attributes:
         factor: [P] path parameter. arc: [P] arc length, dimensionless.
         x: [P, N, 3] positions [m]. angles: [P, C + Q] continuous hinge angles [rad].
-        stable: [P] whether the point is stable at a held factor. negative: [P] number of negative eigenvalues.
+        stable: [P] whether the point is stable at a held factor.
+        negative: [P] number of negative eigenvalues (at most 8 are counted beyond 600 degrees of freedom).
         lowest: [P] lowest eigenvalue of the tangent [N/m].
         limit_points: indices of the points where the factor is largest or smallest (found to the tolerance).
         branch_points: indices after which the number of negative eigenvalues changes without a limit point.
@@ -175,7 +178,7 @@ def continuation(
     Every channel of the drive is base + factor (drive - base), at one instant; `base` is no drive unless given, so
     that the factor scales fields, voltages and loads. It may turn back and become negative. Pseudo-arclength
     continuation with tangent predictor and orthogonal corrector (Keller 1977; Crisfield 1981); limit points are found
-    by bisection of the tangent's factor component.
+    where the tangent's factor component vanishes (regula falsi). Laws that depend on time itself see the factor.
 
     Args:
         drive, base: the drives at factor 1 and 0. time: instant at which both are taken [s].
@@ -258,17 +261,25 @@ def _line(base: Drive, drive: Drive) -> Drive:
 
 
 class _Factor:
-    """Sparse factors of a shifted tangent. `definite`: every pivot is positive, which for a symmetric matrix means that
-    it is positive definite."""
+    """Sparse factors of a shifted tangent.
+
+    Attributes:
+        singular: it cannot be solved with.
+        definite: every pivot is positive, which for a symmetric matrix means that it is positive definite.
+    """
 
     def __init__(self, k: sp.csc_array):
-        self.definite, self.solve = False, None
+        self._lu: Any = None
         try:
             self._lu = spla.splu(k, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError:  # exactly singular
+            self.singular, self.definite = True, False
             return
+        self.singular = False
         self.definite = np.array_equal(self._lu.perm_r, self._lu.perm_c) and bool(np.all(self._lu.U.diagonal() > 0))
-        self.solve = self._lu.solve
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        return self._lu.solve(right)
 
 
 class _System:
@@ -312,7 +323,7 @@ class _System:
 
     def by_factor(self, x: np.ndarray, angles: np.ndarray, time: float, h: float) -> np.ndarray:
         """dF/dt [N, 3] at fixed positions."""
-        return sum(w * self.force(x, angles, time + s * h)[0] for s, w in zip(STENCIL, WEIGHTS, strict=True)) / h
+        return np.einsum("snc,s->nc", [self.force(x, angles, time + s * h)[0] for s in STENCIL], WEIGHTS) / h
 
     # --- tangent
 
@@ -348,7 +359,7 @@ class _System:
         """Colour of each node: two of one colour have no neighbour in common."""
         near = sp.csr_array((np.ones(len(self._rows), np.int32), (self._rows, self._columns)), shape=(n, n))
         clash = sp.csr_array(near.T @ near)
-        movable = self.model.free.any(axis=1)
+        movable = np.asarray(self.model.free.any(axis=1))
         colours = np.full(n, -1)
         for i in np.argsort(-np.diff(clash.indptr), kind="stable"):
             if movable[i]:
@@ -368,7 +379,7 @@ class _System:
         self._many.place(placed, np.repeat(angles[:, None], worlds, axis=1))
         f = self._many.total_force(time).reshape(self._shape)
         slopes = -np.einsum("ncasb,s->ncab", f, WEIGHTS)  # [row node, colour, axis moved, axis of force]
-        of = self._colours[self._columns] >= 0
+        of = np.flatnonzero(self._colours[self._columns] >= 0)
         rows, columns = self._rows[of], self._columns[of]
         blocks = slopes[rows, self._colours[columns]] / self._steps[columns, None, None]
         i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
@@ -380,7 +391,7 @@ class _System:
         """Tangent on the free axes, its largest entry [N/m] and whether it is symmetric (then made exactly so)."""
         k = sp.csc_array(self.tangent(x, angles, time)[self.free][:, self.free])
         largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
-        skew = abs(k - k.T)
+        skew = abs(sp.csc_array(k - k.T))
         symmetric = float(skew.max()) <= 1e-8 * largest
         return sp.csc_array(0.5 * (k + k.T)) if symmetric else k, largest, symmetric
 
@@ -393,10 +404,9 @@ class _System:
             values, vectors = np.linalg.eigh(k.toarray()) if symmetric else np.linalg.eig(k.toarray())
         else:
             shift = self._definite(k, largest, 0.0)[1]
-            if symmetric:
-                values, vectors = spla.eigsh(k, k=count, sigma=-2 * shift, which="LM")
-            else:
-                values, vectors = spla.eigs(k, k=count, sigma=-2 * shift, which="LM")
+            v0 = np.random.default_rng(0).standard_normal(n)  # fixed, so that runs repeat
+            find = spla.eigsh if symmetric else spla.eigs
+            values, vectors = find(k, k=min(count, n - 2), sigma=-2 * shift, which="LM", v0=v0)
         order = np.argsort(values.real)[:count]
         mode = np.zeros(self.model.position.size)
         mode[self.free] = vectors[:, order[0]].real
@@ -441,6 +451,7 @@ class _System:
         """See `equilibrium`."""
         history: list[float] = []
         shift, pushes, message, converged = 0.0, 0, "", False
+        values, mode = np.full(1, np.nan), np.zeros_like(x)
         f, angles = self.force(x, angles, time)
         while True:
             r = f.ravel()[self.free]
@@ -495,7 +506,7 @@ class _System:
     def _polished(self, x, f, angles, time, k, largest):
         """One more Newton step where it helps: the residual is small, but soft modes may still be off."""
         factor = _Factor(k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc"))
-        if factor.solve:
+        if not factor.singular:
             d = self.spread(factor.solve(f.ravel()[self.free]))
             if np.all(np.isfinite(d)) and np.abs(d).max() <= 1e-3 * self.length:
                 new, turned = self.force(x + d, angles, time)
@@ -508,7 +519,7 @@ class _System:
         r = f.ravel()[self.free]
         if unstable:
             factor, shift = _Factor(k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc")), 0.0
-            if not factor.solve:
+            if factor.singular:
                 return None
         else:
             factor, shift = self._definite(k, largest, shift / 16)
@@ -561,7 +572,8 @@ class _Tracer:
         row = np.append(tx.ravel()[free] * self.mx, tf * self.mf) * weight
         shifted = k + NULL_SHIFT * largest * sp.eye_array(k.shape[0], format="csc")
         column = sp.csc_array(-by.ravel()[free][:, None])
-        whole = sp.block_array([[shifted, column], [sp.csc_array(row[None, :-1]), np.array([[row[-1]]])]], format="csc")
+        top, bottom = sp.hstack([shifted, column], format="csc"), sp.csc_array(row[None, :])
+        whole = sp.csc_array(sp.vstack([top, bottom], format="csc"))
         try:
             return spla.splu(whole), weight
         except RuntimeError:

@@ -1,5 +1,7 @@
 """Small structures for the statics tests, written out as arrays."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from origami_sim.model import Model, Parameters, dihedral_angles
@@ -49,8 +51,9 @@ def kresling() -> tuple[Model, Parameters]:
         j = (i + 1) % n
         triangles += [(i, j, j + n), (i, j + n, i + n)]
     edges, creases = hinges_of(triangles)
-    model = model_of(np.concatenate([ring, upper]), ("ogden_bars", "crease", "crease_stop", "load"), bars=edges, creases=creases,
-                     triangles=triangles, held=range(n))  # fmt: skip
+    effects = ("ogden_bars", "crease", "crease_stop", "load")
+    model = model_of(np.concatenate([ring, upper]), effects, bars=edges, creases=creases, triangles=triangles,
+                     held=range(n))  # fmt: skip
     x = model.position
     axis = np.linalg.norm(x[model.creases[:, 2]] - x[model.creases[:, 1]], axis=-1)
     parameters = Parameters(model, {
@@ -71,6 +74,22 @@ def truss(rise=0.3, stiffness=100.0) -> tuple[Model, Parameters]:
     model = model_of([(-1, 0, 0), (1, 0, 0), (0, 0, rise)], PLAIN, bars=[(0, 2), (1, 2)], held=[0, 1, (2, 0), (2, 1)])
     parameters = Parameters(model, {("bars", "stiffness"): stiffness, ("bars", "rest_length"): lengths(model)})
     return model, parameters.set("load", "force_z", -1.0, entities=2)
+
+
+def tent(side=0.02, stiffness=500.0) -> tuple[Model, Parameters]:
+    """Two rigid panels, hinged at a ridge, that stand with four feet above a compliant ground; grams at the nodes."""
+    x = [(s * side, y, 0.02 + (s == 0) * side / 2) for s in (0, 1, -1) for y in (0, side)]
+    triangles = [(0, 2, 3), (0, 3, 1), (0, 1, 5), (0, 5, 4)]
+    edges, creases = hinges_of(triangles)
+    model = model_of(x, ("bars", "crease", "gravity", "ground"), bars=edges, creases=creases, triangles=triangles)
+    model = replace(model, contacts=np.array([(2, 3, 0), (3, 2, 0), (4, 5, 0), (5, 4, 0)]),
+                    contact_weights=np.tile([1.0, 0, 0], (4, 1)), contact_offsets=np.zeros(4),
+                    contact_axes=np.zeros((4, 3)))  # fmt: skip
+    return model, Parameters(model, {
+        ("bars", "stiffness"): 1e4, ("bars", "rest_length"): lengths(model), ("crease", "stiffness"): 0.05,
+        ("crease", "rest_angle"): dihedral_angles(model.position, model.creases), ("inertia", "mass"): 1e-3,
+        ("ground", "stiffness"): stiffness, ("plane", "reach"): 1.0,
+    })  # fmt: skip
 
 
 def flap(*, side=0.02, stiffness=0.02, membrane=1e3, free=False) -> tuple[Model, Parameters]:
@@ -100,7 +119,7 @@ def strip(cells: int, *, length=1.0, width=0.1, rigidity=1.0, membrane=1e7) -> t
     model = model_of(x, PLAIN, bars=edges, creases=creases, triangles=triangles, held=range(4))
     along = model.position[model.creases[:, 2]] - model.position[model.creases[:, 1]]
     across = np.abs(along[:, 0]) < 1e-12
-    stiffness = np.where(across, rigidity / d, 1e5 * rigidity / d)
+    stiffness = np.where(across, rigidity / d, 1e4 * rigidity / d)
     stiffness[across & (model.creases[:, 1:3] == 2).any(axis=1)] *= 2
     parameters = Parameters(model, {
         ("bars", "stiffness"): membrane / lengths(model), ("bars", "rest_length"): lengths(model),
