@@ -217,12 +217,13 @@ def _photograph(source: Path, picture: Path, time: float, width: int, height: in
     try:
         client = _connect(process, port, timeout)
         if client is None:
-            said = [line.strip() for line in log.read_text(errors="replace").splitlines() if line.strip()]
-            drawing = [line for line in said if "adapter" in line.lower()]
-            if drawing:
+            said = log.read_text(errors="replace")
+            if "render context" in said or "adapter" in said.lower():
                 return ("no graphics driver offers Vulkan; on Debian and Ubuntu `apt install mesa-vulkan-drivers` "
                         "draws without a graphics card")  # fmt: skip
-            return f"the viewer did not come up within {timeout:g} s" + (f" ({said[-1][:200]})" if said else "")
+            what = f"did not come up within {timeout:g} s" if process.poll() is None else "ended by itself"
+            first = next((line.strip()[:200] for line in said.splitlines() if line.strip()), "it said nothing")
+            return f"the viewer {what} ({first})"
         return _settle(client, picture, time, timeout)
     finally:
         _end(process)
@@ -316,7 +317,7 @@ class _Scene:
             sound = np.isfinite(self.x).all(axis=(1, 2))
             if not sound.any():
                 raise InputError("no frame of this world has finite positions", field="world", value=world)
-            self.x = self.x[np.maximum.accumulate(np.where(sound, np.arange(len(sound)), sound.argmax()))]
+            self.x = self.x[np.maximum.accumulate(np.where(sound, np.arange(len(self.x)), sound.argmax()))]
         if tip is not None and not 0 <= tip < self.x.shape[1]:
             raise InputError("there is no such node", field="tip", value=tip, allowed=f"0 to {self.x.shape[1] - 1}")
         self.moments = self._moments()
@@ -646,7 +647,7 @@ def _write_surroundings(scene: _Scene, out: _Writer):
     if len(scene.model.contacts):
         corner += scene.up * (scene.height + 0.002 * scene.size - corner @ scene.up)
     out.stream.log("scale", rr.LineStrips3D(
-        [np.stack([corner, corner + scene.step * right])], radii=[rr.Radius.ui_points(2.5)], colors=[COLOURS["scale"]],
+        [np.stack([corner, corner + scene.step * right])], radii=rr.Radius.ui_points(2.5), colors=[COLOURS["scale"]],
     ), static=True)  # fmt: skip
     out.stream.log("scale/value", rr.Points3D(
         [corner + 0.5 * scene.step * right], radii=[0.0], colors=[COLOURS["label"]],
@@ -692,7 +693,7 @@ def _write_ground(scene: _Scene, out: _Writer):
     lines = [np.array([(v, low[1]), (v, high[1])]) for v in np.arange(low[0], high[0] + step / 2, step)]
     lines += [np.array([(low[0], v), (high[0], v)]) for v in np.arange(low[1], high[1] + step / 2, step)]
     out.stream.log("ground/grid", rr.LineStrips3D(
-        on_plane(np.array(lines), 0.0), radii=[rr.Radius.ui_points(0.5)], colors=[COLOURS["grid"]]
+        on_plane(np.array(lines), 0.0), radii=rr.Radius.ui_points(0.5), colors=[COLOURS["grid"]]
     ), static=True)  # fmt: skip
 
 
@@ -777,7 +778,8 @@ def _write_recording(recording: Recording, scene: _Scene, out: _Writer):
             seen = np.isfinite(values).all(axis=1)
             path = f"markers/{_slug(channel.name)}"
             out.stream.log(path, rr.Points3D.from_fields(colors=[COLOURS["marker"]], radii=[0.015 * scene.size],
-                                                         labels=[channel.name]), static=True)  # fmt: skip
+                                                         labels=[channel.name], show_labels=[False]),
+                           static=True)  # fmt: skip
             rr.send_columns(path, [rr.TimeColumn(TIMELINE, duration=recording.times)],
                             rr.Points3D.columns(positions=values[seen].astype(np.float32)).partition(seen.astype(int)),
                             recording=out.stream)  # fmt: skip

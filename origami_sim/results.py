@@ -362,19 +362,18 @@ def _read_manifest(file: Path) -> dict[str, Any]:
 
 
 def _read_states(file: Path, manifest: dict[str, Any]) -> Trajectory:
+    arrays = _Arrays({}, file)
     try:
         with np.load(file, allow_pickle=False) as data:
             if not isinstance(data, np.lib.npyio.NpzFile):
                 raise ValueError("not a zip of arrays")
-            arrays = _Arrays({}, file)
             for name in data.files:
                 arrays.current = name
                 arrays.values[name] = data[name]
     except FileNotFoundError:
         raise InputError("is missing", file=file) from None
     except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, zlib.error) as e:
-        name = arrays.current if "arrays" in locals() else None
-        raise InputError(f"is damaged ({_first_line(e)})", file=file, field=name) from None
+        raise InputError(f"is damaged ({_first_line(e)})", file=file, field=arrays.current) from None
     try:
         return _trajectory(arrays, manifest)
     except InputError as e:
@@ -405,10 +404,10 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     model = _with_plain_names(Model(
         **{n: arrays[f"model.{n}"] for n in _MODEL}, effects=tuple(manifest["effects"]), names=manifest["names"]
     ))  # fmt: skip
+    parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:
         raise InputError("is not the model of the manifest beside it", file=arrays.file, field="model_hash",
                          value=model.hash, allowed=manifest["model_hash"])  # fmt: skip
-    parameters = Parameters(model)
     for key, value in arrays.under("parameters.").items():
         owner, _, name = key.partition(".")
         parameters.set(owner, name, value)
@@ -429,7 +428,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
         if frames[name].shape != (count, nodes, worlds, 3):
             raise InputError("has the wrong shape", file=arrays.file, field=name, value=frames[name].shape,
                              allowed=f"{(count, nodes, worlds, 3)}")  # fmt: skip
-    state = {f.name: arrays[f"state.{f.name}"] for f in fields(State)}
+    state: dict[str, Any] = {f.name: arrays[f"state.{f.name}"] for f in fields(State)}
     state["step"] = int(state["step"])
     step = manifest["time_step"]
     return Trajectory(
@@ -441,4 +440,5 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
 
 
 def _signal(values: dict[str, np.ndarray]) -> Signal:
-    return Signal(**{n: v if v.ndim else float(v) for n, v in values.items()})
+    given: dict[str, Any] = {n: v if v.ndim else float(v) for n, v in values.items()}
+    return Signal(**given)

@@ -46,6 +46,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         centre = (s.base / 2 + s.gap / 2 + s.patch_length / 2) * out
         sheet.patch(k + 1, thickness=s.patch_thickness, size=size, centre=centre, poling=out,
                     remanence=s.remanence, density=s.patch_density)  # fmt: skip
+        sheet.panel(k + 1, rigidity=s.flap_stiffening * sheet.rigidity(k + 1))
     sheet.fix(panels=[0])
     stiffness = bridge_stiffness(s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson,
                                  end_correction=s.end_correction)  # fmt: skip
@@ -62,14 +63,23 @@ def drive(s: Settings) -> Drive:
     return Drive(field=(0, 0, vertical))
 
 
+def inclination(x: np.ndarray, faces: list[tuple[int, ...]]) -> np.ndarray:
+    """Inclination of the four flaps from crease to tip, as a camera sees it [rad]; x [N, 3]."""
+    out = []
+    for a, d, c, b in faces[1:]:
+        along = 0.5 * (x[c] + x[d] - x[a] - x[b])
+        out.append(np.arctan2(along[2], np.hypot(along[0], along[1])))
+    return np.array(out)
+
+
 def flap_angles(s: Settings, fields: np.ndarray) -> np.ndarray:
-    """Equilibrium fold angles of the four flaps [rad], [field, flap], followed up from zero field."""
+    """Equilibrium inclinations of the four flaps [rad], [field, flap], followed up from zero field."""
     model, parameters, _ = build(s)
+    faces = pattern(s).faces
     state, out = None, []
     for b in fields:
-        found = equilibrium(model, parameters, Drive(field=(0, 0, b)), state=state)
-        state = found.state
-        out.append(found.state.angles[:4, 0])
+        state = equilibrium(model, parameters, Drive(field=(0, 0, b)), state=state).state
+        out.append(inclination(state.x[:, 0], faces))
     return np.array(out)
 
 
@@ -78,7 +88,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     statics = np.degrees(flap_angles(s, FIELDS * np.sign(s.field or 1.0)))
     model, parameters, signals = build(s)
     motion = simulate(model, parameters, signals, duration=3.0, rate=60, progress=progress)
-    final = np.degrees(motion.creases[-1, :, 0])
+    final = np.degrees(inclination(motion.x[-1, :, 0], pattern(s).faces))
     table = {
         "field_mT": FIELDS * 1e3, "flap_deg": statics.mean(1), "reference_deg": REFERENCE,
         "difference_deg": statics.mean(1) - REFERENCE, "spread_deg": np.ptp(statics, axis=1),

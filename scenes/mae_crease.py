@@ -20,7 +20,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     """A held panel, a crease, and a magnetic panel that is rigid beside the crease."""
     sheet = Sheet(strip([s.length / 2, s.length], s.width), thickness=s.thickness, material="mae", density=s.density,
                   triangulation="center")  # fmt: skip
-    sheet.fix(panels=[0]).panel([0, 1], rigidity=1e4 * s.stiffness)
+    sheet.fix(panels=[0]).panel([0, 1], rigidity=1e6 * s.stiffness)
     sheet.crease(stiffness=s.stiffness, rest_angle=0.0, loss_time=s.loss_time)
     sheet.magnetise(1, remanence=s.remanence, volume=s.length * s.width * s.thickness, poling=(1, 0, 0))
     model, parameters = sheet.build()

@@ -94,7 +94,7 @@ def simulate(
     see its second-order prediction. Worlds are independent and their results do not depend on the batch.
 
     Args:
-        duration: simulated time [s]. rate: frames per second.
+        duration: simulated time [s], rounded to whole frames. rate: frames per second.
         dt: step [s]; default SAFETY times the stability limit of the stiffest element.
         state: where to start (default: the reference state at rest); its worlds must match.
         device: "cpu" or "cuda:0". threads: CPU threads (default all cores).
@@ -116,6 +116,9 @@ def simulate(
     substeps = max(1, int(np.ceil(frame_time / min(dt or chosen.dt, frame_time) * (1 - 1e-12))))
     step = frame_time / substeps
     frames = round(duration * rate)
+    if frames < 1:
+        raise InputError("the run is shorter than one frame", field="duration", value=duration,
+                         allowed=f">= {frame_time:g} s at this rate")  # fmt: skip
     if state is None:
         worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()))
         state = State.at_rest(model, worlds)

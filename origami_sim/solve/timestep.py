@@ -45,12 +45,12 @@ def _gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
         e = k - j
         ee = (e**2).sum(-1)
         n1, n2 = np.cross(i - j, e), np.cross(e, m - j)
-        gi = n1 * (np.sqrt(ee) / (n1**2).sum(-1))[:, None]
-        gl = n2 * (np.sqrt(ee) / (n2**2).sum(-1))[:, None]
+        gi, gl = (np.sqrt(ee) / np.linalg.norm(n, axis=-1) for n in (n1, n2))
         ai, al = ((i - j) * e).sum(-1) / ee, ((m - j) * e).sum(-1) / ee
-        gj = -(1 - ai)[:, None] * gi - (1 - al)[:, None] * gl
-        gk = -ai[:, None] * gi - al[:, None] * gl
-        return h, np.stack([np.linalg.norm(g, axis=-1) for g in (gi, gj, gk, gl)], axis=1)
+        # on the axis the two sides add as vectors; their lengths bound the sum at every fold angle
+        gj = np.abs(1 - ai) * gi + np.abs(1 - al) * gl
+        gk = np.abs(ai) * gi + np.abs(al) * gl
+        return h, np.stack([gi, gj, gk, gl], axis=1)
     if family in CONTACTS:
         a, b, c = (x[model.contacts[:, i]] for i in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=-1)

@@ -495,6 +495,7 @@ def test_not_a_number_is_a_failure_with_that_cause():
         ({"dt": float("nan")}, ["dt"]),
         ({"duration": 0.0}, ["duration", "> 0"]),
         ({"rate": float("inf")}, ["rate"]),
+        ({"duration": 0.01}, ["duration", "0.025 s"]),
         ({"drive": Drive(voltage=series([0, 0.1], [0, 1]))}, ["voltage_0", "ends before", "0.1"]),
         ({"drive": Drive(field=(0, sine(np.ones(4), 1.0), 0))}, ["number of worlds", "1 or 4"]),
         ({"device": "cuda:99"}, ["cuda:99", "cpu"]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effects.kit import hinge, hinge_positions, make_model, quiet, start, strip
+from effects.kit import HINGE, hinge, hinge_positions, make_model, quiet, start, strip
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
@@ -137,6 +137,18 @@ def test_limit_with_damping_is_safe_and_at_most_three_times_too_small(case):
     assert np.isfinite(limit)
     exact = exact_limit(*differentiated(model, parameters), limit)
     assert exact / 3 <= limit <= exact * (1 + 1e-3), limit / exact
+
+
+@pytest.mark.parametrize("apexes", [((0.4, 0.9), (0.6, 0.8)), ((1.7, 0.3), (-0.7, 0.3)), ((1.7, 0.3), (-0.4, 1.2))])
+@pytest.mark.parametrize("angle", [0.0, 1.5, 3.0, 3.14])
+def test_limit_of_the_flat_reference_holds_at_every_fold_angle(apexes, angle):
+    """Apexes beyond the ends of the axis are the hard case: there the axis nodes feel a folded hinge more."""
+    values = {("crease", "stiffness"): 1.0, ("crease", "rest_angle"): angle, ("inertia", "mass"): 0.01}
+    flat, folded = (make_model(hinge_positions(a, *apexes), **HINGE) for a in (0.0, angle))
+    mass, k, _ = differentiated(folded, quiet(folded, values))
+    exact = 2 / np.sqrt(np.linalg.eigvalsh((k + k.T) / 2 / mass[0]).max())
+    limit = stable_step(flat, quiet(flat, values)).limit
+    assert exact / 4 <= limit <= exact * (1 + 1e-6), limit / exact
 
 
 def relaxing():
