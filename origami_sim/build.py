@@ -261,8 +261,6 @@ class Sheet:
                     p.set("eccentric_weight", "offset", offset, [t])
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
-        if "adhesion" in self._effects:
-            p.set("plane", "reach", p["adhesion", "reach"].max())
         return model, p
 
     # geometry -----------------------------------------------------------------------------------------------------

@@ -52,7 +52,7 @@ def dihedral(xi: wp.vec3d, xj: wp.vec3d, xk: wp.vec3d, xl: wp.vec3d):
 @wp.func
 def unwrap(angle: scalar, before: scalar):
     """The angle, shifted by whole turns to lie within half a turn of its earlier value."""
-    turn = scalar(2.0 * math.pi)
+    turn = scalar(2.0) * scalar(math.pi)  # an expression inside scalar() would be single precision
     return angle + turn * wp.round((before - angle) / turn)
 
 

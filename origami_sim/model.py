@@ -1,7 +1,7 @@
 """Model (what is constant), Parameters (what can be identified), State (what moves)."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -126,10 +126,10 @@ class Parameters:
             raise InputError("a parameter must be finite", field=f"{owner}.{name}", value=value)
         self._check_bounds(owner, name, new)
         tail = 1 + len(knots)
-        if new.ndim < 1 + tail:  # scalar, or one value (or table) per entity
-            new = new.reshape((-1, 1, *knots)) if new.ndim else np.full((1, 1), float(new))
         index = np.arange(len(old)) if entities is None else np.atleast_1d(entities)
         try:
+            if new.ndim < 1 + tail:  # scalar, or one value (or table) per entity
+                new = new.reshape((-1, 1, *knots)) if new.ndim else np.full((1, 1), float(new))
             worlds = max(old.shape[1], new.shape[1])
             out = np.array(np.broadcast_to(old, (len(old), worlds, *knots)))
             out[index] = np.broadcast_to(new, (len(index), worlds, *knots))
@@ -192,7 +192,7 @@ class State:
         a: [N, W, 3] accelerations of the last force evaluation [m/s^2].
         angles: [C + Q, W] continuous hinge angles, creases first [rad].
         memory: [M, W] extra state of the effects.
-        work: [E, W] work done so far by each effect that exchanges it [J].
+        work: [E, W] work done so far by each effect that exchanges it [J]. power: [E, W] its present power [W].
         step: number of steps taken; -1 before the first force evaluation.
         status: [2, W] step and node at which a world failed, -1 while it is sound.
     """
@@ -203,6 +203,7 @@ class State:
     angles: np.ndarray
     memory: np.ndarray
     work: np.ndarray
+    power: np.ndarray
     step: int
     status: np.ndarray
 
@@ -218,10 +219,21 @@ class State:
         hinges = np.concatenate([model.creases, model.bends])
         angles = dihedral_angles(x, hinges)
         return cls(x=x, v=np.zeros_like(x), a=np.zeros_like(x), angles=angles, memory=np.zeros((rows, worlds)),
-                   work=np.zeros((len(effects), worlds)), step=-1, status=np.full((2, worlds), -1, np.int32))  # fmt: skip
+                   work=np.zeros((len(effects), worlds)), power=np.zeros((len(effects), worlds)), step=-1, status=np.full((2, worlds), -1, np.int32))  # fmt: skip
 
     def copy(self) -> "State":
         return State(*(v.copy() if isinstance(v, np.ndarray) else v for v in (getattr(self, f.name) for f in fields(self))))
+
+    def select(self, worlds: np.ndarray) -> "State":
+        """These worlds, copied; an index may repeat."""
+        names = [f.name for f in fields(self) if f.name != "step"]
+        return State(**{n: getattr(self, n)[:, worlds] for n in names}, step=self.step)
+
+    @classmethod
+    def join(cls, states: "Sequence[State]") -> "State":
+        """One batch of the worlds of several states, which must have taken equally many steps."""
+        names = [f.name for f in fields(cls) if f.name != "step"]
+        return cls(**{n: np.concatenate([getattr(s, n) for s in states], axis=1) for n in names}, step=states[0].step)
 
     @property
     def worlds(self) -> int:

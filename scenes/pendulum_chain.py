@@ -96,10 +96,7 @@ def _fit_start(s: Settings, recording: Recording, window: float, names: list[str
     misfit = np.inf
     for _ in range(4):
         trials = values + np.vstack([np.zeros(len(names)), np.diag(scale)])
-        states = [start(s.replace(**dict(zip(names, map(float, t), strict=True))), model) for t in trials]
-        state = states[0]
-        for field in ("x", "v", "a", "angles", "memory", "work", "status"):
-            setattr(state, field, np.concatenate([getattr(q, field) for q in states], axis=1))
+        state = State.join([start(s.replace(**dict(zip(names, map(float, t), strict=True))), model) for t in trials])
         motion = simulate(model, parameters, drive, duration=(len(head.times) - 1) / rate, rate=rate, state=state)
         predicted = np.stack([np.concatenate(list(observe(motion, head, world=w).values())) for w in range(len(trials))])
         slopes = (predicted[1:] - predicted[0]).T / scale

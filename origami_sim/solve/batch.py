@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from origami_sim.drive import Drive
+from origami_sim.effects import CONTACTS
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.compose import compose
@@ -86,8 +87,8 @@ class Batch:
         ]  # fmt: skip
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = wp.zeros_like(self._x)
-        self._angles, self._memory, self._work = (
-            self._upload(s, wp.float64) for s in (state.angles, state.memory, state.work)
+        self._angles, self._memory, self._work, self._power = (
+            self._upload(s, wp.float64) for s in (state.angles, state.memory, state.work, state.power)
         )
         self._status = self._upload(state.status, wp.int32)
         self._mass = parameters["inertia", "mass"]
@@ -98,6 +99,10 @@ class Batch:
         blocks, layout, offset = [], [], 0
         for owner, name in self.program.slots:
             a = waves[name] if owner == "drive" else parameters[owner, name]
+            if (owner, name) == ("plane", "reach"):  # no contact law may be cut off
+                reaches = [parameters[e.name, "reach"].max() for e in self.program.effects
+                           if e.family in CONTACTS and "reach" in {p.name for p in e.parameters} and parameters[e.name, "reach"].size]
+                a = np.maximum(a, max(reaches, default=0.0))
             worlds, knots = a.shape[1], int(np.prod(a.shape[2:]))
             if worlds not in (1, self.worlds):
                 raise InputError("a parameter is given for another number of worlds than the state has",
@@ -134,7 +139,7 @@ class Batch:
 
     def advance(self, steps: int, dt: float, speed_limit: float):
         """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""
-        self._launch(self.program.rollout, [self._a, self._f, self._work, self._status, _FIRST, self.step, steps,
+        self._launch(self.program.rollout, [self._a, self._f, self._work, self._power, self._status, _FIRST, self.step, steps,
                                             wp.float64(dt), wp.float64(speed_limit)])  # fmt: skip
         self.step = max(self.step, 0) + steps
 
@@ -175,6 +180,7 @@ class Batch:
             x=self._download(self._x, n), v=self._download(self._v, n), a=self._download(self._a, n),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
             memory=self._download(self._memory, rows), work=self._download(self._work, len(self.program.effects)),
+            power=self._download(self._power, len(self.program.effects)),
             step=self.step, status=self._download(self._status, 2),
         )  # fmt: skip
 

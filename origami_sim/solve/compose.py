@@ -41,7 +41,7 @@ _ROLLOUT_HEAD = """
 @wp.kernel(enable_backward=False)
 def rollout({arguments}
     A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
-    status: wp.array2d(dtype=wp.int32),
+    power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
 ):
     w = first_world + wp.tid()
@@ -249,7 +249,7 @@ class _Composer:
 
     def add_work(self, t: _Text, effect: Effect, power: str, mode: str):
         if mode == "rollout" and effect.exchanges_work:
-            t(f"work_{effect.name} += h * ({power})")
+            t(f"power_{effect.name} += {power}")
 
     def scatter(self, t: _Text, effect: Effect, node: str, force: str, mode: str):
         """Adds to the node: to the effect's own array when reporting, to the sum otherwise."""
@@ -269,7 +269,7 @@ class _Composer:
             t(f"load = {self.channel(str(LOAD))}")
         for e in self.effects:
             if mode == "rollout" and e.exchanges_work:
-                t(f"work_{e.name} = scalar(0.0)")
+                t(f"power_{e.name} = scalar(0.0)")
         self._nodes(t, mode)
         self._bars(t, mode)
         for family in HINGES:
@@ -278,7 +278,8 @@ class _Composer:
         self._contacts(t, mode)
         for i, e in enumerate(self.effects):
             if mode == "rollout" and e.exchanges_work:
-                t(f"work[{i}, w] = work[{i}, w] + work_{e.name}")
+                t(f"work[{i}, w] = work[{i}, w] + half * (power[{i}, w] + power_{e.name})")
+                t(f"power[{i}, w] = power_{e.name}")
         return str(t)
 
     def _nodes(self, t: _Text, mode: str):

@@ -217,7 +217,7 @@ def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_
     if not 0 <= world < worlds:
         raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
     drive.require(time)
-    one = State.at_rest(model) if state is None else _worlds(state, np.array([world if state.worlds > 1 else 0]))
+    one = State.at_rest(model) if state is None else state.select(np.array([world if state.worlds > 1 else 0]))
     if not np.all(np.isfinite(one.x)):
         raise InputError("a position must be finite", field="state.x", value=float("nan"))
     if not np.any(model.free):
@@ -226,12 +226,6 @@ def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_
         model, parameters.world(world if parameters.worlds > 1 else 0), fixed or _fixed(drive, time, world), one
     )
     return system, one.x[:, 0], one.angles[:, 0]
-
-
-def _worlds(state: State, index: np.ndarray) -> State:
-    """These worlds of a state, copied; an index may repeat."""
-    names = ("x", "v", "a", "angles", "memory", "work", "status")
-    return State(**{n: getattr(state, n)[:, index] for n in names}, step=state.step)
 
 
 def _resting(state: State, x: np.ndarray, angles: np.ndarray) -> State:
@@ -304,7 +298,7 @@ class _System:
         self._steps = STEP * self._smallest(lengths)
         self._colours = self._colour(n)
         worlds = 3 * (self._colours.max(initial=0) + 1) * len(STENCIL)
-        tiled = _worlds(self.state, np.zeros(worlds, int))
+        tiled = self.state.select(np.zeros(worlds, int))
         self._many = Batch(model, parameters, drive, tiled)
         self._shape = (n, worlds // 3 // len(STENCIL), 3, len(STENCIL), 3)
 

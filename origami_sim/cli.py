@@ -1,0 +1,335 @@
+"""`origami-sim`: run scenes, replay runs, compare recordings, list effects, check strides.
+
+Exit codes: 0 done; 1 done, but the answer is no (a regression changed); 2 bad input, nothing written over; 3 a world
+went unstable; 130 interrupted, earlier results untouched.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from origami_sim.errors import InputError
+
+if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
+    from origami_sim.recording import Recording
+    from origami_sim.scene import Outcome
+
+OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
+STAND_IN_SECONDS = 20.0
+
+
+class _Bar:
+    """A progress line on standard error, only where somebody watches."""
+
+    def __init__(self, label: str):
+        self.label, self.shown, self.began = label, -1, time.perf_counter()
+        self.watched = sys.stderr.isatty()
+
+    def __call__(self, fraction: float):
+        percent = int(100 * fraction)
+        if self.watched and percent != self.shown:
+            self.shown = percent
+            sys.stderr.write(f"\r{self.label}: {percent:3d} %")
+            if fraction >= 1:
+                sys.stderr.write(f" in {time.perf_counter() - self.began:.1f} s\n")
+            sys.stderr.flush()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="origami-sim", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def command(name: str, action: Callable, summary: str, example: str) -> argparse.ArgumentParser:
+        p = commands.add_parser(name, help=summary, description=summary + ".", epilog=f"example: {example}",
+                                formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+        p.set_defaults(action=action)
+        p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
+        return p
+
+    p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
+    p.add_argument("scene", help="box, crawler, bifold, pendulum_chain, fold_file or mae_crease")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)")
+    p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
+    p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
+    p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
+
+    p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
+    p.add_argument("run", help="run folder or .rrd file")
+    p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
+    p.add_argument("--time", type=float, help="simulated time of the picture [s]")
+
+    p = command("compare", _compare, "Compare a recording with a scene",
+                "origami-sim compare double.csv --scene pendulum_chain --duration 5")  # fmt: skip
+    p.add_argument("recording", help="CSV or Parquet file")
+    p.add_argument("--scene", required=True, help="scene that models what was recorded")
+    p.add_argument("--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
+    p.add_argument("--duration", type=float, default=5.0, help="seconds compared (default 5)")
+    p.add_argument("--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)")
+    p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/compare)")
+
+    p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
+    p.add_argument("name", nargs="?", help="one effect, in full")
+
+    p = command("stride", _stride, "Regression of stride per cycle: against the stored reference and the paper",
+                "origami-sim stride crawler")  # fmt: skip
+    p.add_argument("scene", nargs="?", default="crawler", help="a scene that walks (default crawler)")
+    p.add_argument("--cycles", type=int, help="cycles to walk (default: those of the reference)")
+
+    p = command("demo", _demo, "Box, crawler, a folded pattern and a recording, with replays and a report",
+                "origami-sim demo --out runs/demo")  # fmt: skip
+    p.add_argument("--out", default="runs/demo", metavar="FOLDER", help="where the run folders go (default runs/demo)")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command line and exits with its code."""
+    args = _parser().parse_args(arguments)
+    try:
+        code = args.action(args)
+    except InputError as e:
+        print(f"origami-sim: {e}", file=sys.stderr)
+        code = BAD_INPUT
+    except KeyboardInterrupt:
+        print("origami-sim: interrupted; earlier results are untouched.", file=sys.stderr)
+        code = INTERRUPTED
+    except BrokenPipeError:
+        code = OK
+    sys.exit(code)
+
+
+# commands ------------------------------------------------------------------------------------------------------------
+
+
+def _run(args) -> int:
+    from origami_sim.scene import read_calibration, scene_module
+
+    module = scene_module(args.scene)
+    settings = read_calibration(args.calibration or module.CALIBRATION).override(args.set)
+    if args.settings:
+        if args.json:
+            print(json.dumps({n: s.__dict__ for n, s in settings.items()}))
+        else:
+            for s in settings.values():
+                limits = f", {s.range[0]:g} to {s.range[1]:g}" if s.range else ""
+                value = f"{s.value:g}" if isinstance(s.value, float) else s.value
+                print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
+        return OK
+    folder = Path(args.out or f"runs/{args.scene}")
+    _writable(folder)
+    outcome = module.run(settings, progress=_Bar(args.scene))
+    _save(folder, args.scene, outcome, settings.as_dict(), args.set)
+    _tell(args, outcome, folder)
+    return _soundness(outcome)
+
+
+def _replay(args) -> int:
+    from origami_sim.replay import open_replay, screenshot
+
+    path = Path(args.run)
+    if path.is_dir():
+        path = path / "replay.rrd"
+    if args.screenshot:
+        return OK if screenshot(path, args.screenshot, time=args.time) else NO
+    open_replay(path)
+    return OK
+
+
+def _compare(args) -> int:
+    from origami_sim.compare import plot_overlay
+    from origami_sim.recording import read_recording
+    from origami_sim.scene import read_calibration, scene_module
+
+    module = scene_module(args.scene)
+    if not hasattr(module, "replicate"):
+        raise InputError("this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain")
+    for name in ("duration", "threshold"):
+        if not getattr(args, name) > 0:
+            raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed="> 0")
+    settings = read_calibration(module.CALIBRATION).override(args.set)
+    recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+    folder = Path(args.out or "runs/compare")
+    _writable(folder)
+    comparison, motion, used, part = _replicate(module, settings, recording, args.start, args.duration, args.threshold)
+    _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
+    plot_overlay(comparison, folder / "overlay.png")
+    if args.json:
+        print(comparison.to_json())
+    else:
+        for note in recording.metadata.get("notes", ()):
+            print(f"note: {note}")
+        print(comparison.table())
+        print(comparison.sentence())
+        print(f"run folder: {folder}")
+    return OK
+
+
+def _effects(args) -> int:
+    from origami_sim.effects import CATALOGUE, get
+
+    chosen = [get(args.name)] if args.name else list(CATALOGUE.values())
+    if args.json:
+        keys = ("name", "family", "formula", "source", "matters", "confused_with", "separated_by")
+        print(json.dumps([{**{k: getattr(e, k) for k in keys}, "parameters": [
+            {"name": p.name, "symbol": p.symbol, "unit": p.unit, "default": p.default, "bounds": list(p.bounds),
+             "meaning": p.meaning} for p in e.parameters]} for e in chosen]))  # fmt: skip
+        return OK
+    for e in chosen:
+        print(f"{e.name}  ({e.family})\n    {e.formula}")
+        print(f"    matters: {e.matters}")
+        if e.confused_with:
+            print(f"    confused with: {e.confused_with}\n    separated by: {e.separated_by}")
+        print(f"    source: {e.source}")
+        for p in e.parameters:
+            print(f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}: {p.meaning}")
+        print()
+    return OK
+
+
+def _stride(args) -> int:
+    from origami_sim import regression
+    from origami_sim.scene import read_calibration, scene_module
+
+    module = scene_module(args.scene)
+    if not hasattr(module, "walk"):
+        raise InputError("this scene does not walk", field="scene", value=args.scene, allowed="crawler")
+    settings = read_calibration(module.CALIBRATION)
+    cycles = args.cycles or len(regression.reference(args.scene)["strides_mm"])
+    motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
+    report = regression.check(args.scene, regression.strides(motion, settings.frequency))
+    print(json.dumps(report.to_json()) if args.json else report.text())
+    return OK if report.passed else NO
+
+
+def _demo(args) -> int:
+    from origami_sim.recording import read_recording, stand_in_double_pendulum
+    from origami_sim.report import Section, write_report
+    from origami_sim.scene import read_calibration, recordings_folder, scene_module
+
+    began = time.perf_counter()
+    out = Path(args.out)
+    _writable(out)
+    sections, worst = [], OK
+    for name in ("box", "crawler", "fold_file"):
+        module = scene_module(name)
+        settings = read_calibration(module.CALIBRATION)
+        print(f"== {name}", flush=True)
+        outcome = module.run(settings, progress=_Bar(name))
+        _save(out / name, name, outcome, settings.as_dict(), [])
+        _tell(args, outcome, out / name)
+        sections.append(Section.of(name, module, outcome, out / name))
+        worst = max(worst, _soundness(outcome))
+
+    print("== pendulum_chain", flush=True)
+    module = scene_module("pendulum_chain")
+    folder = recordings_folder()
+    real = folder / "pendulum_chain" / "double.csv" if folder else None
+    if real is not None and real.is_file():
+        source, note = real, "real recording"
+    else:
+        note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
+        source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
+    print(f"{note}: {source.name}")
+    recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
+    settings = read_calibration(module.CALIBRATION)
+    comparison, motion, used, part = _replicate(module, settings, recording, 0.0, 5.0, 5.0)
+    _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
+    print(comparison.table())
+    print(comparison.sentence())
+    sections.append(Section.of_comparison("pendulum_chain", module, comparison, note, out / "pendulum_chain"))
+
+    page = write_report(out / "index.html", sections)
+    print(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
+    print(f"done in {time.perf_counter() - began:.0f} s")
+    return worst
+
+
+# parts ---------------------------------------------------------------------------------------------------------------
+
+
+def _writable(folder: Path) -> None:
+    """Refuses a folder that cannot be written before anything is computed."""
+    import os
+
+    existing = folder
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise InputError("the output folder cannot be written", file=folder, field="--out", allowed="a writable folder")
+
+
+def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
+    from origami_sim.results import save_run
+
+    save_run(folder, outcome.trajectory, scene=scene, tables=outcome.tables, units=outcome.units or _units(outcome.tables),
+             settings={**settings, "overrides": dict(o.split("=", 1) for o in overrides)})  # fmt: skip
+
+
+def _units(tables: dict) -> dict[str, str]:
+    """Units from column names such as field_mT."""
+    known = {"deg", "mT", "mm", "s", "rad", "T", "V", "N", "J"}
+    names = {n for t in tables.values() for n in t}
+    return {n: n.rsplit("_", 1)[1] for n in names if "_" in n and n.rsplit("_", 1)[1] in known}
+
+
+def _tell(args, outcome: "Outcome", folder: Path) -> None:
+    from origami_sim.results import format_table
+
+    if args.json:
+        print(json.dumps({"numbers": outcome.numbers, "folder": str(folder), "dt": outcome.trajectory.dt,
+                          "failures": [str(f) for f in outcome.trajectory.failures]}))  # fmt: skip
+        return
+    for table in outcome.tables.values():
+        print(format_table(table, _units(outcome.tables)))
+    for sentence in outcome.summary:
+        print(sentence)
+    print(f"{outcome.trajectory.step}; {outcome.trajectory.wall:.1f} s of computing; run folder: {folder}")
+
+
+def _soundness(outcome: "Outcome") -> int:
+    for failure in outcome.trajectory.failures:
+        print(f"origami-sim: {failure}", file=sys.stderr)
+    return UNSTABLE if outcome.trajectory.failures else OK
+
+
+def _shipped_sidecar(name: str) -> Path:
+    from importlib import resources
+
+    return Path(str(resources.files("origami_sim.scenes") / f"{name}.toml"))
+
+
+def _sidecar(recording: Path) -> Path | None:
+    """The shipped sidecar of a known recording, unless one lies beside the file."""
+    shipped = _shipped_sidecar(f"{recording.parent.name}_{recording.stem}")
+    return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
+
+
+def _replicate(module, settings, recording: "Recording", start: float, duration: float, threshold: float):
+    from origami_sim.compare import compare
+    from origami_sim.observe import observe
+
+    first = float(recording.times[0]) + start
+    part = recording.window(first, first + duration)
+    motion, used = module.replicate(settings, part, progress=_Bar("replicate"))
+    return compare(part, observe(motion, part), threshold=threshold), motion, used, part
+
+
+def _save_comparison(folder: Path, scene: str, comparison, motion, used, part, overrides: list[str]) -> None:
+    from origami_sim.results import save_run
+
+    columns = {"time_s": comparison.times}
+    for c in comparison.channels.values():
+        columns |= {f"{c.name}_recorded": c.recorded[:, 0], f"{c.name}_simulated": c.predicted[:, 0]}
+    save_run(folder, motion, scene=scene, tables={"comparison": columns}, units={"time_s": "s"},
+             settings={**used.as_dict(), "overrides": dict(o.split("=", 1) for o in overrides)},
+             replay={"recording": part, "title": scene})  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
