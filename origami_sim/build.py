@@ -32,10 +32,17 @@ class Sheet:
     """
 
     def __init__(
-        self, pattern: Pattern, *, thickness: float, material: str = "pdms", modulus: float | None = None,
-        density: float | None = None, triangulation: str = "diagonal", membrane: float = 1.0,
+        self,
+        pattern: Pattern,
+        *,
+        thickness: float,
+        material: str = "pdms",
+        modulus: float | None = None,
+        density: float | None = None,
+        triangulation: str = "diagonal",
+        membrane: float = 1.0,
         membrane_damping: float = 0.02,
-    ):  # fmt: skip
+    ):
         self.pattern = pattern
         self.mesh = triangulate(pattern, triangulation)
         faces = pattern.face_count
@@ -46,11 +53,15 @@ class Sheet:
         self.density = np.array([density or m.density for m in chosen])
         self.poisson = np.array([m.poisson for m in chosen])
         for name, value in (
-            ("thickness", self.thickness), ("modulus", self.modulus), ("density", self.density),
+            ("thickness", self.thickness),
+            ("modulus", self.modulus),
+            ("density", self.density),
             ("membrane", np.array([membrane])),
-        ):  # fmt: skip
+        ):
             if not np.all(value > 0) or not np.all(np.isfinite(value)):
-                raise InputError("a panel property must be positive", field=name, value=float(value.min()), allowed="> 0")
+                raise InputError(
+                    "a panel property must be positive", field=name, value=float(value.min()), allowed="> 0"
+                )
         if membrane_damping < 0:
             raise InputError("a damping ratio cannot be negative", field="membrane_damping", value=membrane_damping)
         self.membrane, self.membrane_damping = membrane, membrane_damping
@@ -90,8 +101,15 @@ class Sheet:
         self._settings += [(effect, name, value, entities) for name, value in parameters.items()]
         return self
 
-    def crease(self, creases=None, *, stiffness=None, rest_angle=None, loss_time: float | None = None,
-               damping_ratio: float | None = None) -> "Sheet":  # fmt: skip
+    def crease(
+        self,
+        creases=None,
+        *,
+        stiffness=None,
+        rest_angle=None,
+        loss_time: float | None = None,
+        damping_ratio: float | None = None,
+    ) -> "Sheet":
         """Elastic creases, with a Kelvin-Voigt loss if asked for.
 
         Args:
@@ -103,7 +121,9 @@ class Sheet:
         index = np.arange(len(self.mesh.creases)) if creases is None else np.atleast_1d(creases)
         if stiffness is not None:
             if np.any(np.asarray(stiffness) < 0):
-                raise InputError("a crease stiffness cannot be negative", field="stiffness", value=stiffness, allowed=">= 0")
+                raise InputError(
+                    "a crease stiffness cannot be negative", field="stiffness", value=stiffness, allowed=">= 0"
+                )
             self._crease_stiffness[index] = stiffness
         if rest_angle is not None:
             self._rest[index] = rest_angle
@@ -117,9 +137,19 @@ class Sheet:
         self._rigidity[np.atleast_1d(panels)] = rigidity
         return self
 
-    def patch(self, panel: int, *, thickness: float, poling: Sequence[float] = (0, 0, 0), size: Sequence[float] | None = None,
-              centre: Sequence[float] | None = None, material: str = "mae", remanence: float | None = None,
-              density: float | None = None, side: int = 1) -> "Sheet":  # fmt: skip
+    def patch(
+        self,
+        panel: int,
+        *,
+        thickness: float,
+        poling: Sequence[float] = (0, 0, 0),
+        size: Sequence[float] | None = None,
+        centre: Sequence[float] | None = None,
+        material: str = "mae",
+        remanence: float | None = None,
+        density: float | None = None,
+        side: int = 1,
+    ) -> "Sheet":
         """Bonds a rectangular patch, magnetised if its material is, on one side of a panel.
 
         Args:
@@ -134,16 +164,25 @@ class Sheet:
         box = self.mesh.vertices[nodes]
         size = np.asarray(size if size is not None else np.ptp(box, axis=0)[:2], float)
         if thickness <= 0 or np.any(size <= 0):
-            raise InputError("a patch needs positive dimensions", field="patch", value=[thickness, *size], allowed="> 0 m")
+            raise InputError(
+                "a patch needs positive dimensions", field="patch", value=[thickness, *size], allowed="> 0 m"
+            )
         self._patches[panel] = {
-            "thickness": float(thickness), "size": size, "material": m, "side": side,
+            "thickness": float(thickness),
+            "size": size,
+            "material": m,
+            "side": side,
             "centre": np.asarray(centre, float) if centre is not None else self._centroid(panel),
             "density": density or m.density,
-        }  # fmt: skip
+        }
         direction = np.asarray(poling, float)
         if np.linalg.norm(direction) > 0:
-            self.magnetise(panel, remanence=m.remanence if remanence is None else remanence,
-                           volume=thickness * size[0] * size[1], poling=direction)  # fmt: skip
+            self.magnetise(
+                panel,
+                remanence=m.remanence if remanence is None else remanence,
+                volume=thickness * size[0] * size[1],
+                poling=direction,
+            )
         return self
 
     def magnetise(self, panel: int, *, remanence: float, volume: float, poling: Sequence[float]) -> "Sheet":
@@ -154,8 +193,15 @@ class Sheet:
             normal = self._area_vector[t] / self.area[t]
             a, b = self._edge_weights(t, d)
             scale = np.linalg.norm(d - normal * (d @ normal)) or 1.0
-            self.set("magnetic_torque", [t], remanence=remanence, volume=volume * self._share(panel, t),
-                     poling_1=a / scale, poling_2=b / scale, poling_n=float(np.clip(d @ normal, -1, 1)))  # fmt: skip
+            self.set(
+                "magnetic_torque",
+                [t],
+                remanence=remanence,
+                volume=volume * self._share(panel, t),
+                poling_1=a / scale,
+                poling_2=b / scale,
+                poling_n=float(np.clip(d @ normal, -1, 1)),
+            )
         return self
 
     def rigid_body(self, panel: int, *, mass: float, centre: Sequence[float], inertia: float) -> "Sheet":
@@ -186,8 +232,15 @@ class Sheet:
             self.set("eccentric_weight", gravity_x=gx, gravity_y=gy, gravity_z=gz)
         return self
 
-    def contact(self, panel: int, point: Sequence[float], *, offset: float = 0.0, axis: Sequence[float] = (1, 0, 0),
-                name: str | None = None) -> int:  # fmt: skip
+    def contact(
+        self,
+        panel: int,
+        point: Sequence[float],
+        *,
+        offset: float = 0.0,
+        axis: Sequence[float] = (1, 0, 0),
+        name: str | None = None,
+    ) -> int:
         """Adds a point that can touch the ground and returns its index.
 
         Args:
@@ -204,7 +257,9 @@ class Sheet:
         if best is None or weights.min() < -1e-6:
             raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=list(point))
         a, b = self._edge_weights(best, d)
-        self._contacts.append((best, weights, offset, np.array([-a - b, a, b]), name or f"contact {len(self._contacts)}"))
+        self._contacts.append(
+            (best, weights, offset, np.array([-a - b, a, b]), name or f"contact {len(self._contacts)}")
+        )
         return len(self._contacts) - 1
 
     def electrode(self, group: int, *, creases=()) -> "Sheet":
@@ -219,23 +274,30 @@ class Sheet:
         mesh = self.mesh
         missing = np.flatnonzero(np.isnan(self._crease_stiffness))
         if len(missing) and "crease" in self._effects:
-            raise InputError("a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)")
+            raise InputError(
+                "a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)"
+            )
         if len(mesh.bends):
             self.on("panel_bending")
         if self.membrane_damping > 0:
             self.on("bar_viscosity")
         tri = np.array([c[0] for c in self._contacts], int)
         model = Model(
-            position=mesh.vertices, free=self._free, bars=mesh.bars.astype(np.int32),
-            creases=mesh.creases.reshape(-1, 4).astype(np.int32), bends=mesh.bends.reshape(-1, 4).astype(np.int32),
-            triangles=mesh.triangles.astype(np.int32), triangle_panel=mesh.triangle_face.astype(np.int32),
+            position=mesh.vertices,
+            free=self._free,
+            bars=mesh.bars.astype(np.int32),
+            creases=mesh.creases.reshape(-1, 4).astype(np.int32),
+            bends=mesh.bends.reshape(-1, 4).astype(np.int32),
+            triangles=mesh.triangles.astype(np.int32),
+            triangle_panel=mesh.triangle_face.astype(np.int32),
             contacts=mesh.triangles[tri].reshape(-1, 3).astype(np.int32),
             contact_weights=np.array([c[1] for c in self._contacts]).reshape(-1, 3),
             contact_offsets=np.array([c[2] for c in self._contacts], float),
             contact_axes=np.array([c[3] for c in self._contacts]).reshape(-1, 3),
-            electrodes=self._electrodes, effects=tuple(self._effects),
+            electrodes=self._electrodes,
+            effects=tuple(self._effects),
             names={"contact": tuple(c[4] for c in self._contacts)},
-        )  # fmt: skip
+        )
         p = Parameters(model)
         mass = self._node_masses()
         p.set("inertia", "mass", mass)
@@ -267,7 +329,9 @@ class Sheet:
 
     def _triangles_of(self, panel: int) -> np.ndarray:
         if not 0 <= panel < self.pattern.face_count:
-            raise InputError("there is no such panel", field="panel", value=panel, allowed=f"0 to {self.pattern.face_count - 1}")
+            raise InputError(
+                "there is no such panel", field="panel", value=panel, allowed=f"0 to {self.pattern.face_count - 1}"
+            )
         return np.flatnonzero(self.mesh.triangle_face == panel)
 
     def _nodes_of(self, panel: int) -> np.ndarray:
@@ -357,7 +421,9 @@ class Sheet:
             raise InputError("a node has no mass", field=f"node {bad[0]}", allowed="> 0 kg")
         return out
 
-    def _lumped(self, panel: int, nodes: np.ndarray, triangles: np.ndarray, sheet: np.ndarray, patch: dict) -> np.ndarray:
+    def _lumped(
+        self, panel: int, nodes: np.ndarray, triangles: np.ndarray, sheet: np.ndarray, patch: dict
+    ) -> np.ndarray:
         """Node masses >= 0 that have the panel's mass, centre of mass and second moments."""
         x = self.mesh.vertices
         normal = self._area_vector[triangles].sum(0)
@@ -381,7 +447,9 @@ class Sheet:
                 target += _moments(np.vstack([p, p.mean(0)]), m * np.array([1 / 12, 1 / 12, 1 / 12, 3 / 4]))
             if patch:
                 half = patch["size"] / 2
-                grid = np.array([[sx, sy, 0.0] for sx in (-1, 1) for sy in (-1, 1)]) * np.append(half, 0) + patch["centre"]
+                grid = (
+                    np.array([[sx, sy, 0.0] for sx in (-1, 1) for sy in (-1, 1)]) * np.append(half, 0) + patch["centre"]
+                )
                 points = (np.vstack([grid, patch["centre"]]) - origin) @ frame.T
                 weights = np.array([1 / 12] * 4 + [2 / 3])  # exact for a uniform rectangle
                 target += _moments(points, self._patch_mass(patch) * weights)
@@ -393,8 +461,12 @@ class Sheet:
         rest = target[given] - matrix @ np.full(len(nodes), floor)
         solution, residual = nnls(matrix * scale[:, None], rest * scale)
         if panel in self._lumps and residual > 1e-6 * target[0]:
-            raise InputError("no non-negative node masses have this mass, centre and inertia", field=f"panel {panel}",
-                             value=float(residual), allowed="a body whose masses lie within its panel")  # fmt: skip
+            raise InputError(
+                "no non-negative node masses have this mass, centre and inertia",
+                field=f"panel {panel}",
+                value=float(residual),
+                allowed="a body whose masses lie within its panel",
+            )
         return solution + floor
 
     def _crease_viscosity(self, mass: np.ndarray) -> np.ndarray:
@@ -412,8 +484,16 @@ class Sheet:
 def _moments(points: np.ndarray, masses: np.ndarray) -> np.ndarray:
     """m, m y1, m y2, m y1^2, m y2^2, m y1 y2 of points [n, 2], summed."""
     a, b = points[:, 0], points[:, 1]
-    return np.array([masses.sum(), (masses * a).sum(), (masses * b).sum(), (masses * a * a).sum(),
-                     (masses * b * b).sum(), (masses * a * b).sum()])  # fmt: skip
+    return np.array(
+        [
+            masses.sum(),
+            (masses * a).sum(),
+            (masses * b).sum(),
+            (masses * a * a).sum(),
+            (masses * b * b).sum(),
+            (masses * a * b).sum(),
+        ]
+    )
 
 
 def _material(name: str, panel: int):

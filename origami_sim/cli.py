@@ -40,20 +40,28 @@ class _Bar:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="origami-sim", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    parser = argparse.ArgumentParser(
+        prog="origami-sim", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, action: Callable, summary: str, example: str) -> argparse.ArgumentParser:
-        p = commands.add_parser(name, help=summary, description=summary + ".", epilog=f"example: {example}",
-                                formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+        p = commands.add_parser(
+            name,
+            help=summary,
+            description=summary + ".",
+            epilog=f"example: {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         p.set_defaults(action=action)
         p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
         return p
 
     p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
     p.add_argument("scene", help="box, crawler, bifold, pendulum_chain, fold_file or mae_crease")
-    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)")
+    p.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
+    )
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
@@ -63,27 +71,43 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
     p.add_argument("--time", type=float, help="simulated time of the picture [s]")
 
-    p = command("compare", _compare, "Compare a recording with a scene",
-                "origami-sim compare double.csv --scene pendulum_chain --duration 5")  # fmt: skip
+    p = command(
+        "compare",
+        _compare,
+        "Compare a recording with a scene",
+        "origami-sim compare double.csv --scene pendulum_chain --duration 5",
+    )
     p.add_argument("recording", help="CSV or Parquet file")
     p.add_argument("--scene", required=True, help="scene that models what was recorded")
-    p.add_argument("--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)")
+    p.add_argument(
+        "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
+    )
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
     p.add_argument("--duration", type=float, default=5.0, help="seconds compared (default 5)")
-    p.add_argument("--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)")
+    p.add_argument(
+        "--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)"
+    )
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/compare)")
 
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
 
-    p = command("stride", _stride, "Regression of stride per cycle: against the stored reference and the paper",
-                "origami-sim stride crawler")  # fmt: skip
+    p = command(
+        "stride",
+        _stride,
+        "Regression of stride per cycle: against the stored reference and the paper",
+        "origami-sim stride crawler",
+    )
     p.add_argument("scene", nargs="?", default="crawler", help="a scene that walks (default crawler)")
     p.add_argument("--cycles", type=int, help="cycles to walk (default: those of the reference)")
 
-    p = command("demo", _demo, "Box, crawler, a folded pattern and a recording, with replays and a report",
-                "origami-sim demo --out runs/demo")  # fmt: skip
+    p = command(
+        "demo",
+        _demo,
+        "Box, crawler, a folded pattern and a recording, with replays and a report",
+        "origami-sim demo --out runs/demo",
+    )
     p.add_argument("--out", default="runs/demo", metavar="FOLDER", help="where the run folders go (default runs/demo)")
     return parser
 
@@ -148,7 +172,9 @@ def _compare(args) -> int:
 
     module = scene_module(args.scene)
     if not hasattr(module, "replicate"):
-        raise InputError("this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain")
+        raise InputError(
+            "this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain"
+        )
     for name in ("duration", "threshold"):
         if not getattr(args, name) > 0:
             raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed="> 0")
@@ -176,9 +202,27 @@ def _effects(args) -> int:
     chosen = [get(args.name)] if args.name else list(CATALOGUE.values())
     if args.json:
         keys = ("name", "family", "formula", "source", "matters", "confused_with", "separated_by")
-        print(json.dumps([{**{k: getattr(e, k) for k in keys}, "parameters": [
-            {"name": p.name, "symbol": p.symbol, "unit": p.unit, "default": p.default, "bounds": list(p.bounds),
-             "meaning": p.meaning} for p in e.parameters]} for e in chosen]))  # fmt: skip
+        print(
+            json.dumps(
+                [
+                    {
+                        **{k: getattr(e, k) for k in keys},
+                        "parameters": [
+                            {
+                                "name": p.name,
+                                "symbol": p.symbol,
+                                "unit": p.unit,
+                                "default": p.default,
+                                "bounds": list(p.bounds),
+                                "meaning": p.meaning,
+                            }
+                            for p in e.parameters
+                        ],
+                    }
+                    for e in chosen
+                ]
+            )
+        )
         return OK
     for e in chosen:
         print(f"{e.name}  ({e.family})\n    {e.formula}")
@@ -187,7 +231,9 @@ def _effects(args) -> int:
             print(f"    confused with: {e.confused_with}\n    separated by: {e.separated_by}")
         print(f"    source: {e.source}")
         for p in e.parameters:
-            print(f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}: {p.meaning}")
+            print(
+                f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}: {p.meaning}"
+            )
         print()
     return OK
 
@@ -267,8 +313,14 @@ def _writable(folder: Path) -> None:
 def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
     from origami_sim.results import save_run
 
-    save_run(folder, outcome.trajectory, scene=scene, tables=outcome.tables, units=outcome.units or _units(outcome.tables),
-             settings={**settings, "overrides": dict(o.split("=", 1) for o in overrides)})  # fmt: skip
+    save_run(
+        folder,
+        outcome.trajectory,
+        scene=scene,
+        tables=outcome.tables,
+        units=outcome.units or _units(outcome.tables),
+        settings={**settings, "overrides": dict(o.split("=", 1) for o in overrides)},
+    )
 
 
 def _units(tables: dict) -> dict[str, str]:
@@ -282,8 +334,16 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     from origami_sim.results import format_table
 
     if args.json:
-        print(json.dumps({"numbers": outcome.numbers, "folder": str(folder), "dt": outcome.trajectory.dt,
-                          "failures": [str(f) for f in outcome.trajectory.failures]}))  # fmt: skip
+        print(
+            json.dumps(
+                {
+                    "numbers": outcome.numbers,
+                    "folder": str(folder),
+                    "dt": outcome.trajectory.dt,
+                    "failures": [str(f) for f in outcome.trajectory.failures],
+                }
+            )
+        )
         return
     for table in outcome.tables.values():
         print(format_table(table, _units(outcome.tables)))
@@ -326,9 +386,15 @@ def _save_comparison(folder: Path, scene: str, comparison, motion, used, part, o
     columns = {"time_s": comparison.times}
     for c in comparison.channels.values():
         columns |= {f"{c.name}_recorded": c.recorded[:, 0], f"{c.name}_simulated": c.predicted[:, 0]}
-    save_run(folder, motion, scene=scene, tables={"comparison": columns}, units={"time_s": "s"},
-             settings={**used.as_dict(), "overrides": dict(o.split("=", 1) for o in overrides)},
-             replay={"recording": part, "title": scene})  # fmt: skip
+    save_run(
+        folder,
+        motion,
+        scene=scene,
+        tables={"comparison": columns},
+        units={"time_s": "s"},
+        settings={**used.as_dict(), "overrides": dict(o.split("=", 1) for o in overrides)},
+        replay={"recording": part, "title": scene},
+    )
 
 
 if __name__ == "__main__":

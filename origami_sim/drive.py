@@ -8,10 +8,13 @@ import numpy as np
 from origami_sim.errors import InputError
 
 CHANNELS = (
-    "field_x", "field_y", "field_z",
+    "field_x",
+    "field_y",
+    "field_z",
     *(f"gradient_{i}{j}" for i in "xyz" for j in "xyz"),
-    "temperature", "load",
-)  # fmt: skip
+    "temperature",
+    "load",
+)
 """Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow."""
 
 
@@ -45,14 +48,19 @@ class Signal:
             return
         times, values = np.asarray(self.times, float), np.asarray(self.values, float)
         if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
-            raise InputError("a sampled signal needs at least two times and as many values", field="values",
-                             value=values.shape, allowed=f"shape {times.shape}")  # fmt: skip
+            raise InputError(
+                "a sampled signal needs at least two times and as many values",
+                field="values",
+                value=values.shape,
+                allowed=f"shape {times.shape}",
+            )
         if not np.all(np.isfinite(values)):
             raise InputError("a sampled signal must be finite", field="values", value=float("nan"))
         back = np.flatnonzero(~(np.diff(times) > 0))
         if len(back):
-            raise InputError(f"times must increase; sample {back[0] + 1} does not", field="times",
-                             value=float(times[back[0] + 1]))  # fmt: skip
+            raise InputError(
+                f"times must increase; sample {back[0] + 1} does not", field="times", value=float(times[back[0] + 1])
+            )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
 
@@ -73,8 +81,12 @@ def ramp(final, duration: float, *, start=0.0) -> Signal:
     """From `start` linearly to `final` within `duration` [s], then constant."""
     if not duration > 0:
         raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed="> 0 s")
-    return Signal(offset=start, times=np.array([0.0, duration, 1e9]), values=np.array([0.0, 1.0, 1.0]),
-                  scale=np.subtract(final, start))  # fmt: skip
+    return Signal(
+        offset=start,
+        times=np.array([0.0, duration, 1e9]),
+        values=np.array([0.0, 1.0, 1.0]),
+        scale=np.subtract(final, start),
+    )
 
 
 def series(times, values, *, scale=1.0) -> Signal:
@@ -126,17 +138,23 @@ class Drive:
         """Raises InputError naming the channel if a sampled channel ends before `duration` [s]."""
         for name, s in self.signals.items():
             if s.times is not None and s.times[-1] < duration * (1 - 1e-12):
-                raise InputError("the drive ends before the run does", field=name, value=float(s.times[-1]),
-                                 allowed=f"samples up to {duration:g} s")  # fmt: skip
+                raise InputError(
+                    "the drive ends before the run does",
+                    field=name,
+                    value=float(s.times[-1]),
+                    allowed=f"samples up to {duration:g} s",
+                )
 
     def slots(self) -> dict[str, np.ndarray]:
         """Wave parameters as arrays [channel, world or 1], by the kernels' names."""
         out = {}
         for name, value in (
-            ("offset", lambda s: s.offset), ("amplitude", lambda s: s.amplitude),
-            ("angular_frequency", lambda s: 2 * math.pi * np.asarray(s.frequency)), ("phase", lambda s: s.phase),
+            ("offset", lambda s: s.offset),
+            ("amplitude", lambda s: s.amplitude),
+            ("angular_frequency", lambda s: 2 * math.pi * np.asarray(s.frequency)),
+            ("phase", lambda s: s.phase),
             ("scale", lambda s: s.scale if s.times is not None else 0.0),
-        ):  # fmt: skip
+        ):
             columns = [np.atleast_1d(np.asarray(value(s), float)) for s in self.signals.values()]
             worlds = max(len(c) for c in columns)
             out[name] = np.stack([np.broadcast_to(c, (worlds,)) for c in columns])

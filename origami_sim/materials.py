@@ -34,7 +34,9 @@ class Material:
 MATERIALS = {
     m.name: m
     for m in (
-        Material("pdms", 1.5e6, 1010.0, 0.49, source="Gelest RTV, specific gravity 1.01 (seed paper); modulus 1.4-1.6 MPa"),
+        Material(
+            "pdms", 1.5e6, 1010.0, 0.49, source="Gelest RTV, specific gravity 1.01 (seed paper); modulus 1.4-1.6 MPa"
+        ),
         Material("mae", 0.78e6, 2800.0, 0.49, 0.130, source="seed paper Table 2: 6 (C10 + C01) with 90 and 40 kPa"),
         Material("vhb", 0.19e6, 960.0, 0.49, source="3M F9473PC (seed paper)"),
         Material("tape", 1.6e9, 1063.0, 0.30, source="3M Magic tape, measured in the seed paper"),
@@ -69,8 +71,9 @@ def layered_rigidity(layers: Sequence[tuple[float, float]]) -> float:
     return sum(e * (t**3 / 12 + t * (c - neutral) ** 2) for (t, e), c in zip(layers, centres, strict=True))
 
 
-def bridge_stiffness(modulus: float, width: float, thickness: float, gap: float, *, poisson: float = 0.49,
-                     end_correction: float = 0.66) -> float:  # fmt: skip
+def bridge_stiffness(
+    modulus: float, width: float, thickness: float, gap: float, *, poisson: float = 0.49, end_correction: float = 0.66
+) -> float:
     """Rotational stiffness of an elastomer bridge between two one-sided patches [N m/rad].
 
     K = E' w h^3 / (12 L*), L* = g + 2 c h: the bridge is longer than the gap because the sheet under the patches

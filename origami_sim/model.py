@@ -50,10 +50,15 @@ class Model:
         """Number of entities of a family of effects."""
         if family in CONTACTS:
             return len(self.contacts)
-        return len({
-            "bar": self.bars, "crease": self.creases, "bend": self.bends, "triangle": self.triangles,
-            "node": self.position,
-        }[family])  # fmt: skip
+        return len(
+            {
+                "bar": self.bars,
+                "crease": self.creases,
+                "bend": self.bends,
+                "triangle": self.triangles,
+                "node": self.position,
+            }[family]
+        )
 
     def name(self, family: str, i: int) -> str:
         """Label of an entity."""
@@ -134,8 +139,12 @@ class Parameters:
             out = np.array(np.broadcast_to(old, (len(old), worlds, *knots)))
             out[index] = np.broadcast_to(new, (len(index), worlds, *knots))
         except (ValueError, IndexError):
-            raise InputError("a parameter array has the wrong shape", field=f"{owner}.{name}", value=np.shape(value),
-                             allowed=f"broadcastable to ({len(index)}, worlds)") from None  # fmt: skip
+            raise InputError(
+                "a parameter array has the wrong shape",
+                field=f"{owner}.{name}",
+                value=np.shape(value),
+                allowed=f"broadcastable to ({len(index)}, worlds)",
+            ) from None
         self._values[owner, name] = out
         return self
 
@@ -147,11 +156,14 @@ class Parameters:
         elif owner == "plane":
             low = -np.inf
         elif np.any(value <= 0):
-            raise InputError("a mass must be positive", field="inertia.mass", value=float(value.min()), allowed="> 0 kg")
+            raise InputError(
+                "a mass must be positive", field="inertia.mass", value=float(value.min()), allowed="> 0 kg"
+            )
         if np.any(value < low) or np.any(value > high):
             bad = float(value[(value < low) | (value > high)].flat[0])
-            raise InputError("a parameter is out of bounds", field=f"{owner}.{name}", value=bad,
-                             allowed=f"{low:g} to {high:g}")  # fmt: skip
+            raise InputError(
+                "a parameter is out of bounds", field=f"{owner}.{name}", value=bad, allowed=f"{low:g} to {high:g}"
+            )
 
     @property
     def worlds(self) -> int:
@@ -218,11 +230,22 @@ class State:
         rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
         hinges = np.concatenate([model.creases, model.bends])
         angles = dihedral_angles(x, hinges)
-        return cls(x=x, v=np.zeros_like(x), a=np.zeros_like(x), angles=angles, memory=np.zeros((rows, worlds)),
-                   work=np.zeros((len(effects), worlds)), power=np.zeros((len(effects), worlds)), step=-1, status=np.full((2, worlds), -1, np.int32))  # fmt: skip
+        return cls(
+            x=x,
+            v=np.zeros_like(x),
+            a=np.zeros_like(x),
+            angles=angles,
+            memory=np.zeros((rows, worlds)),
+            work=np.zeros((len(effects), worlds)),
+            power=np.zeros((len(effects), worlds)),
+            step=-1,
+            status=np.full((2, worlds), -1, np.int32),
+        )
 
     def copy(self) -> "State":
-        return State(*(v.copy() if isinstance(v, np.ndarray) else v for v in (getattr(self, f.name) for f in fields(self))))
+        return State(
+            *(v.copy() if isinstance(v, np.ndarray) else v for v in (getattr(self, f.name) for f in fields(self)))
+        )
 
     def select(self, worlds: np.ndarray) -> "State":
         """These worlds, copied; an index may repeat."""

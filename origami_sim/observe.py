@@ -20,8 +20,12 @@ def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> 
     times = recording.times - recording.times[0]
     frames = trajectory.times - trajectory.times[0]
     if times[-1] > frames[-1] * (1 + 1e-9) + 1e-12:
-        raise InputError("the run is shorter than the recording", field="duration", value=float(frames[-1]),
-                         allowed=f">= {times[-1]:g} s")  # fmt: skip
+        raise InputError(
+            "the run is shorter than the recording",
+            field="duration",
+            value=float(frames[-1]),
+            allowed=f">= {times[-1]:g} s",
+        )
     out = {}
     for name, channel in recording.channels.items():
         values = channel_frames(trajectory, channel, world=world)
@@ -43,8 +47,12 @@ def channel_frames(trajectory: Trajectory, channel: Channel, *, world: int = 0) 
     if channel.kind in ("marker", "tip_displacement"):
         point = x[:, _index(model, channel, "node", len(model.position))]
         return point if channel.kind == "marker" else np.linalg.norm(point - point[0], axis=1)
-    raise InputError("this kind of channel cannot be observed yet", field=f"channels.{channel.name}.kind",
-                     value=channel.kind, allowed="crease_angle, panel_angle, marker, tip_displacement")  # fmt: skip
+    raise InputError(
+        "this kind of channel cannot be observed yet",
+        field=f"channels.{channel.name}.kind",
+        value=channel.kind,
+        allowed="crease_angle, panel_angle, marker, tip_displacement",
+    )
 
 
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:
@@ -70,5 +78,9 @@ def _index(model: Model, channel: Channel, family: str, count: int) -> int:
         return names.index(given)
     if isinstance(given, int) and 0 <= given < count:
         return given
-    raise InputError("the model has nothing of that name", field=f"channels.{channel.name}.{family}", value=given,
-                     allowed=", ".join(names) or f"0 to {count - 1}")  # fmt: skip
+    raise InputError(
+        "the model has nothing of that name",
+        field=f"channels.{channel.name}.{family}",
+        value=given,
+        allowed=", ".join(names) or f"0 to {count - 1}",
+    )

@@ -60,8 +60,16 @@ COLOURS = {
 }
 """Colours (red, green, blue; 0 to 255) of what is drawn."""
 
-SERIES = ((57, 135, 229), (233, 121, 42), (46, 160, 96), (199, 70, 110), (142, 105, 214), (176, 138, 28),
-          (30, 160, 172), (140, 140, 140))  # fmt: skip
+SERIES = (
+    (57, 135, 229),
+    (233, 121, 42),
+    (46, 160, 96),
+    (199, 70, 110),
+    (142, 105, 214),
+    (176, 138, 28),
+    (30, 160, 172),
+    (140, 140, 140),
+)
 """Colours of series, readable on dark and on light."""
 
 PLOTTED = len(SERIES)
@@ -80,9 +88,16 @@ class HasTrajectory(Protocol):
 
 
 def write_replay(
-    path: str | Path, source: Trajectory | HasTrajectory, *, world: int = 0, magnets: Iterable[int] | None = None,
-    arms: Iterable[int] = (), tip: int | None = None, recording: Recording | None = None, title: str = "origami_sim",
-) -> Path:  # fmt: skip
+    path: str | Path,
+    source: Trajectory | HasTrajectory,
+    *,
+    world: int = 0,
+    magnets: Iterable[int] | None = None,
+    arms: Iterable[int] = (),
+    tip: int | None = None,
+    recording: Recording | None = None,
+    title: str = "origami_sim",
+) -> Path:
     """Writes one world of a run as a replay that opens with a fixed camera and its plots.
 
     The file's identity depends only on what it shows (title, model, parameters, world), so a replay written again
@@ -130,9 +145,15 @@ def open_replay(path: str | Path) -> subprocess.Popen:
 
 
 def screenshot(
-    path_rrd: str | Path, path_png: str | Path, *, time: float | None = None, width: int = 1280, height: int = 800,
-    timeout: float = 60.0, note: Callable[[str], object] | None = None,
-) -> bool:  # fmt: skip
+    path_rrd: str | Path,
+    path_png: str | Path,
+    *,
+    time: float | None = None,
+    width: int = 1280,
+    height: int = 800,
+    timeout: float = 60.0,
+    note: Callable[[str], object] | None = None,
+) -> bool:
     """Takes a picture of a replay as the viewer shows it, without a window.
 
     A viewer without a window is started, sent to the time and asked for pictures until two in a row are the same,
@@ -190,8 +211,11 @@ def _viewer() -> str:
 def _existing(path: str | Path) -> Path:
     file = Path(path).expanduser().absolute()
     if not file.is_file():
-        raise InputError("is a folder, not a replay" if file.is_dir() else "there is no such replay", file=file,
-                         allowed="an .rrd file")  # fmt: skip
+        raise InputError(
+            "is a folder, not a replay" if file.is_dir() else "there is no such replay",
+            file=file,
+            allowed="an .rrd file",
+        )
     try:
         with open(file, "rb") as f:
             start = f.read(3)
@@ -207,8 +231,18 @@ def _photograph(source: Path, picture: Path, time: float, width: int, height: in
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
-    command = [_viewer(), str(source), "--headless", "--port", str(port), "--bind", "127.0.0.1",
-               "--window-size", f"{width}x{height}", "--hide-welcome-screen"]  # fmt: skip
+    command = [
+        _viewer(),
+        str(source),
+        "--headless",
+        "--port",
+        str(port),
+        "--bind",
+        "127.0.0.1",
+        "--window-size",
+        f"{width}x{height}",
+        "--hide-welcome-screen",
+    ]
     log = picture.with_suffix(".log")
     # the viewer shows its log as notices on top of the picture
     environment = {**os.environ, "RUST_LOG": "error", "NO_COLOR": "1"}
@@ -219,8 +253,10 @@ def _photograph(source: Path, picture: Path, time: float, width: int, height: in
         if client is None:
             said = log.read_text(errors="replace")
             if "render context" in said or "adapter" in said.lower():
-                return ("no graphics driver offers Vulkan; on Debian and Ubuntu `apt install mesa-vulkan-drivers` "
-                        "draws without a graphics card")  # fmt: skip
+                return (
+                    "no graphics driver offers Vulkan; on Debian and Ubuntu `apt install mesa-vulkan-drivers` "
+                    "draws without a graphics card"
+                )
             what = f"did not come up within {timeout:g} s" if process.poll() is None else "ended by itself"
             first = next((line.strip()[:200] for line in said.splitlines() if line.strip()), "it said nothing")
             return f"the viewer {what} ({first})"
@@ -305,8 +341,15 @@ def read_series(path: str | Path) -> Iterator[tuple[str, np.ndarray, np.ndarray]
 class _Scene:
     """The geometry and the numbers of one world, in the order in which they are drawn. Lengths [m], times [s]."""
 
-    def __init__(self, trajectory: Trajectory, world: int, magnets: Iterable[int] | None, arms: Iterable[int],
-                 tip: int | None, title: str):  # fmt: skip
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        world: int,
+        magnets: Iterable[int] | None,
+        arms: Iterable[int],
+        tip: int | None,
+        title: str,
+    ):
         worlds = trajectory.x.shape[2]
         if not 0 <= world < worlds:
             raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
@@ -431,8 +474,11 @@ class _Scene:
                 vectors.append(vector)
                 labels.append(self.model.name("panel", p))
         empty = np.zeros((0, len(self.x), 3))
-        return (np.moveaxis(np.array(origins).reshape(-1, *empty.shape[1:]), 0, 1),
-                np.moveaxis(np.array(vectors).reshape(-1, *empty.shape[1:]), 0, 1), labels)  # fmt: skip
+        return (
+            np.moveaxis(np.array(origins).reshape(-1, *empty.shape[1:]), 0, 1),
+            np.moveaxis(np.array(vectors).reshape(-1, *empty.shape[1:]), 0, 1),
+            labels,
+        )
 
     def _tip(self) -> int:
         """The node that moves furthest from where it began."""
@@ -468,8 +514,10 @@ class _Scene:
             full = (len(active), 3, 3, 3)
             rows = np.broadcast_to(3 * m.contacts[active, :, None, None] + np.arange(3)[:, None], full)
             columns = np.broadcast_to(3 * np.arange(len(active))[:, None, None, None] + np.arange(3), full)
-            matrix = coo_array((blocks[f, active].ravel(), (rows.ravel(), columns.ravel())),
-                               shape=(3 * len(m.position), 3 * len(active)))  # fmt: skip
+            matrix = coo_array(
+                (blocks[f, active].ravel(), (rows.ravel(), columns.ravel())),
+                shape=(3 * len(m.position), 3 * len(active)),
+            )
             used = np.unique(rows)
             if len(active) <= 60:
                 solved = np.linalg.lstsq(matrix.tocsr()[used].toarray(), forces[f].ravel()[used], rcond=1e-10)[0]
@@ -542,17 +590,33 @@ class _Writer:
                 if n in flat:
                     flat[n] = flat[n].astype(np.float32)
             lengths = np.full(len(times[part]), count)
-            rr.send_columns(path, [rr.TimeColumn(TIMELINE, duration=times[part])],
-                            archetype.columns(**flat).partition(lengths), recording=self.stream)  # fmt: skip
+            rr.send_columns(
+                path,
+                [rr.TimeColumn(TIMELINE, duration=times[part])],
+                archetype.columns(**flat).partition(lengths),
+                recording=self.stream,
+            )
 
-    def series(self, path: str, name: str, times: np.ndarray, values: np.ndarray, colour: Sequence[int], *,
-               points: bool = False):  # fmt: skip
+    def series(
+        self,
+        path: str,
+        name: str,
+        times: np.ndarray,
+        values: np.ndarray,
+        colour: Sequence[int],
+        *,
+        points: bool = False,
+    ):
         """Sends a scalar series; `name` ends with its unit in brackets."""
-        style = (rr.SeriesPoints(names=name, colors=[colour], marker_sizes=[2.0]) if points
-                 else rr.SeriesLines(names=name, colors=[colour], widths=[1.5]))  # fmt: skip
+        style = (
+            rr.SeriesPoints(names=name, colors=[colour], marker_sizes=[2.0])
+            if points
+            else rr.SeriesLines(names=name, colors=[colour], widths=[1.5])
+        )
         self.stream.log(path, style, static=True)
-        rr.send_columns(path, [rr.TimeColumn(TIMELINE, duration=times)], rr.Scalars.columns(scalars=values),
-                        recording=self.stream)  # fmt: skip
+        rr.send_columns(
+            path, [rr.TimeColumn(TIMELINE, duration=times)], rr.Scalars.columns(scalars=values), recording=self.stream
+        )
 
 
 def _write(scene: _Scene, stream: rr.RecordingStream, recording: Recording | None) -> _Writer:
@@ -605,20 +669,40 @@ def _write_sheet(scene: _Scene, out: _Writer, crease_colours: list[tuple[int, in
     corners, colours = scene.faces()
     count = corners.shape[1]
     # whatever is static would hide later values of the same field, so only what never changes is
-    out.moving("sheet/faces", scene.times, rr.Mesh3D,
-               static={"triangle_indices": np.arange(count, dtype=np.uint32).reshape(-1, 3)},
-               vertex_positions=corners, vertex_colors=colours)  # fmt: skip
+    out.moving(
+        "sheet/faces",
+        scene.times,
+        rr.Mesh3D,
+        static={"triangle_indices": np.arange(count, dtype=np.uint32).reshape(-1, 3)},
+        vertex_positions=corners,
+        vertex_colors=colours,
+    )
     edges = scene.outlines()
     thin, thick = rr.Radius.ui_points(0.8), rr.Radius.ui_points(2.0)
-    out.moving("sheet/outlines", scene.times, rr.LineStrips3D, static={"radii": [thin], "colors": [COLOURS["outline"]]},
-               strips=scene.x[:, edges])  # fmt: skip
-    out.moving("sheet/creases", scene.times, rr.LineStrips3D, static={"radii": [thick], "colors": crease_colours},
-               strips=scene.x[:, scene.model.creases[:, 1:3]])  # fmt: skip
+    out.moving(
+        "sheet/outlines",
+        scene.times,
+        rr.LineStrips3D,
+        static={"radii": [thin], "colors": [COLOURS["outline"]]},
+        strips=scene.x[:, edges],
+    )
+    out.moving(
+        "sheet/creases",
+        scene.times,
+        rr.LineStrips3D,
+        static={"radii": [thick], "colors": crease_colours},
+        strips=scene.x[:, scene.model.creases[:, 1:3]],
+    )
     origins, vectors, labels = scene.arrows()
     if labels:
-        out.moving("magnets", scene.times, rr.Arrows3D,
-                   static={"radii": [0.008 * scene.size], "colors": [COLOURS["poling"]]},
-                   origins=origins, vectors=vectors)  # fmt: skip
+        out.moving(
+            "magnets",
+            scene.times,
+            rr.Arrows3D,
+            static={"radii": [0.008 * scene.size], "colors": [COLOURS["poling"]]},
+            origins=origins,
+            vectors=vectors,
+        )
         out.notes.append("Red arrows: poling of the magnets (length means nothing).")
 
 
@@ -634,11 +718,18 @@ def _write_surroundings(scene: _Scene, out: _Writer):
             scale = 0.35 * scene.size / typical
             unit, factor = _scaled("N", typical, "m")
             shown = size > 1e-3 * typical
-            out.moving("contacts", scene.times, rr.Arrows3D,
-                       static={"radii": [0.006 * scene.size], "colors": [COLOURS["contact"]]},
-                       origins=points, vectors=np.where(shown[:, :, None], scale * forces, 0.0))  # fmt: skip
-            out.notes.append(f"Green arrows: contact forces, {_length_text(scene.step)} of arrow for "
-                             f"{scene.step / scale * factor:.3g} {unit}.")  # fmt: skip
+            out.moving(
+                "contacts",
+                scene.times,
+                rr.Arrows3D,
+                static={"radii": [0.006 * scene.size], "colors": [COLOURS["contact"]]},
+                origins=points,
+                vectors=np.where(shown[:, :, None], scale * forces, 0.0),
+            )
+            out.notes.append(
+                f"Green arrows: contact forces, {_length_text(scene.step)} of arrow for "
+                f"{scene.step / scale * factor:.3g} {unit}."
+            )
     corner = (scene.low + scene.high) / 2 - 0.5 * scene.step * right
     below = scene.height if len(scene.model.contacts) else scene.low[2] - 0.12 * scene.size
     near = np.array([0.0, -1.0, 0.0]) if scene.across == 0 else np.array([1.0, 0.0, 0.0])
@@ -646,26 +737,52 @@ def _write_surroundings(scene: _Scene, out: _Writer):
     corner[2] = below + 0.002 * scene.size
     if len(scene.model.contacts):
         corner += scene.up * (scene.height + 0.002 * scene.size - corner @ scene.up)
-    out.stream.log("scale", rr.LineStrips3D(
-        [np.stack([corner, corner + scene.step * right])], radii=rr.Radius.ui_points(2.5), colors=[COLOURS["scale"]],
-    ), static=True)  # fmt: skip
-    out.stream.log("scale/value", rr.Points3D(
-        [corner + 0.5 * scene.step * right], radii=[0.0], colors=[COLOURS["label"]],
-        labels=[_length_text(scene.step)], show_labels=True,
-    ), static=True)  # fmt: skip
+    out.stream.log(
+        "scale",
+        rr.LineStrips3D(
+            [np.stack([corner, corner + scene.step * right])],
+            radii=rr.Radius.ui_points(2.5),
+            colors=[COLOURS["scale"]],
+        ),
+        static=True,
+    )
+    out.stream.log(
+        "scale/value",
+        rr.Points3D(
+            [corner + 0.5 * scene.step * right],
+            radii=[0.0],
+            colors=[COLOURS["label"]],
+            labels=[_length_text(scene.step)],
+            show_labels=True,
+        ),
+        static=True,
+    )
     field = np.stack([scene.channel(f"field_{i}") for i in "xyz"], axis=1)
     size = np.linalg.norm(field, axis=1)
     if size.max() > 0:
         unit, factor = _scaled("T", float(size.max()), "m")
         origin = _field_origin(scene)
         vectors = (0.6 * scene.size / size.max() * field)[:, None, :]
-        out.moving("field", scene.times, rr.Arrows3D,
-                   static={"radii": [0.014 * scene.size], "colors": [COLOURS["field"]]},
-                   origins=np.broadcast_to(origin, vectors.shape), vectors=vectors)  # fmt: skip
-        out.moving("field/value", scene.times, rr.Points3D,
-                   static={"positions": [origin], "radii": [0.015 * scene.size], "colors": [COLOURS["label"]],
-                           "show_labels": [True]},
-                   labels=np.array([[f"B = {factor * b:.0f} {unit}"] for b in size]))  # fmt: skip
+        out.moving(
+            "field",
+            scene.times,
+            rr.Arrows3D,
+            static={"radii": [0.014 * scene.size], "colors": [COLOURS["field"]]},
+            origins=np.broadcast_to(origin, vectors.shape),
+            vectors=vectors,
+        )
+        out.moving(
+            "field/value",
+            scene.times,
+            rr.Points3D,
+            static={
+                "positions": [origin],
+                "radii": [0.015 * scene.size],
+                "colors": [COLOURS["label"]],
+                "show_labels": [True],
+            },
+            labels=np.array([[f"B = {factor * b:.0f} {unit}"] for b in size]),
+        )
         out.notes.append(f"Blue arrow: flux density, longest for {factor * size.max():.3g} {unit}.")
 
 
@@ -686,15 +803,22 @@ def _write_ground(scene: _Scene, out: _Writer):
 
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
     lift = 1e-3 * scene.size
-    out.stream.log("ground/plane", rr.Mesh3D(
-        vertex_positions=on_plane(corners, -lift), triangle_indices=[[0, 1, 2], [0, 2, 3]],
-        vertex_colors=[COLOURS["ground"]] * 4,
-    ), static=True)  # fmt: skip
+    out.stream.log(
+        "ground/plane",
+        rr.Mesh3D(
+            vertex_positions=on_plane(corners, -lift),
+            triangle_indices=[[0, 1, 2], [0, 2, 3]],
+            vertex_colors=[COLOURS["ground"]] * 4,
+        ),
+        static=True,
+    )
     lines = [np.array([(v, low[1]), (v, high[1])]) for v in np.arange(low[0], high[0] + step / 2, step)]
     lines += [np.array([(low[0], v), (high[0], v)]) for v in np.arange(low[1], high[1] + step / 2, step)]
-    out.stream.log("ground/grid", rr.LineStrips3D(
-        on_plane(np.array(lines), 0.0), radii=rr.Radius.ui_points(0.5), colors=[COLOURS["grid"]]
-    ), static=True)  # fmt: skip
+    out.stream.log(
+        "ground/grid",
+        rr.LineStrips3D(on_plane(np.array(lines), 0.0), radii=rr.Radius.ui_points(0.5), colors=[COLOURS["grid"]]),
+        static=True,
+    )
 
 
 def _write_motion(scene: _Scene, out: _Writer):
@@ -745,8 +869,13 @@ def _write_energies(scene: _Scene, out: _Writer):
     out.plots.append(plot)
 
 
-_DRIVES = (("field_", "Field", "T", "m"), ("gradient_", "Field gradient", "T/m", ""), ("voltage_", "Voltage", "V", ""),
-           ("temperature", "Temperature rise", "K", ""), ("load", "Load factor", "-", ""))  # fmt: skip
+_DRIVES = (
+    ("field_", "Field", "T", "m"),
+    ("gradient_", "Field gradient", "T/m", ""),
+    ("voltage_", "Voltage", "V", ""),
+    ("temperature", "Temperature rise", "K", ""),
+    ("load", "Load factor", "-", ""),
+)
 
 
 def _write_drive(scene: _Scene, out: _Writer):
@@ -760,8 +889,9 @@ def _write_drive(scene: _Scene, out: _Writer):
         unit, factor = (unit, 1.0) if unit == "-" else _scaled(unit, largest, usual)
         plot = _Plot(f"{title} ({unit})")
         for i, (name, v) in enumerate(values.items()):
-            out.series(f"/drive/{name}", f"{name.replace('_', ' ')} ({unit})", scene.times, factor * v,
-                       SERIES[i % len(SERIES)])  # fmt: skip
+            out.series(
+                f"/drive/{name}", f"{name.replace('_', ' ')} ({unit})", scene.times, factor * v, SERIES[i % len(SERIES)]
+            )
             plot.paths.append(f"/drive/{name}")
         plot.paths = plot.paths[:PLOTTED]
         out.plots.append(plot)
@@ -777,12 +907,19 @@ def _write_recording(recording: Recording, scene: _Scene, out: _Writer):
         if channel.kind == "marker":
             seen = np.isfinite(values).all(axis=1)
             path = f"markers/{_slug(channel.name)}"
-            out.stream.log(path, rr.Points3D.from_fields(colors=[COLOURS["marker"]], radii=[0.015 * scene.size],
-                                                         labels=[channel.name], show_labels=[False]),
-                           static=True)  # fmt: skip
-            rr.send_columns(path, [rr.TimeColumn(TIMELINE, duration=recording.times)],
-                            rr.Points3D.columns(positions=values[seen].astype(np.float32)).partition(seen.astype(int)),
-                            recording=out.stream)  # fmt: skip
+            out.stream.log(
+                path,
+                rr.Points3D.from_fields(
+                    colors=[COLOURS["marker"]], radii=[0.015 * scene.size], labels=[channel.name], show_labels=[False]
+                ),
+                static=True,
+            )
+            rr.send_columns(
+                path,
+                [rr.TimeColumn(TIMELINE, duration=recording.times)],
+                rr.Points3D.columns(positions=values[seen].astype(np.float32)).partition(seen.astype(int)),
+                recording=out.stream,
+            )
             continue
         kind = "angle" if channel.is_angle else "force" if channel.kind == "force" else "length"
         unit, factor = _MEASURED[kind]
@@ -795,8 +932,14 @@ def _write_recording(recording: Recording, scene: _Scene, out: _Writer):
             suffix = "" if values.shape[1] == 1 else f" {'xyz'[i]}"
             path = f"/measured/{_slug(channel.name + suffix)}"
             seen = np.isfinite(column)
-            out.series(path, f"measured {channel.name}{suffix} ({unit})", recording.times[seen], factor * column[seen],
-                       COLOURS["marker"] if values.shape[1] == 1 else SERIES[i], points=True)  # fmt: skip
+            out.series(
+                path,
+                f"measured {channel.name}{suffix} ({unit})",
+                recording.times[seen],
+                factor * column[seen],
+                COLOURS["marker"] if values.shape[1] == 1 else SERIES[i],
+                points=True,
+            )
             plot.paths.append(path)
 
 
@@ -805,16 +948,26 @@ def _write_notes(scene: _Scene, out: _Writer):
     kinds = {"passive": "light blue: passive sheet", "magnet": "dark: magnetised", "arm": "sand: arms"}
     used = [text for kind, text in kinds.items() if kind in scene.kinds]
     lines = [
-        f"# {scene.title}", "",
+        f"# {scene.title}",
+        "",
         f"World {scene.world} of {t.x.shape[2]}; {len(t.times)} frames, {t.times[0]:g} s to {t.times[-1]:g} s; "
-        f"{t.step if t.dt == t.step.dt else f'dt = {t.dt:.3g} s'}.", "",
-        "Coordinates in metres, z up; time in seconds.", "",
-        f"- Panels: {', '.join(used)}.", *(f"- {n}" for n in out.notes),
+        f"{t.step if t.dt == t.step.dt else f'dt = {t.dt:.3g} s'}.",
+        "",
+        "Coordinates in metres, z up; time in seconds.",
+        "",
+        f"- Panels: {', '.join(used)}.",
+        *(f"- {n}" for n in out.notes),
         *(["- Thick lines: creases, in the colours of the angle plot."] if len(t.model.creases) else []),
-        *(f"- **{f}**" for f in t.failures if f.world == scene.world), *(f"- {n}" for n in t.notes), "",
+        *(f"- **{f}**" for f in t.failures if f.world == scene.world),
+        *(f"- {n}" for n in t.notes),
+        "",
         f"Effects: {', '.join(t.model.effects)}.",
-    ]  # fmt: skip
+    ]
     out.stream.log("notes", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+WALK = 3.0
+"""Extent of all frames, in sizes of the device, beyond which the camera follows it."""
 
 
 def _camera(scene: _Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -829,25 +982,52 @@ def _camera(scene: _Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 def _blueprint(scene: _Scene, out: _Writer) -> rrb.Blueprint:
     _, eye, target, _ = _camera(scene)
+    controls = rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0))
+    if np.linalg.norm(scene.high - scene.low) > WALK * scene.size:  # it walks away: the camera goes along
+        start = scene.x[0].mean(axis=0)
+        near = start + (eye - target) / np.linalg.norm(eye - target) * 1.6 * scene.size
+        controls = rrb.EyeControls3D(
+            position=near, look_target=start, eye_up=(0.0, 0.0, 1.0), tracking_entity="/sheet/faces"
+        )
     space = rrb.Spatial3DView(
-        origin="/", name=f"{scene.title} (m)", background=_BACKGROUND, line_grid=False,
-        contents=["+ /sheet/**", "+ /magnets/**", "+ /field/**", "+ /contacts/**", "+ /ground/**", "+ /scale/**",
-                  "+ /markers/**"],
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0)),
-    )  # fmt: skip
+        origin="/",
+        name=f"{scene.title} (m)",
+        background=_BACKGROUND,
+        line_grid=False,
+        contents=[
+            "+ /sheet/**",
+            "+ /magnets/**",
+            "+ /field/**",
+            "+ /contacts/**",
+            "+ /ground/**",
+            "+ /scale/**",
+            "+ /markers/**",
+        ],
+        eye_controls=controls,
+    )
     about = rrb.TextDocumentView(origin="/notes", name="About")
     start, end = float(scene.times[0]), float(scene.times[-1])
     # the legend lies on the plot, so room is left for it beside the curves
     room = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (start, end + 0.5 * (end - start))]
     axis = rrb.TimeAxis(view_range=rr.TimeRange(start=room[0], end=room[1]))
     plots = [
-        rrb.TimeSeriesView(origin="/", name=p.name, contents=[f"+ {path}" for path in p.paths],
-                           axis_x=axis, plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop))
+        rrb.TimeSeriesView(
+            origin="/",
+            name=p.name,
+            contents=[f"+ {path}" for path in p.paths],
+            axis_x=axis,
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        )
         for p in out.plots
-    ]  # fmt: skip
+    ]
     left = rrb.Tabs(space, about)
     duration = end - start
-    time = rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="Playing", loop_mode="All",
-                         playback_speed=min(1.0, duration / 4.0) if duration > 0 else 1.0)  # fmt: skip
+    time = rrb.TimePanel(
+        state="collapsed",
+        timeline=TIMELINE,
+        play_state="Playing",
+        loop_mode="All",
+        playback_speed=min(1.0, duration / 4.0) if duration > 0 else 1.0,
+    )
     root = rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[11, 9]) if plots else left
     return rrb.Blueprint(root, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time)

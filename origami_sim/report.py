@@ -43,8 +43,14 @@ class Section:
     @classmethod
     def of(cls, name: str, module: ModuleType, outcome: Outcome, folder: Path) -> "Section":
         tables = "\n\n".join(format_table(t, outcome.units) for t in outcome.tables.values())
-        out = cls(name, _first_line(module), tables, outcome.summary, f"origami-sim replay {folder}",
-                  failures=[str(f) for f in outcome.trajectory.failures])  # fmt: skip
+        out = cls(
+            name,
+            _first_line(module),
+            tables,
+            outcome.summary,
+            f"origami-sim replay {folder}",
+            failures=[str(f) for f in outcome.trajectory.failures],
+        )
         table = next(iter(outcome.tables.values()))
         out.pictures = [*_picture(folder), ("first table, drawn", _plot(table))]
         return out
@@ -52,21 +58,31 @@ class Section:
     @classmethod
     def of_comparison(cls, name: str, module: ModuleType, comparison: Comparison, note: str, folder: Path) -> "Section":
         overlay = plot_overlay(comparison, folder / "overlay.png").read_bytes()
-        return cls(name, _first_line(module), comparison.table(), [note + ".", comparison.sentence()],
-                   f"origami-sim replay {folder}", [*_picture(folder), ("recording and simulation", overlay)])  # fmt: skip
+        return cls(
+            name,
+            _first_line(module),
+            comparison.table(),
+            [note + ".", comparison.sentence()],
+            f"origami-sim replay {folder}",
+            [*_picture(folder), ("recording and simulation", overlay)],
+        )
 
 
 def write_report(path: Path, sections: list[Section]) -> Path:
     """Writes the page in one piece; every picture is inside it."""
-    parts = [f"<!doctype html><html lang='en'><meta charset='utf-8'><meta name='viewport' content='width=device-width'>"
-             f"<title>origami_sim demonstration</title><style>{_STYLE}</style><h1>origami_sim demonstration</h1>"]  # fmt: skip
+    parts = [
+        f"<!doctype html><html lang='en'><meta charset='utf-8'><meta name='viewport' content='width=device-width'>"
+        f"<title>origami_sim demonstration</title><style>{_STYLE}</style><h1>origami_sim demonstration</h1>"
+    ]
     for s in sections:
         parts.append(f"<h2 id='{html.escape(s.name)}'>{html.escape(s.name)}</h2><p>{html.escape(s.about)}</p>")
         parts += [f"<p>{html.escape(t)}</p>" for t in s.sentences]
         parts += [f"<p class='bad'>{html.escape(t)}</p>" for t in s.failures]
         for caption, png in s.pictures:
             data = base64.b64encode(png).decode()
-            parts.append(f"<img alt='{html.escape(s.name)}: {html.escape(caption)}' src='data:image/png;base64,{data}'>")
+            parts.append(
+                f"<img alt='{html.escape(s.name)}: {html.escape(caption)}' src='data:image/png;base64,{data}'>"
+            )
         parts.append(f"<pre>{html.escape(s.text)}</pre><p>Replay: <code>{html.escape(s.replay)}</code></p>")
     work = path.with_suffix(".tmp")
     work.write_text("".join(parts) + "</html>", encoding="utf-8")

@@ -44,10 +44,23 @@ _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
 _MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names"))
 _REQUIRED = {
-    "format": int, "scene": str, "created": str, "versions": dict, "model_hash": str, "parameters_hash": str,
-    "effects": list, "names": dict, "drive": list, "dt": float, "time_step": dict, "wall": float, "failures": list,
-    "notes": list, "overrides": dict, "settings": dict,
-}  # fmt: skip
+    "format": int,
+    "scene": str,
+    "created": str,
+    "versions": dict,
+    "model_hash": str,
+    "parameters_hash": str,
+    "effects": list,
+    "names": dict,
+    "drive": list,
+    "dt": float,
+    "time_step": dict,
+    "wall": float,
+    "failures": list,
+    "notes": list,
+    "overrides": dict,
+    "settings": dict,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +87,15 @@ class Run:
 
 
 def save_run(
-    path: str | Path, trajectory: Trajectory, *, scene: str,
-    tables: Mapping[str, Mapping[str, Sequence | np.ndarray]] | None = None, units: Mapping[str, str] | None = None,
-    settings: Mapping[str, Any] | None = None, replay: Mapping[str, Any] | bool = True,
-) -> Run:  # fmt: skip
+    path: str | Path,
+    trajectory: Trajectory,
+    *,
+    scene: str,
+    tables: Mapping[str, Mapping[str, Sequence | np.ndarray]] | None = None,
+    units: Mapping[str, str] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    replay: Mapping[str, Any] | bool = True,
+) -> Run:
     """Writes a run folder. It appears complete or not at all; an earlier run there is replaced only then.
 
     Files in an earlier run folder that are not part of a run (notes, pictures) are kept.
@@ -195,20 +213,38 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
     if not isinstance(overrides, Mapping):
         raise InputError("overrides map a name to a value", field="overrides", value=overrides, allowed="a mapping")
     return {
-        "format": FORMAT, "scene": scene, "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "format": FORMAT,
+        "scene": scene,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": {"python": platform.python_version(), **{p: _version(p) for p in _PACKAGES}},
-        "seed": seed, "overrides": dict(overrides), "settings": settings,
-        "model_hash": _with_plain_names(t.model).hash, "parameters_hash": t.parameters.hash,
-        "effects": list(t.model.effects), "names": {k: list(v) for k, v in t.model.names.items()},
-        "drive": list(t.drive.signals), "worlds": t.state.worlds, "frames": len(t.times),
-        "dt": float(t.dt), "dt_reason": str(step),
+        "seed": seed,
+        "overrides": dict(overrides),
+        "settings": settings,
+        "model_hash": _with_plain_names(t.model).hash,
+        "parameters_hash": t.parameters.hash,
+        "effects": list(t.model.effects),
+        "names": {k: list(v) for k, v in t.model.names.items()},
+        "drive": list(t.drive.signals),
+        "worlds": t.state.worlds,
+        "frames": len(t.times),
+        "dt": float(t.dt),
+        "dt_reason": str(step),
         "time_step": {"limit": step.limit, "dt": step.dt, "node": step.node, "cause": step.cause},
-        "wall": float(t.wall), "steps": t.state.step,
+        "wall": float(t.wall),
+        "steps": t.state.step,
         "failures": [{"world": f.world, "time": f.time, "node": f.node, "cause": f.cause} for f in t.failures],
         "notes": list(t.notes),
-        "units": {"times": "s", "x": "m", "v": "m/s", "angles": "rad", "energies": "J", "work": "J", "gaps": "m",
-                  "contact_forces": "N"},
-    }  # fmt: skip
+        "units": {
+            "times": "s",
+            "x": "m",
+            "v": "m/s",
+            "angles": "rad",
+            "energies": "J",
+            "work": "J",
+            "gaps": "m",
+            "contact_forces": "N",
+        },
+    }
 
 
 def _version(package: str) -> str | None:
@@ -224,8 +260,12 @@ def _json(manifest: dict[str, Any], file: Path) -> str:
         try:
             out[name] = _plain(value)
         except TypeError as e:
-            raise InputError(f"cannot be kept as JSON ({e})", file=file, field=name,
-                             allowed="numbers, words, switches, lists and mappings of them") from None  # fmt: skip
+            raise InputError(
+                f"cannot be kept as JSON ({e})",
+                file=file,
+                field=name,
+                allowed="numbers, words, switches, lists and mappings of them",
+            ) from None
     return json.dumps(out, indent=2, allow_nan=False) + "\n"
 
 
@@ -269,8 +309,12 @@ def _equal_columns(name: str, columns: Mapping[str, Sequence | np.ndarray]) -> d
         if values.dtype == object:
             values = np.array([str(v) for v in given])
         if values.ndim != 1:
-            raise InputError(f"a column of table '{name}' has one axis", field=column, value=values.shape,
-                             allowed="one value per row")  # fmt: skip
+            raise InputError(
+                f"a column of table '{name}' has one axis",
+                field=column,
+                value=values.shape,
+                allowed="one value per row",
+            )
         out[column] = values
     lengths = {c: len(v) for c, v in out.items()}
     if len(set(lengths.values())) > 1:
@@ -282,9 +326,12 @@ def _table(name: str, columns: Mapping[str, Sequence | np.ndarray], units: Mappi
     if not name or name != Path(name).name or name.startswith("."):
         raise InputError("a table's name is a file name", field="tables", value=name, allowed="letters, digits, -, _")
     arrays = {c: pa.array(v) for c, v in _equal_columns(name, columns).items()}
-    return pa.Table.from_arrays(list(arrays.values()), schema=pa.schema([
-        pa.field(c, a.type, metadata={"unit": units[c]} if units.get(c) else None) for c, a in arrays.items()
-    ]))  # fmt: skip
+    return pa.Table.from_arrays(
+        list(arrays.values()),
+        schema=pa.schema(
+            [pa.field(c, a.type, metadata={"unit": units[c]} if units.get(c) else None) for c, a in arrays.items()]
+        ),
+    )
 
 
 # the folder -----------------------------------------------------------------------------------------------------------
@@ -302,8 +349,11 @@ def _check_target(target: Path):
     if target.exists() and not target.is_dir():
         raise InputError("is a file; a run is a folder", file=target, allowed="a new folder, or an earlier run")
     if target.is_dir() and any(target.iterdir()) and not (target / MANIFEST).is_file():
-        raise InputError("is a folder with other things in it, not a run", file=target,
-                         allowed="a new or empty folder, or an earlier run")  # fmt: skip
+        raise InputError(
+            "is a folder with other things in it, not a run",
+            file=target,
+            allowed="a new or empty folder, or an earlier run",
+        )
 
 
 def _previous(target: Path) -> Path:
@@ -356,8 +406,13 @@ def _read_manifest(file: Path) -> dict[str, Any]:
             what = "a field is missing" if value is None else "a field has the wrong type"
             raise InputError(what, file=file, field=name, value=value, allowed=kind.__name__)
     if not 1 <= manifest["format"] <= FORMAT:
-        raise InputError("was written by a newer version", file=file, field="format", value=manifest["format"],
-                         allowed=f"1 to {FORMAT}")  # fmt: skip
+        raise InputError(
+            "was written by a newer version",
+            file=file,
+            field="format",
+            value=manifest["format"],
+            allowed=f"1 to {FORMAT}",
+        )
     return manifest
 
 
@@ -401,19 +456,29 @@ class _Arrays:
 
 
 def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
-    model = _with_plain_names(Model(
-        **{n: arrays[f"model.{n}"] for n in _MODEL}, effects=tuple(manifest["effects"]), names=manifest["names"]
-    ))  # fmt: skip
+    model = _with_plain_names(
+        Model(**{n: arrays[f"model.{n}"] for n in _MODEL}, effects=tuple(manifest["effects"]), names=manifest["names"])
+    )
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:
-        raise InputError("is not the model of the manifest beside it", file=arrays.file, field="model_hash",
-                         value=model.hash, allowed=manifest["model_hash"])  # fmt: skip
+        raise InputError(
+            "is not the model of the manifest beside it",
+            file=arrays.file,
+            field="model_hash",
+            value=model.hash,
+            allowed=manifest["model_hash"],
+        )
     for key, value in arrays.under("parameters.").items():
         owner, _, name = key.partition(".")
         parameters.set(owner, name, value)
     if parameters.hash != manifest["parameters_hash"]:
-        raise InputError("has not the parameters of the manifest beside it", file=arrays.file, field="parameters_hash",
-                         value=parameters.hash, allowed=manifest["parameters_hash"])  # fmt: skip
+        raise InputError(
+            "has not the parameters of the manifest beside it",
+            file=arrays.file,
+            field="parameters_hash",
+            value=parameters.hash,
+            allowed=manifest["parameters_hash"],
+        )
     drive = Drive()
     drive.signals = {c: _signal(arrays.under(f"drive.{c}.")) for c in manifest["drive"]}
     frames = {n: arrays[n] for n in _FRAMES}
@@ -421,22 +486,40 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     energies, work = arrays.under("energies."), arrays.under("work.")
     for name, a in {**frames, **energies, **work}.items():
         if a.ndim < 1 or len(a) != count:
-            raise InputError("has another number of frames than times", file=arrays.file, field=name, value=a.shape,
-                             allowed=f"({count}, ...)")  # fmt: skip
+            raise InputError(
+                "has another number of frames than times",
+                file=arrays.file,
+                field=name,
+                value=a.shape,
+                allowed=f"({count}, ...)",
+            )
     nodes, worlds = len(model.position), arrays["state.x"].shape[1]
     for name in ("x", "v", "contact_forces"):
         if frames[name].shape != (count, nodes, worlds, 3):
-            raise InputError("has the wrong shape", file=arrays.file, field=name, value=frames[name].shape,
-                             allowed=f"{(count, nodes, worlds, 3)}")  # fmt: skip
+            raise InputError(
+                "has the wrong shape",
+                file=arrays.file,
+                field=name,
+                value=frames[name].shape,
+                allowed=f"{(count, nodes, worlds, 3)}",
+            )
     state: dict[str, Any] = {f.name: arrays[f"state.{f.name}"] for f in fields(State)}
     state["step"] = int(state["step"])
     step = manifest["time_step"]
     return Trajectory(
-        model=model, parameters=parameters, drive=drive, **frames, energies=energies, work=work,
-        failures=[Failure(**f) for f in manifest["failures"]], dt=float(manifest["dt"]),
+        model=model,
+        parameters=parameters,
+        drive=drive,
+        **frames,
+        energies=energies,
+        work=work,
+        failures=[Failure(**f) for f in manifest["failures"]],
+        dt=float(manifest["dt"]),
         step=TimeStep(float(step["limit"]), float(step["dt"]), int(step["node"]), str(step["cause"])),
-        state=State(**state), wall=float(manifest["wall"]), notes=list(manifest["notes"]),
-    )  # fmt: skip
+        state=State(**state),
+        wall=float(manifest["wall"]),
+        notes=list(manifest["notes"]),
+    )
 
 
 def _signal(values: dict[str, np.ndarray]) -> Signal:

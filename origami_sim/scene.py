@@ -62,7 +62,9 @@ class Settings(Mapping[str, Setting]):
         """A copy with other values (SI), checked against their ranges."""
         out = []
         for s in self._settings.values():
-            out.append(_checked(Setting(**{**s.__dict__, "value": values.pop(s.name)}), self.file) if s.name in values else s)
+            out.append(
+                _checked(Setting(**{**s.__dict__, "value": values.pop(s.name)}), self.file) if s.name in values else s
+            )
         for name in values:
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
         return Settings(out, self.file)
@@ -73,8 +75,13 @@ class Settings(Mapping[str, Setting]):
         for text in assignments:
             name, equals, given = text.partition("=")
             if not equals or name not in self._settings:
-                raise InputError("cannot apply this setting", file=self.file, field=name, value=text,
-                                 allowed="name=value with name one of " + ", ".join(self._settings))  # fmt: skip
+                raise InputError(
+                    "cannot apply this setting",
+                    file=self.file,
+                    field=name,
+                    value=text,
+                    allowed="name=value with name one of " + ", ".join(self._settings),
+                )
             values[name] = _parse(self._settings[name], given.strip(), self.file)
         return self.replace(**values)
 
@@ -91,7 +98,9 @@ def _parse(setting: Setting, text: str, file: Path):
         return text
     match = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*(.*)", text)
     if not match:
-        raise InputError("not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}")
+        raise InputError(
+            "not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}"
+        )
     number, unit = float(match[1]), match[2]
     if not unit or unit == setting.unit:
         return number
@@ -109,8 +118,13 @@ def _checked(s: Setting, file: Path) -> Setting:
         if not np.isfinite(s.value):
             raise InputError("not a finite number", file=file, field=s.name, value=s.value)
         if s.range and not s.range[0] <= s.value <= s.range[1]:
-            raise InputError("out of its range", file=file, field=s.name, value=s.value,
-                             allowed=f"{s.range[0]:g} to {s.range[1]:g} {s.unit}")  # fmt: skip
+            raise InputError(
+                "out of its range",
+                file=file,
+                field=s.name,
+                value=s.value,
+                allowed=f"{s.range[0]:g} to {s.range[1]:g} {s.unit}",
+            )
     return s
 
 
@@ -129,7 +143,9 @@ def read_calibration(source: str | Path) -> Settings:
     try:
         data = tomllib.loads(path.read_text())
     except OSError as e:
-        raise InputError(f"cannot be read ({e.strerror})", file=path, allowed="a TOML file or a shipped calibration") from None
+        raise InputError(
+            f"cannot be read ({e.strerror})", file=path, allowed="a TOML file or a shipped calibration"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
         raise InputError(f"is not valid TOML ({e})", file=path) from None
     settings = []
@@ -145,8 +161,20 @@ def read_calibration(source: str | Path) -> Settings:
         if isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         limits = tuple(table["range"]) if "range" in table else None
-        settings.append(_checked(Setting(name, value, table["unit"], table["source"], table["meaning"], limits,
-                                         tuple(table.get("choices", ()))), path))  # fmt: skip
+        settings.append(
+            _checked(
+                Setting(
+                    name,
+                    value,
+                    table["unit"],
+                    table["source"],
+                    table["meaning"],
+                    limits,
+                    tuple(table.get("choices", ())),
+                ),
+                path,
+            )
+        )
     return Settings(settings, path)
 
 

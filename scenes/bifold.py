@@ -27,8 +27,13 @@ REFERENCE = np.array([10.9, 19.4, 25.3, 29.4])
 def columns(s: Settings) -> tuple[np.ndarray, np.ndarray]:
     """Cell borders along x [m] and the material of each cell: 0 dielectric, +1 and -1 magnetic by poling."""
     if abs(3 * s.de_width + 2 * s.mae_width - s.side) > 1e-9:
-        raise InputError("the strips do not fill the sheet", file=s.file, field="mae_width", value=s.mae_width,
-                         allowed="3 de_width + 2 mae_width = side")  # fmt: skip
+        raise InputError(
+            "the strips do not fill the sheet",
+            file=s.file,
+            field="mae_width",
+            value=s.mae_width,
+            allowed="3 de_width + 2 mae_width = side",
+        )
     x, kind, n = [0.0], [], round(s.cells)
     for width, k in ((s.de_width, 0), (s.mae_width, 1), (s.de_width, 0), (s.mae_width, -1), (s.de_width, 0)):
         cells = 2 * n if k == 0 and len(kind) == 2 * n else n  # the middle strip needs a border at the crease
@@ -51,13 +56,29 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
 
     factor = 1 - s.poisson**2
     modulus = np.where(kind == 0, s.de_modulus, s.mae_modulus)
-    full = np.array([layered_rigidity([(s.underlayer_thickness, s.underlayer_modulus / factor), (s.active_thickness, e / factor)])
-                     for e in modulus])  # fmt: skip
-    notched = np.array([layered_rigidity([(s.notch_thickness, s.underlayer_modulus / factor), (s.active_thickness, e / factor)])
-                        for e in modulus])  # fmt: skip
+    full = np.array(
+        [
+            layered_rigidity(
+                [(s.underlayer_thickness, s.underlayer_modulus / factor), (s.active_thickness, e / factor)]
+            )
+            for e in modulus
+        ]
+    )
+    notched = np.array(
+        [
+            layered_rigidity([(s.notch_thickness, s.underlayer_modulus / factor), (s.active_thickness, e / factor)])
+            for e in modulus
+        ]
+    )
 
-    sheet = Sheet(pattern, thickness=s.underlayer_thickness + s.active_thickness, modulus=s.underlayer_modulus,
-                  density=s.underlayer_density, triangulation="center", membrane_damping=0.05)  # fmt: skip
+    sheet = Sheet(
+        pattern,
+        thickness=s.underlayer_thickness + s.active_thickness,
+        modulus=s.underlayer_modulus,
+        density=s.underlayer_density,
+        triangulation="center",
+        membrane_damping=0.05,
+    )
     areal = s.underlayer_thickness * s.underlayer_density + s.active_thickness * np.where(
         kind == 0, s.de_density, s.mae_density
     )
@@ -79,7 +100,10 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         if abs(a[0] - b[0]) < 1e-12:  # a crease along y
             at = int(np.argmin(np.abs(x - a[0])))
             compliance = 0.0
-            for cell, length in ((at - 1, x[at] - x[at - 1] if at else 0), (at, x[at + 1] - x[at] if at < cells else 0)):
+            for cell, length in (
+                (at - 1, x[at] - x[at - 1] if at else 0),
+                (at, x[at + 1] - x[at] if at < cells else 0),
+            ):
                 if 0 <= cell < cells:
                     notch = min(s.notch_length / 2, length / 2) if at == middle else 0.0
                     compliance += (length / 2 - notch) / full[cell] + notch / notched[cell]
@@ -93,8 +117,17 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
     neutral = _neutral_axis(s)
     for k, _, width in along_x:
-        sheet.set("maxwell_stress", [k], permittivity=s.permittivity, layer_thickness=s.active_thickness, layers=1.0,
-                  lever=s.notch_thickness + s.active_thickness / 2 - neutral, width=width, constraint=1.0, side=-1.0)  # fmt: skip
+        sheet.set(
+            "maxwell_stress",
+            [k],
+            permittivity=s.permittivity,
+            layer_thickness=s.active_thickness,
+            layers=1.0,
+            lever=s.notch_thickness + s.active_thickness / 2 - neutral,
+            width=width,
+            constraint=1.0,
+            side=-1.0,
+        )
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     model, parameters = sheet.build()
     return model, parameters, Drive(field=(0, 0, ramp(s.field, 1.0)), voltage=ramp(s.voltage, 1.0))
@@ -121,10 +154,13 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     motion = simulate(model, parameters, drive, duration=1.5, rate=60, progress=progress)
     final = np.degrees(fold_angle(model, motion.x[-1, :, 0], s.side))
     return Outcome(
-        motion, {"fold_angle": {"field_mT": FIELDS * 1e3, "angle_deg": np.array(angles), "reference_deg": REFERENCE}},
-        summary=[f"dynamics end at {final:.2f} deg in {s.field * 1e3:.0f} mT; the reference is good to a factor of two"],
+        motion,
+        {"fold_angle": {"field_mT": FIELDS * 1e3, "angle_deg": np.array(angles), "reference_deg": REFERENCE}},
+        summary=[
+            f"dynamics end at {final:.2f} deg in {s.field * 1e3:.0f} mT; the reference is good to a factor of two"
+        ],
         numbers={"angle_deg": float(final)},
-    )  # fmt: skip
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Folded box: four magnetic flaps on a silicone cross close in a vertical field.
 
-    python -m origami_sim.scenes.box
+python -m origami_sim.scenes.box
 """
 
 import numpy as np
@@ -44,12 +44,20 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     for k, out in enumerate(OUTWARD):
         size = (s.patch_length, s.patch_width) if out[0] else (s.patch_width, s.patch_length)
         centre = (s.base / 2 + s.gap / 2 + s.patch_length / 2) * out
-        sheet.patch(k + 1, thickness=s.patch_thickness, size=size, centre=centre, poling=out,
-                    remanence=s.remanence, density=s.patch_density)  # fmt: skip
+        sheet.patch(
+            k + 1,
+            thickness=s.patch_thickness,
+            size=size,
+            centre=centre,
+            poling=out,
+            remanence=s.remanence,
+            density=s.patch_density,
+        )
         sheet.panel(k + 1, rigidity=s.flap_stiffening * sheet.rigidity(k + 1))
     sheet.fix(panels=[0])
-    stiffness = bridge_stiffness(s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson,
-                                 end_correction=s.end_correction)  # fmt: skip
+    stiffness = bridge_stiffness(
+        s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson, end_correction=s.end_correction
+    )
     sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
     if s.gravity:
         sheet.gravity((0, 0, -s.gravity))
@@ -90,14 +98,23 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     motion = simulate(model, parameters, signals, duration=3.0, rate=60, progress=progress)
     final = np.degrees(inclination(motion.x[-1, :, 0], pattern(s).faces))
     table = {
-        "field_mT": FIELDS * 1e3, "flap_deg": statics.mean(1), "reference_deg": REFERENCE,
-        "difference_deg": statics.mean(1) - REFERENCE, "spread_deg": np.ptp(statics, axis=1),
-    }  # fmt: skip
+        "field_mT": FIELDS * 1e3,
+        "flap_deg": statics.mean(1),
+        "reference_deg": REFERENCE,
+        "difference_deg": statics.mean(1) - REFERENCE,
+        "spread_deg": np.ptp(statics, axis=1),
+    }
     return Outcome(
-        motion, {"flap_angle": table},
-        summary=[f"dynamics end at {final.mean():.2f} deg in {s.field * 1e3:.0f} mT (four flaps within {np.ptp(final):.2g} deg)"],
-        numbers={"flap_deg": float(final.mean()), "largest_difference_deg": float(np.abs(table["difference_deg"]).max())},
-    )  # fmt: skip
+        motion,
+        {"flap_angle": table},
+        summary=[
+            f"dynamics end at {final.mean():.2f} deg in {s.field * 1e3:.0f} mT (four flaps within {np.ptp(final):.2g} deg)"
+        ],
+        numbers={
+            "flap_deg": float(final.mean()),
+            "largest_difference_deg": float(np.abs(table["difference_deg"]).max()),
+        },
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Any crease pattern from a file, folded towards its target angles.
 
-    python -m origami_sim.scenes.fold_file
-    origami-sim run fold_file --set pattern=my.fold
+python -m origami_sim.scenes.fold_file
+origami-sim run fold_file --set pattern=my.fold
 """
 
 from importlib import resources
@@ -36,8 +36,12 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive, np.ndarray]:
     stiffness = np.where(np.isnan(sheet._crease_stiffness), s.crease_stiffness, sheet._crease_stiffness)
     target = np.nan_to_num(pattern.fold_angles[sheet.mesh.crease_edge])
     if not np.any(target):
-        raise InputError("the pattern gives no target angle", file=s.pattern, field="edges_foldAngle",
-                         allowed="degrees, valley positive")  # fmt: skip
+        raise InputError(
+            "the pattern gives no target angle",
+            file=s.pattern,
+            field="edges_foldAngle",
+            allowed="degrees, valley positive",
+        )
     sheet.crease(stiffness=stiffness, damping_ratio=s.damping_ratio)
     sheet.set("crease_drive", drive_stiffness=stiffness, target_angle=target - sheet._rest)
     sheet.set("crease_stop", stop_stiffness=stiffness)
@@ -57,14 +61,15 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     strain = float(np.abs(now / lengths - 1).max())
     table = {"crease": np.arange(len(target)), "target_deg": np.degrees(target), "angle_deg": np.degrees(final)}
     return Outcome(
-        motion, {"creases": table},
+        motion,
+        {"creases": table},
         summary=[
             *pattern.notes,
             f"{len(target)} creases folded to within {np.abs(error).max():.2f} deg of their targets; "
             f"largest membrane strain {strain:.2%}",
         ],
         numbers={"largest_error_deg": float(np.abs(error).max()), "largest_strain": strain},
-    )  # fmt: skip
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """One magnetic panel on one crease: k (theta - theta0) = (Br V / mu0) B cos(theta).
 
-    python -m origami_sim.scenes.mae_crease
+python -m origami_sim.scenes.mae_crease
 """
 
 import numpy as np
@@ -18,8 +18,13 @@ CALIBRATION = "mae_crease"
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     """A held panel, a crease, and a magnetic panel that is rigid beside the crease."""
-    sheet = Sheet(strip([s.length / 2, s.length], s.width), thickness=s.thickness, material="mae", density=s.density,
-                  triangulation="center")  # fmt: skip
+    sheet = Sheet(
+        strip([s.length / 2, s.length], s.width),
+        thickness=s.thickness,
+        material="mae",
+        density=s.density,
+        triangulation="center",
+    )
     sheet.fix(panels=[0]).panel([0, 1], rigidity=1e6 * s.stiffness)
     sheet.crease(stiffness=s.stiffness, rest_angle=0.0, loss_time=s.loss_time)
     sheet.magnetise(1, remanence=s.remanence, volume=s.length * s.width * s.thickness, poling=(1, 0, 0))
@@ -37,10 +42,13 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     motion = simulate(model, parameters, drive, duration=2.0, rate=60, progress=progress)
     final = float(np.degrees(motion.creases[-1, 0, 0]))
     return Outcome(
-        motion, {"fold_angle": {"field_mT": fields * 1e3, "angle_deg": np.array(angles)}},
-        summary=[f"{angles[-1]:.4f} deg in {s.field * 1e3:.0f} mT by statics, {final:.4f} deg by dynamics after 1 s of rest"],
+        motion,
+        {"fold_angle": {"field_mT": fields * 1e3, "angle_deg": np.array(angles)}},
+        summary=[
+            f"{angles[-1]:.4f} deg in {s.field * 1e3:.0f} mT by statics, {final:.4f} deg by dynamics after 1 s of rest"
+        ],
         numbers={"angle_deg": float(angles[-1]), "dynamic_angle_deg": final},
-    )  # fmt: skip
+    )
 
 
 if __name__ == "__main__":

@@ -98,7 +98,9 @@ def _fit_start(s: Settings, recording: Recording, window: float, names: list[str
         trials = values + np.vstack([np.zeros(len(names)), np.diag(scale)])
         state = State.join([start(s.replace(**dict(zip(names, map(float, t), strict=True))), model) for t in trials])
         motion = simulate(model, parameters, drive, duration=(len(head.times) - 1) / rate, rate=rate, state=state)
-        predicted = np.stack([np.concatenate(list(observe(motion, head, world=w).values())) for w in range(len(trials))])
+        predicted = np.stack(
+            [np.concatenate(list(observe(motion, head, world=w).values())) for w in range(len(trials))]
+        )
         slopes = (predicted[1:] - predicted[0]).T / scale
         residual = (measured - predicted[0]) / noise
         misfit = float(np.sqrt(np.mean(residual**2)))
@@ -119,8 +121,9 @@ def replicate(s: Settings, recording: Recording, progress: Progress | None = Non
 def swing(s: Settings, *, rate: float = 1000.0, progress: Progress | None = None, **options) -> Trajectory:
     """Simulates `duration` of free swing."""
     model, parameters, drive = build(s)
-    return simulate(model, parameters, drive, duration=s.duration, rate=rate, state=start(s, model), progress=progress,
-                    **options)  # fmt: skip
+    return simulate(
+        model, parameters, drive, duration=s.duration, rate=rate, state=start(s, model), progress=progress, **options
+    )
 
 
 def arm_angles(motion: Trajectory, s: Settings) -> np.ndarray:
@@ -140,10 +143,11 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     table = {"time_s": motion.times[every], **{f"theta{n + 1}_rad": a[every] for n, a in enumerate(angles.T)}}
     balance = motion.energy_balance()
     return Outcome(
-        motion, {"angles": table},
+        motion,
+        {"angles": table},
         summary=[f"energy balance kept within {np.ptp(balance) * 1e6:.2f} uJ over {s.duration:g} s"],
         numbers={"energy_error_J": float(np.ptp(balance))},
-    )  # fmt: skip
+    )
 
 
 if __name__ == "__main__":

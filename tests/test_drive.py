@@ -67,8 +67,15 @@ def test_kernels_see_the_same_signal_as_python():
     """The load as a force on a node: wave, ramp and two series with different knots, two worlds."""
     rng = np.random.default_rng(1)
     times = np.sort(rng.uniform(0, 5, 12))
-    signal = Signal(offset=np.array([0.3, -0.1]), amplitude=np.array([1.0, 0.0]), frequency=0.7, phase=1.1,
-                    times=times, values=rng.normal(size=12), scale=np.array([1.0, -2.0]))  # fmt: skip
+    signal = Signal(
+        offset=np.array([0.3, -0.1]),
+        amplitude=np.array([1.0, 0.0]),
+        frequency=0.7,
+        phase=1.1,
+        times=times,
+        values=rng.normal(size=12),
+        scale=np.array([1.0, -2.0]),
+    )
     model = make_model([[0.0, 0, 0]])
     p = quiet(model, {("load", "force_x"): 1.0})
     batch = Batch(model, p, Drive(load=signal, voltage=series([0, 2.2, 7], [0, 1, 0])), start(model, 2))

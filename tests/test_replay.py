@@ -33,14 +33,21 @@ def bifold(contacts: bool = True) -> Model:
     bars = sorted({tuple(sorted((t[i], t[(i + 1) % 3]))) for t in TRIANGLES for i in range(3)})
     k = 2 if contacts else 0
     return Model(
-        position=x, free=free, bars=np.array(bars, np.int32), creases=np.array([[5, 1, 2, 0]], np.int32),
-        bends=np.array([[1, 0, 2, 3], [4, 1, 5, 2]], np.int32), triangles=triangles,
-        triangle_panel=np.array([0, 0, 1, 1], np.int32), contacts=triangles[[2, 2]][:k],
-        contact_weights=np.array([[0.0, 1, 0], [0, 0, 1]])[:k], contact_offsets=np.full(k, -2e-4),
-        contact_axes=np.tile([-50.0, 50, 0], (k, 1)), electrodes=np.zeros(3, np.int32),
+        position=x,
+        free=free,
+        bars=np.array(bars, np.int32),
+        creases=np.array([[5, 1, 2, 0]], np.int32),
+        bends=np.array([[1, 0, 2, 3], [4, 1, 5, 2]], np.int32),
+        triangles=triangles,
+        triangle_panel=np.array([0, 0, 1, 1], np.int32),
+        contacts=triangles[[2, 2]][:k],
+        contact_weights=np.array([[0.0, 1, 0], [0, 0, 1]])[:k],
+        contact_offsets=np.full(k, -2e-4),
+        contact_axes=np.tile([-50.0, 50, 0], (k, 1)),
+        electrodes=np.zeros(3, np.int32),
         effects=("bars", "crease", "gravity", "magnetic_torque", *(("ground",) if contacts else ())),
         names={"panel": ("base", "flap"), "crease": ("hinge",)},
-    )  # fmt: skip
+    )
 
 
 def swing(contacts: bool = True) -> Trajectory:
@@ -66,12 +73,22 @@ def swing(contacts: bool = True) -> Trajectory:
     energy = 1e-4 * angle**2
     state = State.at_rest(model, WORLDS)
     return Trajectory(
-        model=model, parameters=p, drive=Drive(field=(0, 0, sine(FIELD, FREQUENCY))), times=times, x=x,
-        v=np.zeros_like(x), angles=angles, energies={"kinetic": 0.1 * energy, "crease": energy, "gravity": -energy},
+        model=model,
+        parameters=p,
+        drive=Drive(field=(0, 0, sine(FIELD, FREQUENCY))),
+        times=times,
+        x=x,
+        v=np.zeros_like(x),
+        angles=angles,
+        energies={"kinetic": 0.1 * energy, "crease": energy, "gravity": -energy},
         work={n: 2 * energy if n == "magnetic_torque" else 0 * energy for n in model.effects},
         gaps=np.where(np.sin(angle)[:, None] < 0, -1e-6, 1e-3).repeat(len(model.contacts), axis=1),
-        contact_forces=forces, failures=[], dt=1e-4, step=TimeStep(2e-4, 1e-4, 5, "bar 8 (bars)"), state=state,
-    )  # fmt: skip
+        contact_forces=forces,
+        failures=[],
+        dt=1e-4,
+        step=TimeStep(2e-4, 1e-4, 5, "bar 8 (bars)"),
+        state=state,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -214,10 +231,14 @@ def test_recording_is_shown_with_gaps(trajectory, tmp_path):
     markers = np.full((7, 3), 0.01)
     markers[3] = np.nan
     angle = np.full(7, 0.5)
-    recording = Recording("r", times, {
-        "m1": Channel("m1", "marker", markers, "m", 1e-4),
-        "hinge": Channel("hinge", "crease_angle", angle, "rad", 1e-3),
-    })  # fmt: skip
+    recording = Recording(
+        "r",
+        times,
+        {
+            "m1": Channel("m1", "marker", markers, "m", 1e-4),
+            "hinge": Channel("hinge", "crease_angle", angle, "rad", 1e-3),
+        },
+    )
     file = write_replay(tmp_path / "a.rrd", trajectory, recording=recording)
     when, positions = columns(file, "/markers/m1", "Points3D:positions")
     assert when == pytest.approx(times, abs=1e-9)
@@ -229,8 +250,15 @@ def test_blueprint_has_a_camera_and_the_plots(file):
     reader = RrdReader(file)
     (blueprint,) = reader.blueprints()
     text = "\n".join(c.format(width=400) for c in reader.stream(store=blueprint))
-    for expected in ("EyeControls3D:position", "swing (m)", "Crease angles (deg)", "Energies and work (µJ)",
-                     "Displacement (mm)", "Field (mT)", TIMELINE):  # fmt: skip
+    for expected in (
+        "EyeControls3D:position",
+        "swing (m)",
+        "Crease angles (deg)",
+        "Energies and work (µJ)",
+        "Displacement (mm)",
+        "Field (mT)",
+        TIMELINE,
+    ):
         assert expected in text, expected
 
 
@@ -262,8 +290,12 @@ def test_a_world_that_failed_is_still_written(contacts, tmp_path):
 def test_bad_requests_name_the_field(trajectory, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("x")
-    for field, options in (("world", {"world": 2}), ("magnets", {"magnets": [2]}), ("arms", {"arms": [-1]}),
-                           ("tip", {"tip": 6})):  # fmt: skip
+    for field, options in (
+        ("world", {"world": 2}),
+        ("magnets", {"magnets": [2]}),
+        ("arms", {"arms": [-1]}),
+        ("tip", {"tip": 6}),
+    ):
         with pytest.raises(InputError) as e:
             write_replay(tmp_path / "a.rrd", trajectory, **options)
         assert e.value.field == field

@@ -24,13 +24,21 @@ def flap() -> tuple[Model, Parameters, Drive]:
     free = np.ones((4, 3))
     free[:3] = 0
     model = Model(
-        position=X, free=free, bars=np.array([[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]], np.int32),
-        creases=np.array([[3, 1, 2, 0]], np.int32), bends=np.zeros((0, 4), np.int32),
-        triangles=np.array([[0, 1, 2], [1, 3, 2]], np.int32), triangle_panel=np.array([0, 1], np.int32),
-        contacts=np.zeros((0, 3), np.int32), contact_weights=np.zeros((0, 3)), contact_offsets=np.zeros(0),
-        contact_axes=np.zeros((0, 3)), electrodes=np.zeros(1, np.int32), effects=("bars", "crease", "gravity"),
+        position=X,
+        free=free,
+        bars=np.array([[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]], np.int32),
+        creases=np.array([[3, 1, 2, 0]], np.int32),
+        bends=np.zeros((0, 4), np.int32),
+        triangles=np.array([[0, 1, 2], [1, 3, 2]], np.int32),
+        triangle_panel=np.array([0, 1], np.int32),
+        contacts=np.zeros((0, 3), np.int32),
+        contact_weights=np.zeros((0, 3)),
+        contact_offsets=np.zeros(0),
+        contact_axes=np.zeros((0, 3)),
+        electrodes=np.zeros(1, np.int32),
+        effects=("bars", "crease", "gravity"),
         names={"crease": ("hinge",)},
-    )  # fmt: skip
+    )
     p = Parameters(model)
     p.set("inertia", "mass", 1e-4).set("bars", "stiffness", 100.0).set("gravity", "gravity_z", -9.81)
     p.set("bars", "rest_length", np.linalg.norm(X[model.bars[:, 1]] - X[model.bars[:, 0]], axis=1))
@@ -77,7 +85,12 @@ def test_everything_comes_back(saved, trajectory):
         assert set(ours) == set(theirs) and all(np.array_equal(ours[n], theirs[n]) for n in ours)
     assert t.model.hash == trajectory.model.hash and t.parameters.hash == trajectory.parameters.hash
     assert (t.failures, t.notes, t.dt, t.step, t.wall) == (
-        trajectory.failures, trajectory.notes, trajectory.dt, trajectory.step, trajectory.wall)  # fmt: skip
+        trajectory.failures,
+        trajectory.notes,
+        trajectory.dt,
+        trajectory.step,
+        trajectory.wall,
+    )
     for when in (0.0, 0.37, 1.4):
         assert np.array_equal(t.drive.field(when), trajectory.drive.field(when))
     assert t.drive.end == 2.0
@@ -87,8 +100,9 @@ def test_everything_comes_back(saved, trajectory):
 def test_a_run_can_be_continued(saved, trajectory):
     t = load_run(saved).trajectory
     ours = simulate(t.model, t.parameters, t.drive, duration=0.04, rate=50, state=t.state)
-    theirs = simulate(trajectory.model, trajectory.parameters, trajectory.drive, duration=0.04, rate=50,
-                      state=trajectory.state.copy())  # fmt: skip
+    theirs = simulate(
+        trajectory.model, trajectory.parameters, trajectory.drive, duration=0.04, rate=50, state=trajectory.state.copy()
+    )
     assert np.array_equal(ours.x, theirs.x)
 
 
@@ -216,9 +230,15 @@ def edit(run: Path, **changes):
 
 @pytest.mark.parametrize(
     ("changes", "field"),
-    [({"format": 99}, "format"), ({"format": "1"}, "format"), ({"names": ...}, "names"), ({"dt": "small"}, "dt"),
-     ({"model_hash": "0" * 16}, "model_hash"), ({"parameters_hash": "0" * 16}, "parameters_hash")],
-)  # fmt: skip
+    [
+        ({"format": 99}, "format"),
+        ({"format": "1"}, "format"),
+        ({"names": ...}, "names"),
+        ({"dt": "small"}, "dt"),
+        ({"model_hash": "0" * 16}, "model_hash"),
+        ({"parameters_hash": "0" * 16}, "parameters_hash"),
+    ],
+)
 def test_damaged_manifest_fields_are_named(copy, changes, field):
     if ... in changes.values():
         manifest = json.loads((copy / "manifest.json").read_text())
@@ -258,9 +278,17 @@ def test_damaged_states_are_named(copy, trajectory, change):
         load_run(copy)
 
 
-@pytest.mark.parametrize(("name", "value"), [("x", None), ("model.bars", None), ("energies.kinetic", np.zeros((2, 2))),
-                                             ("v", np.zeros((6, 4, 2))), ("drive.field_z.values", np.zeros(2)),
-                                             ("parameters.crease.nonsense", np.zeros((1, 1)))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("x", None),
+        ("model.bars", None),
+        ("energies.kinetic", np.zeros((2, 2))),
+        ("v", np.zeros((6, 4, 2))),
+        ("drive.field_z.values", np.zeros(2)),
+        ("parameters.crease.nonsense", np.zeros((1, 1))),
+    ],
+)
 def test_states_that_do_not_fit_are_named(copy, name, value):
     with np.load(copy / "states.npz") as data:
         arrays = {n: data[n] for n in data.files if n != name}
@@ -286,10 +314,14 @@ def test_a_damaged_table_is_named(copy):
 
 @pytest.mark.parametrize(
     ("options", "field"),
-    [({"tables": {"t": {"a": [1, 2], "b": [1]}}}, "t"), ({"tables": {"t": {"a": np.zeros((2, 2))}}}, "a"),
-     ({"tables": {"../t": {"a": [1]}}}, "tables"), ({"settings": {"overrides": 3}}, "overrides"),
-     ({"settings": {"f": object()}}, "settings")],
-)  # fmt: skip
+    [
+        ({"tables": {"t": {"a": [1, 2], "b": [1]}}}, "t"),
+        ({"tables": {"t": {"a": np.zeros((2, 2))}}}, "a"),
+        ({"tables": {"../t": {"a": [1]}}}, "tables"),
+        ({"settings": {"overrides": 3}}, "overrides"),
+        ({"settings": {"f": object()}}, "settings"),
+    ],
+)
 def test_what_cannot_be_kept_is_named(trajectory, tmp_path, options, field):
     with pytest.raises(InputError) as e:
         save_run(tmp_path / "run", trajectory, scene="x", replay=False, **options)

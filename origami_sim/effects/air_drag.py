@@ -8,9 +8,15 @@ from origami_sim.kinematics import corner_rows
 
 @wp.func
 def force(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, v1: wp.vec3d, v2: wp.vec3d, v3: wp.vec3d,
-    air_density: scalar, drag_coefficient: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    v1: wp.vec3d,
+    v2: wp.vec3d,
+    v3: wp.vec3d,
+    air_density: scalar,
+    drag_coefficient: scalar,
+):
     double_area = wp.cross(x2 - x1, x3 - x1)
     n = wp.normalize(double_area)
     c = scalar(-0.25) * air_density * drag_coefficient * wp.length(double_area) / scalar(3.0)

@@ -20,10 +20,18 @@ def branch(q: scalar, turn: scalar, dt: scalar, stiffness: scalar, time: scalar)
 
 @wp.func
 def moment(
-    turn: scalar, dt: scalar,
-    q1: scalar, q2: scalar, q3: scalar,
-    stiffness_1: scalar, time_1: scalar, stiffness_2: scalar, time_2: scalar, stiffness_3: scalar, time_3: scalar,
-):  # fmt: skip
+    turn: scalar,
+    dt: scalar,
+    q1: scalar,
+    q2: scalar,
+    q3: scalar,
+    stiffness_1: scalar,
+    time_1: scalar,
+    stiffness_2: scalar,
+    time_2: scalar,
+    stiffness_3: scalar,
+    time_3: scalar,
+):
     p1 = branch(q1, turn, dt, stiffness_1, time_1)
     p2 = branch(q2, turn, dt, stiffness_2, time_2)
     p3 = branch(q3, turn, dt, stiffness_3, time_3)

@@ -19,9 +19,7 @@ def slope(buffer: wp.array(dtype=scalar), first: int, k: int):
 
 
 @wp.func
-def moment(
-    angle: scalar, buffer: wp.array(dtype=scalar), resisting_moment: int, angle_min: scalar, angle_max: scalar
-):
+def moment(angle: scalar, buffer: wp.array(dtype=scalar), resisting_moment: int, angle_min: scalar, angle_max: scalar):
     step = (angle_max - angle_min) / scalar(KNOTS - 1)
     s = (angle - angle_min) / step
     k = wp.clamp(int(wp.floor(s)), 0, KNOTS - 2)
@@ -43,9 +41,7 @@ def moment(
 
 
 @wp.func
-def energy(
-    angle: scalar, buffer: wp.array(dtype=scalar), resisting_moment: int, angle_min: scalar, angle_max: scalar
-):
+def energy(angle: scalar, buffer: wp.array(dtype=scalar), resisting_moment: int, angle_min: scalar, angle_max: scalar):
     step = (angle_max - angle_min) / scalar(KNOTS - 1)
     s = (angle - angle_min) / step
     last = wp.clamp(int(wp.floor(s)), 0, KNOTS - 2)

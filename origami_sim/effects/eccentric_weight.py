@@ -8,9 +8,15 @@ from origami_sim.kinematics import corner_rows, normal_gradients
 
 @wp.func
 def force(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d,
-    mass: scalar, offset: scalar, gravity_x: scalar, gravity_y: scalar, gravity_z: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    mass: scalar,
+    offset: scalar,
+    gravity_x: scalar,
+    gravity_y: scalar,
+    gravity_z: scalar,
+):
     # the centre of mass is offset * n away from the mid-plane; dn = -sum (n . dx_i) grad_i
     weight = mass * wp.vec3d(gravity_x, gravity_y, gravity_z)
     t = normal_gradients(x1, x2, x3)
@@ -21,9 +27,15 @@ def force(
 
 @wp.func
 def energy(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d,
-    mass: scalar, offset: scalar, gravity_x: scalar, gravity_y: scalar, gravity_z: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    mass: scalar,
+    offset: scalar,
+    gravity_x: scalar,
+    gravity_y: scalar,
+    gravity_z: scalar,
+):
     return -mass * offset * wp.dot(wp.vec3d(gravity_x, gravity_y, gravity_z), wp.normalize(wp.cross(x2 - x1, x3 - x1)))
 
 

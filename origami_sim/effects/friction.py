@@ -9,9 +9,15 @@ from origami_sim.effects._effect import Effect, Memory, Parameter, scalar
 
 @wp.func
 def force(
-    velocity: wp.vec3d, slip: wp.vec3d, normal: wp.vec3d, normal_load: scalar, coefficient: scalar, bristle: wp.vec3d,
-    stiffness: scalar, damping: scalar,
-):  # fmt: skip
+    velocity: wp.vec3d,
+    slip: wp.vec3d,
+    normal: wp.vec3d,
+    normal_load: scalar,
+    coefficient: scalar,
+    bristle: wp.vec3d,
+    stiffness: scalar,
+    damping: scalar,
+):
     stretch = bristle + slip
     stretch = stretch - normal * wp.dot(normal, stretch)
     f = -stiffness * stretch - damping * velocity

@@ -12,9 +12,16 @@ MU0 = 1.25663706212e-6
 
 @wp.func
 def force(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, field: wp.vec3d,
-    remanence: scalar, volume: scalar, poling_1: scalar, poling_2: scalar, poling_n: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    field: wp.vec3d,
+    remanence: scalar,
+    volume: scalar,
+    poling_1: scalar,
+    poling_2: scalar,
+    poling_n: scalar,
+):
     m = remanence * volume / scalar(MU0)
     d = poling_1 * (x2 - x1) + poling_2 * (x3 - x1)
     length = wp.length(d)
@@ -36,9 +43,16 @@ def force(
 
 @wp.func
 def energy(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, field: wp.vec3d,
-    remanence: scalar, volume: scalar, poling_1: scalar, poling_2: scalar, poling_n: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    field: wp.vec3d,
+    remanence: scalar,
+    volume: scalar,
+    poling_1: scalar,
+    poling_2: scalar,
+    poling_n: scalar,
+):
     m = remanence * volume / scalar(MU0)
     d = poling_1 * (x2 - x1) + poling_2 * (x3 - x1)
     share = wp.sqrt(wp.max(scalar(1.0) - poling_n * poling_n, scalar(0.0)))

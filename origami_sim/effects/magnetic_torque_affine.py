@@ -20,9 +20,15 @@ def force(field: wp.vec3d, remanence: scalar, volume: scalar, poling_1: scalar, 
 
 @wp.func
 def energy(
-    x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, field: wp.vec3d,
-    remanence: scalar, volume: scalar, poling_1: scalar, poling_2: scalar,
-):  # fmt: skip
+    x1: wp.vec3d,
+    x2: wp.vec3d,
+    x3: wp.vec3d,
+    field: wp.vec3d,
+    remanence: scalar,
+    volume: scalar,
+    poling_1: scalar,
+    poling_2: scalar,
+):
     m = remanence * volume / scalar(MU0)
     return -m * wp.dot(field, poling_1 * (x2 - x1) + poling_2 * (x3 - x1))
 

@@ -20,17 +20,30 @@ def unit_moment(
 
 @wp.func
 def moment(
-    voltage: scalar, permittivity: scalar, layer_thickness: scalar, layers: scalar, lever: scalar, width: scalar,
-    constraint: scalar, side: scalar,
-):  # fmt: skip
+    voltage: scalar,
+    permittivity: scalar,
+    layer_thickness: scalar,
+    layers: scalar,
+    lever: scalar,
+    width: scalar,
+    constraint: scalar,
+    side: scalar,
+):
     return side * constraint * unit_moment(voltage, permittivity, layer_thickness, layers, lever, width)
 
 
 @wp.func
 def energy(
-    angle: scalar, voltage: scalar, permittivity: scalar, layer_thickness: scalar, layers: scalar, lever: scalar,
-    width: scalar, constraint: scalar, side: scalar,
-):  # fmt: skip
+    angle: scalar,
+    voltage: scalar,
+    permittivity: scalar,
+    layer_thickness: scalar,
+    layers: scalar,
+    lever: scalar,
+    width: scalar,
+    constraint: scalar,
+    side: scalar,
+):
     return -angle * moment(voltage, permittivity, layer_thickness, layers, lever, width, constraint, side)
 
 

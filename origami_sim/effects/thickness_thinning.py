@@ -11,10 +11,18 @@ EPS0 = 8.8541878128e-12
 
 @wp.func
 def excess(
-    angle: scalar, voltage: scalar, permittivity: scalar, layer_thickness: scalar, layers: scalar,
-    first: scalar, hinge_length: scalar, width: scalar, constraint: scalar, side: scalar,
+    angle: scalar,
+    voltage: scalar,
+    permittivity: scalar,
+    layer_thickness: scalar,
+    layers: scalar,
+    first: scalar,
+    hinge_length: scalar,
+    width: scalar,
+    constraint: scalar,
+    side: scalar,
     neutral: scalar,
-):  # fmt: skip
+):
     e = voltage / layer_thickness
     p = side * constraint * width * permittivity * scalar(EPS0) * e * e * layer_thickness
     m = scalar(0.0)
@@ -30,23 +38,41 @@ def excess(
 
 @wp.func
 def moment(
-    angle: scalar, voltage: scalar, permittivity: scalar, layer_thickness: scalar, layers: scalar,
-    first: scalar, hinge_length: scalar, width: scalar, constraint: scalar, side: scalar,
+    angle: scalar,
+    voltage: scalar,
+    permittivity: scalar,
+    layer_thickness: scalar,
+    layers: scalar,
+    first: scalar,
+    hinge_length: scalar,
+    width: scalar,
+    constraint: scalar,
+    side: scalar,
     neutral: scalar,
-):  # fmt: skip
-    m, _ = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
-                  constraint, side, neutral)  # fmt: skip
+):
+    m, _ = excess(
+        angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width, constraint, side, neutral
+    )
     return m
 
 
 @wp.func
 def energy(
-    angle: scalar, voltage: scalar, permittivity: scalar, layer_thickness: scalar, layers: scalar,
-    first: scalar, hinge_length: scalar, width: scalar, constraint: scalar, side: scalar,
+    angle: scalar,
+    voltage: scalar,
+    permittivity: scalar,
+    layer_thickness: scalar,
+    layers: scalar,
+    first: scalar,
+    hinge_length: scalar,
+    width: scalar,
+    constraint: scalar,
+    side: scalar,
     neutral: scalar,
-):  # fmt: skip
-    _, u = excess(angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width,
-                  constraint, side, neutral)  # fmt: skip
+):
+    _, u = excess(
+        angle, voltage, permittivity, layer_thickness, layers, first, hinge_length, width, constraint, side, neutral
+    )
     return u
 
 

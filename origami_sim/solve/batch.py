@@ -50,8 +50,16 @@ class Batch:
         InputError: parameters or drive for another number of worlds, too few electrode groups, no such device.
     """
 
-    def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State, *, device: str = "cpu",
-                 threads: int | None = None):  # fmt: skip
+    def __init__(
+        self,
+        model: Model,
+        parameters: Parameters,
+        drive: Drive,
+        state: State,
+        *,
+        device: str = "cpu",
+        threads: int | None = None,
+    ):
         try:
             self.device = wp.get_device(device)
         except (ValueError, RuntimeError):
@@ -69,22 +77,34 @@ class Batch:
 
         groups = len(drive.signals) - 14
         if len(model.electrodes) and model.electrodes.max(initial=0) >= groups:
-            raise InputError("the drive has too few electrode groups", field="voltage", value=groups,
-                             allowed=f">= {int(model.electrodes.max()) + 1}")  # fmt: skip
+            raise InputError(
+                "the drive has too few electrode groups",
+                field="voltage",
+                value=groups,
+                allowed=f">= {int(model.electrodes.max()) + 1}",
+            )
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()
         sizes = [(e, m) for e in self.program.effects for m in e.memory]
         rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
         self._constants = [
-            constant(model.free, wp.vec3d), constant(model.bars.reshape(-1, 2), wp.vec2i), constant(hinges, wp.vec4i),
-            constant(model.electrodes, wp.int32), constant(model.triangles.reshape(-1, 3), wp.vec3i),
-            constant(model.contacts.reshape(-1, 3), wp.vec3i), constant(model.contact_weights.reshape(-1, 3), wp.vec3d),
-            constant(model.contact_offsets, wp.float64), constant(model.contact_axes.reshape(-1, 3), wp.vec3d),
-            len(model.creases), constant(buffer, wp.float64), constant(layout, wp.int32),
-            constant(times, wp.float64), constant(values, wp.float64),
+            constant(model.free, wp.vec3d),
+            constant(model.bars.reshape(-1, 2), wp.vec2i),
+            constant(hinges, wp.vec4i),
+            constant(model.electrodes, wp.int32),
+            constant(model.triangles.reshape(-1, 3), wp.vec3i),
+            constant(model.contacts.reshape(-1, 3), wp.vec3i),
+            constant(model.contact_weights.reshape(-1, 3), wp.vec3d),
+            constant(model.contact_offsets, wp.float64),
+            constant(model.contact_axes.reshape(-1, 3), wp.vec3d),
+            len(model.creases),
+            constant(buffer, wp.float64),
+            constant(layout, wp.int32),
+            constant(times, wp.float64),
+            constant(values, wp.float64),
             constant(rows[:-1] if len(sizes) else [0], wp.int32),
-        ]  # fmt: skip
+        ]
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = wp.zeros_like(self._x)
         self._angles, self._memory, self._work, self._power = (
@@ -100,13 +120,22 @@ class Batch:
         for owner, name in self.program.slots:
             a = waves[name] if owner == "drive" else parameters[owner, name]
             if (owner, name) == ("plane", "reach"):  # no contact law may be cut off
-                reaches = [parameters[e.name, "reach"].max() for e in self.program.effects
-                           if e.family in CONTACTS and "reach" in {p.name for p in e.parameters} and parameters[e.name, "reach"].size]
+                reaches = [
+                    parameters[e.name, "reach"].max()
+                    for e in self.program.effects
+                    if e.family in CONTACTS
+                    and "reach" in {p.name for p in e.parameters}
+                    and parameters[e.name, "reach"].size
+                ]
                 a = np.maximum(a, max(reaches, default=0.0))
             worlds, knots = a.shape[1], int(np.prod(a.shape[2:]))
             if worlds not in (1, self.worlds):
-                raise InputError("a parameter is given for another number of worlds than the state has",
-                                 field=f"{owner}.{name}", value=worlds, allowed=f"1 or {self.worlds}")  # fmt: skip
+                raise InputError(
+                    "a parameter is given for another number of worlds than the state has",
+                    field=f"{owner}.{name}",
+                    value=worlds,
+                    allowed=f"1 or {self.worlds}",
+                )
             blocks.append(np.ascontiguousarray(a, float).ravel())
             layout.append((offset, worlds * knots, knots if worlds > 1 else 0))
             offset += a.size
@@ -126,8 +155,9 @@ class Batch:
         inputs = [*self._constants, self._x, self._v, self._angles, self._memory]
 
         def run(lo: int, hi: int):
-            wp.launch(kernel, dim=hi - lo, inputs=[*inputs, *(lo if o is _FIRST else o for o in outputs)],
-                      device=self.device)  # fmt: skip
+            wp.launch(
+                kernel, dim=hi - lo, inputs=[*inputs, *(lo if o is _FIRST else o for o in outputs)], device=self.device
+            )
 
         if self.threads == 1:
             run(0, self.worlds)
@@ -139,8 +169,21 @@ class Batch:
 
     def advance(self, steps: int, dt: float, speed_limit: float):
         """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""
-        self._launch(self.program.rollout, [self._a, self._f, self._work, self._power, self._status, _FIRST, self.step, steps,
-                                            wp.float64(dt), wp.float64(speed_limit)])  # fmt: skip
+        self._launch(
+            self.program.rollout,
+            [
+                self._a,
+                self._f,
+                self._work,
+                self._power,
+                self._status,
+                _FIRST,
+                self.step,
+                steps,
+                wp.float64(dt),
+                wp.float64(speed_limit),
+            ],
+        )
         self.step = max(self.step, 0) + steps
 
     def total_force(self, time: float) -> np.ndarray:
@@ -177,12 +220,16 @@ class Batch:
         m = self.model
         n, rows = len(m.position), sum(d.size * m.count(e.family) for e in self.program.effects for d in e.memory)
         return State(
-            x=self._download(self._x, n), v=self._download(self._v, n), a=self._download(self._a, n),
+            x=self._download(self._x, n),
+            v=self._download(self._v, n),
+            a=self._download(self._a, n),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
-            memory=self._download(self._memory, rows), work=self._download(self._work, len(self.program.effects)),
+            memory=self._download(self._memory, rows),
+            work=self._download(self._work, len(self.program.effects)),
             power=self._download(self._power, len(self.program.effects)),
-            step=self.step, status=self._download(self._status, 2),
-        )  # fmt: skip
+            step=self.step,
+            status=self._download(self._status, 2),
+        )
 
 
 _FIRST = object()
@@ -192,5 +239,3 @@ _FIRST = object()
 def forces(model: Model, parameters: Parameters, drive: Drive, state: State, time: float, **options) -> Evaluation:
     """Forces and energies of a state, one named array per effect."""
     return Batch(model, parameters, drive, state, **options).evaluate(time)
-
-

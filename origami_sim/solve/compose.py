@@ -20,9 +20,16 @@ FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
 
 FIXED_SLOTS = (
     ("inertia", "mass"),
-    ("plane", "tilt"), ("plane", "azimuth"), ("plane", "height"), ("plane", "reach"),
-    ("drive", "offset"), ("drive", "amplitude"), ("drive", "angular_frequency"), ("drive", "phase"), ("drive", "scale"),
-)  # fmt: skip
+    ("plane", "tilt"),
+    ("plane", "azimuth"),
+    ("plane", "height"),
+    ("plane", "reach"),
+    ("drive", "offset"),
+    ("drive", "amplitude"),
+    ("drive", "angular_frequency"),
+    ("drive", "phase"),
+    ("drive", "scale"),
+)
 """Parameters that every model has besides those of its effects."""
 
 _ARGUMENTS = """
@@ -113,9 +120,15 @@ def total({arguments}
 
 @wp.func
 def wave(
-    P: wp.array(dtype=wp.float64), layout: wp.array2d(dtype=wp.int32), first: int, k: int, w: int,
-    series_times: wp.array(dtype=wp.float64), series_values: wp.array2d(dtype=wp.float64), t: wp.float64,
-):  # fmt: skip
+    P: wp.array(dtype=wp.float64),
+    layout: wp.array2d(dtype=wp.int32),
+    first: int,
+    k: int,
+    w: int,
+    series_times: wp.array(dtype=wp.float64),
+    series_values: wp.array2d(dtype=wp.float64),
+    t: wp.float64,
+):
     """Drive channel k at time t: offset + amplitude sin(omega t + phase) + scale * sampled series."""
     value = P[layout[first, 0] + k * layout[first, 1] + w * layout[first, 2]]
     amplitude = P[layout[first + 1, 0] + k * layout[first + 1, 1] + w * layout[first + 1, 2]]
@@ -505,8 +518,13 @@ def compose(names: tuple[str, ...]) -> Program:
     # warp reads the source of a kernel through inspect, which looks here first
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     scope = {
-        "__name__": module, "wp": wp, "scalar": wp.float64, "vec3": wp.vec3d, "kinematics": kinematics, "wave": wave,
-    }  # fmt: skip
+        "__name__": module,
+        "wp": wp,
+        "scalar": wp.float64,
+        "vec3": wp.vec3d,
+        "kinematics": kinematics,
+        "wave": wave,
+    }
     for e in effects:
         scope[f"{e.name}_force"] = e.force
         if e.energy is not None:

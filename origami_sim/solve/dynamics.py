@@ -84,10 +84,18 @@ class Trajectory:
 
 
 def simulate(
-    model: Model, parameters: Parameters, drive: Drive | None = None, *, duration: float, rate: float = 60.0,
-    dt: float | None = None, state: State | None = None, device: str = "cpu", threads: int | None = None,
+    model: Model,
+    parameters: Parameters,
+    drive: Drive | None = None,
+    *,
+    duration: float,
+    rate: float = 60.0,
+    dt: float | None = None,
+    state: State | None = None,
+    device: str = "cpu",
+    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:
     """Simulates all worlds that the parameters and the drive describe.
 
     Velocity-Verlet (kick, drift, kick), second order and symplectic without damping; forces that depend on velocity
@@ -117,8 +125,12 @@ def simulate(
     step = frame_time / substeps
     frames = round(duration * rate)
     if frames < 1:
-        raise InputError("the run is shorter than one frame", field="duration", value=duration,
-                         allowed=f">= {frame_time:g} s at this rate")  # fmt: skip
+        raise InputError(
+            "the run is shorter than one frame",
+            field="duration",
+            value=duration,
+            allowed=f">= {frame_time:g} s at this rate",
+        )
     if state is None:
         worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()))
         state = State.at_rest(model, worlds)
@@ -146,8 +158,12 @@ def simulate(
     ]
     zero = np.zeros((len(model.position), last.worlds, 3))
     return Trajectory(
-        model=model, parameters=parameters, drive=drive, times=(first + np.arange(frames + 1) * substeps) * step,
-        x=np.stack([s.x for s, _ in record]), v=np.stack([s.v for s, _ in record]),
+        model=model,
+        parameters=parameters,
+        drive=drive,
+        times=(first + np.arange(frames + 1) * substeps) * step,
+        x=np.stack([s.x for s, _ in record]),
+        v=np.stack([s.v for s, _ in record]),
         angles=np.stack([e.angles for _, e in record]),
         energies={
             "kinetic": np.stack([e.kinetic for _, e in record]),
@@ -156,8 +172,12 @@ def simulate(
         work={n: np.stack([s.work[i] for s, _ in record]) for i, n in enumerate(model.effects)},
         gaps=np.stack([e.gaps for _, e in record]),
         contact_forces=np.stack([sum((e.forces[c] for c in contact), zero) for _, e in record]),
-        failures=failures, dt=step, step=chosen, state=last, wall=wall,
-    )  # fmt: skip
+        failures=failures,
+        dt=step,
+        step=chosen,
+        state=last,
+        wall=wall,
+    )
 
 
 def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) -> str:

@@ -119,9 +119,14 @@ class Path:
 
 
 def tangent(
-    model: Model, parameters: Parameters, drive: Drive | None = None, *, time: float = 0.0, state: State | None = None,
+    model: Model,
+    parameters: Parameters,
+    drive: Drive | None = None,
+    *,
+    time: float = 0.0,
+    state: State | None = None,
     world: int = 0,
-) -> sp.csr_array:  # fmt: skip
+) -> sp.csr_array:
     """Tangent stiffness K = -dF/dx at a state [3 N, 3 N] [N/m], row 3 n + axis; columns of held axes are empty.
 
     Raises:
@@ -132,9 +137,17 @@ def tangent(
 
 
 def equilibrium(
-    model: Model, parameters: Parameters, drive: Drive | None = None, *, time: float = 0.0, state: State | None = None,
-    world: int = 0, tolerance: float = 1e-10, max_iterations: int = 300, unstable: bool = False,
-) -> Equilibrium:  # fmt: skip
+    model: Model,
+    parameters: Parameters,
+    drive: Drive | None = None,
+    *,
+    time: float = 0.0,
+    state: State | None = None,
+    world: int = 0,
+    tolerance: float = 1e-10,
+    max_iterations: int = 300,
+    unstable: bool = False,
+) -> Equilibrium:
     """Finds the equilibrium that a state settles into, with the drive held at its value at one instant.
 
     Newton with a tangent that is shifted until it is positive definite, so that steps go downhill and leave saddles
@@ -168,11 +181,22 @@ def equilibrium(
 
 
 def continuation(
-    model: Model, parameters: Parameters, drive: Drive, *, base: Drive | None = None, time: float = 0.0,
-    start: float = 0.0, end: float = 1.0, step: float | None = None, move: float | None = None,
-    state: State | None = None, world: int = 0, tolerance: float = 1e-10, max_points: int = 200,
+    model: Model,
+    parameters: Parameters,
+    drive: Drive,
+    *,
+    base: Drive | None = None,
+    time: float = 0.0,
+    start: float = 0.0,
+    end: float = 1.0,
+    step: float | None = None,
+    move: float | None = None,
+    state: State | None = None,
+    world: int = 0,
+    tolerance: float = 1e-10,
+    max_points: int = 200,
     stop: Callable[[float, np.ndarray], bool] | None = None,
-) -> Path:  # fmt: skip
+) -> Path:
     """Follows equilibria under proportional loading, through limit points.
 
     Every channel of the drive is base + factor (drive - base), at one instant; `base` is no drive unless given, so
@@ -194,8 +218,12 @@ def continuation(
     began = clock.perf_counter()
     span = abs(end - start)
     if not (span > 0 and max(abs(start), abs(end)) < FURTHEST):
-        raise InputError("a path needs a finite start and another end", field="end", value=end,
-                         allowed=f"not {start}, within +-{FURTHEST:g}")  # fmt: skip
+        raise InputError(
+            "a path needs a finite start and another end",
+            field="end",
+            value=end,
+            allowed=f"not {start}, within +-{FURTHEST:g}",
+        )
     _positive(tolerance=tolerance, max_points=max_points, step=step or 1.0, move=move or 1.0)
     worlds = [_fixed(d, time, world) for d in (base or Drive(), drive)]
     system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
@@ -489,10 +517,20 @@ class _System:
             message = f"{kind} equilibrium after {len(history)} iterations, residual {residual:.3g} N"
             message += f", {neutral} neutral modes." if neutral else "."
         return Equilibrium(
-            state=_resting(self.state, x, angles), angles=angles, residual=residual, tolerance=target,
-            iterations=len(history), history=np.array(history), converged=converged, stable=stable, eigenvalues=values,
-            neutral=neutral, mode=mode, reactions=np.where(self.model.free > 0, 0.0, -f), message=message,
-        )  # fmt: skip
+            state=_resting(self.state, x, angles),
+            angles=angles,
+            residual=residual,
+            tolerance=target,
+            iterations=len(history),
+            history=np.array(history),
+            converged=converged,
+            stable=stable,
+            eigenvalues=values,
+            neutral=neutral,
+            mode=mode,
+            reactions=np.where(self.model.free > 0, 0.0, -f),
+            message=message,
+        )
 
     def _worst(self, f: np.ndarray) -> int:
         return int(self.free[np.abs(f.ravel()[self.free]).argmax()] // 3)
@@ -676,10 +714,16 @@ class _Tracer:
         near = {i + d for i in limits for d in (-1, 0)}
         branches = [i for i in range(len(points) - 1) if negative[i] != negative[i + 1] and i not in near]
         return Path(
-            factor=np.array([p.factor for p in points]), arc=np.array([p.arc for p in points]),
+            factor=np.array([p.factor for p in points]),
+            arc=np.array([p.arc for p in points]),
             x=np.array([p.x for p in points]).reshape(-1, n, 3),
-            angles=np.array([p.angles for p in points]).reshape(len(points), -1), stable=negative == 0,
+            angles=np.array([p.angles for p in points]).reshape(len(points), -1),
+            stable=negative == 0,
             negative=negative,
-            lowest=np.array([v[0] for v in spectra]), limit_points=np.array(limits, int),
-            branch_points=np.array(branches, int), reached=reached, message=message, start=s.state,
-        )  # fmt: skip
+            lowest=np.array([v[0] for v in spectra]),
+            limit_points=np.array(limits, int),
+            branch_points=np.array(branches, int),
+            reached=reached,
+            message=message,
+            start=s.state,
+        )

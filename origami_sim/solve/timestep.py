@@ -72,8 +72,12 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     n, worlds = len(model.position), parameters.worlds
     for owner, name in parameters:
         if (given := parameters[owner, name].shape[1]) not in (1, worlds):
-            raise InputError("parameters are given for different numbers of worlds", field=f"{owner}.{name}",
-                             value=given, allowed=f"1 or {worlds}")  # fmt: skip
+            raise InputError(
+                "parameters are given for different numbers of worlds",
+                field=f"{owner}.{name}",
+                value=given,
+                allowed=f"1 or {worlds}",
+            )
     free = model.free.any(axis=1)
     sums = {"stiffness": np.zeros((n, worlds)), "damping": np.zeros((n, worlds))}
     largest = np.zeros((n, worlds))

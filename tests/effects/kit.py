@@ -12,8 +12,22 @@ INTERNAL = ("bar", "crease", "bend")
 """Families whose forces act between nodes: no net force, no net torque."""
 
 
-def make_model(position, *, bars=(), creases=(), bends=(), triangles=(), contacts=(), weights=None, offsets=None,
-               axes=None, free=None, effects=ALL, electrodes=None, names=None) -> Model:  # fmt: skip
+def make_model(
+    position,
+    *,
+    bars=(),
+    creases=(),
+    bends=(),
+    triangles=(),
+    contacts=(),
+    weights=None,
+    offsets=None,
+    axes=None,
+    free=None,
+    effects=ALL,
+    electrodes=None,
+    names=None,
+) -> Model:
     """A model from lists; contact points sit on the first corner of their triangle unless weights are given."""
 
     def indices(a, columns):
@@ -22,15 +36,21 @@ def make_model(position, *, bars=(), creases=(), bends=(), triangles=(), contact
     position = np.asarray(position, float)
     contacts, k, h = indices(contacts, 3), len(contacts), len(creases) + len(bends)
     return Model(
-        position=position, free=np.ones_like(position) if free is None else np.asarray(free, float),
-        bars=indices(bars, 2), creases=indices(creases, 4), bends=indices(bends, 4), triangles=indices(triangles, 3),
-        triangle_panel=np.zeros(len(triangles), np.int32), contacts=contacts,
+        position=position,
+        free=np.ones_like(position) if free is None else np.asarray(free, float),
+        bars=indices(bars, 2),
+        creases=indices(creases, 4),
+        bends=indices(bends, 4),
+        triangles=indices(triangles, 3),
+        triangle_panel=np.zeros(len(triangles), np.int32),
+        contacts=contacts,
         contact_weights=np.tile([1.0, 0, 0], (k, 1)) if weights is None else np.asarray(weights, float),
         contact_offsets=np.zeros(k) if offsets is None else np.asarray(offsets, float),
         contact_axes=np.zeros((k, 3)) if axes is None else np.asarray(axes, float),
         electrodes=np.zeros(h, np.int32) if electrodes is None else np.asarray(electrodes, np.int32),
-        effects=effects, names=names or {},
-    )  # fmt: skip
+        effects=effects,
+        names=names or {},
+    )
 
 
 def quiet(model: Model, values=None) -> Parameters:
@@ -54,15 +74,21 @@ def hinge_positions(angle, left=(0.4, 0.9), right=(0.6, 0.8)) -> np.ndarray:
 
     `left` and `right` are the place of the apex along the axis j-k of unit length, and its distance from it.
     """
-    return np.array([
-        [right[0], -right[1], 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0],
-        [left[0], left[1] * math.cos(angle), left[1] * math.sin(angle)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [right[0], -right[1], 0.0],
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [left[0], left[1] * math.cos(angle), left[1] * math.sin(angle)],
+        ]
+    )
 
 
 HINGE = {
-    "bars": [(0, 1), (0, 2), (1, 2), (3, 1), (3, 2)], "creases": [(0, 1, 2, 3)], "triangles": [(1, 2, 3), (1, 0, 2)],
-}  # fmt: skip
+    "bars": [(0, 1), (0, 2), (1, 2), (3, 1), (3, 2)],
+    "creases": [(0, 1, 2, 3)],
+    "triangles": [(1, 2, 3), (1, 0, 2)],
+}
 
 
 def hinge(angle=0.0, *, held=(), **options) -> Model:
@@ -86,10 +112,18 @@ def strip(n=4, *, effects=ALL, height=0.0, electrodes=None) -> Model:
             creases.append((d, a, b, a - 2))
     contacts = [triangles[0], triangles[1], triangles[-1]]
     return make_model(
-        x, bars=sorted(bars), creases=creases, bends=bends, triangles=triangles, contacts=contacts,
-        weights=[[1 / 3, 1 / 3, 1 / 3], [0.2, 0.3, 0.5], [0.6, 0.3, 0.1]], offsets=[-0.05, 0.1, -0.02],
-        axes=[[-1.0, 1, 0]] * 3, effects=effects, electrodes=electrodes,
-    )  # fmt: skip
+        x,
+        bars=sorted(bars),
+        creases=creases,
+        bends=bends,
+        triangles=triangles,
+        contacts=contacts,
+        weights=[[1 / 3, 1 / 3, 1 / 3], [0.2, 0.3, 0.5], [0.6, 0.3, 0.1]],
+        offsets=[-0.05, 0.1, -0.02],
+        axes=[[-1.0, 1, 0]] * 3,
+        effects=effects,
+        electrodes=electrodes,
+    )
 
 
 def random_rotation(rng) -> np.ndarray:

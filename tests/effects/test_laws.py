@@ -104,8 +104,9 @@ def test_crease_and_panel_bending_are_linear():
     values = {("crease", "stiffness"): 0.7, ("crease", "rest_angle"): 0.4}
     assert hinge_moment("crease", values, angles) == pytest.approx(-0.7 * (angles - 0.4), abs=1e-13)
     model = hinge(creases=(), bends=[(0, 1, 2, 3)])
-    f = report(model, {("panel_bending", "stiffness"): 0.7, ("panel_bending", "rest_angle"): 0.4},
-               x=hinge_positions(1.0)).forces["panel_bending"][3, 0]  # fmt: skip
+    f = report(
+        model, {("panel_bending", "stiffness"): 0.7, ("panel_bending", "rest_angle"): 0.4}, x=hinge_positions(1.0)
+    ).forces["panel_bending"][3, 0]
     assert LEVER * np.linalg.norm(f) == pytest.approx(0.7 * 0.6, rel=1e-13)
 
 
@@ -161,12 +162,18 @@ def test_crease_stop_holds_against_a_strong_closing_moment():
     """The fold settles where the barrier balances the moment, short of pi."""
     closing = 0.5
     model = hinge(0.5, held=(0, 1, 2), bars=[(3, 1), (3, 2)])
-    p = quiet(model, {
-        ("bars", "stiffness"): 2e3, ("bars", "rest_length"): lengths(model), ("inertia", "mass"): 0.01,
-        ("crease_viscosity", "viscosity"): 0.3,
-        **under("crease_stop", stop_stiffness=1.0, stop_angle=2.8),
-        **under("maxwell_stress", **UNIT_STACK), ("maxwell_stress", "width"): closing,
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 2e3,
+            ("bars", "rest_length"): lengths(model),
+            ("inertia", "mass"): 0.01,
+            ("crease_viscosity", "viscosity"): 0.3,
+            **under("crease_stop", stop_stiffness=1.0, stop_angle=2.8),
+            **under("maxwell_stress", **UNIT_STACK),
+            ("maxwell_stress", "width"): closing,
+        },
+    )
     run = simulate(model, p, Drive(voltage=UNIT_VOLTAGE), duration=3.0, rate=50)
     expected = brentq(lambda a: stop_moment(a, 1.0, 2.8) + closing, 2.8, math.pi)
     assert run.creases.max() < math.pi
@@ -202,8 +209,10 @@ def test_thinning_excess_is_that_of_stretched_layers(side):
         kappa = side * angle / length
         p0 = 4.7 * EPS0 * (volts / t) ** 2
         total = side * 0.5 * 0.015 * sum(p0 * (1 + kappa * h) ** 2 * t * (h - zn) for h in z)
-        both = [hinge_moment(n, {**flat, **thin}, angle, Drive(voltage=volts))[0]
-                for n in ("maxwell_stress", "thickness_thinning")]  # fmt: skip
+        both = [
+            hinge_moment(n, {**flat, **thin}, angle, Drive(voltage=volts))[0]
+            for n in ("maxwell_stress", "thickness_thinning")
+        ]
         assert sum(both) == pytest.approx(total, rel=1e-12)
         ratio = both[1] / both[0]
         stack_height = first + 6 * t
@@ -319,8 +328,12 @@ def test_air_drag_of_a_plate():
 
 def test_loads_weights_and_mass_damping():
     model = make_model([[0, 0, 0.0]])
-    values = {("load", "force_x"): 2.0, ("gravity", "gravity_z"): -9.80665, ("inertia", "mass"): 0.3,
-              ("mass_damping", "decay_rate"): 1.5}  # fmt: skip
+    values = {
+        ("load", "force_x"): 2.0,
+        ("gravity", "gravity_z"): -9.80665,
+        ("inertia", "mass"): 0.3,
+        ("mass_damping", "decay_rate"): 1.5,
+    }
     f = report(model, values, drive=Drive(load=-0.4), v=[[0.0, 7.0, 0.0]]).forces
     assert f["load"][0, 0] == pytest.approx([-0.8, 0, 0])
     assert f["gravity"][0, 0] == pytest.approx([0, 0, -0.3 * 9.80665])

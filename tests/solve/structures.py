@@ -14,12 +14,20 @@ def model_of(position, effects, *, bars=(), creases=(), triangles=(), held=()) -
     for h in held:
         free[h] = 0.0
     return Model(
-        position=position, free=free, bars=np.array(bars, int).reshape(-1, 2),
-        creases=np.array(creases, int).reshape(-1, 4), bends=np.zeros((0, 4), int),
-        triangles=np.array(triangles, int).reshape(-1, 3), triangle_panel=np.arange(len(triangles)),
-        contacts=np.zeros((0, 3), int), contact_weights=np.zeros((0, 3)), contact_offsets=np.zeros(0),
-        contact_axes=np.zeros((0, 3)), electrodes=np.zeros(len(creases), int), effects=tuple(effects),
-    )  # fmt: skip
+        position=position,
+        free=free,
+        bars=np.array(bars, int).reshape(-1, 2),
+        creases=np.array(creases, int).reshape(-1, 4),
+        bends=np.zeros((0, 4), int),
+        triangles=np.array(triangles, int).reshape(-1, 3),
+        triangle_panel=np.arange(len(triangles)),
+        contacts=np.zeros((0, 3), int),
+        contact_weights=np.zeros((0, 3)),
+        contact_offsets=np.zeros(0),
+        contact_axes=np.zeros((0, 3)),
+        electrodes=np.zeros(len(creases), int),
+        effects=tuple(effects),
+    )
 
 
 def lengths(model: Model) -> np.ndarray:
@@ -52,15 +60,23 @@ def kresling() -> tuple[Model, Parameters]:
         triangles += [(i, j, j + n), (i, j + n, i + n)]
     edges, creases = hinges_of(triangles)
     effects = ("ogden_bars", "crease", "crease_stop", "load")
-    model = model_of(np.concatenate([ring, upper]), effects, bars=edges, creases=creases, triangles=triangles,
-                     held=range(n))  # fmt: skip
+    model = model_of(
+        np.concatenate([ring, upper]), effects, bars=edges, creases=creases, triangles=triangles, held=range(n)
+    )
     x = model.position
     axis = np.linalg.norm(x[model.creases[:, 2]] - x[model.creases[:, 1]], axis=-1)
-    parameters = Parameters(model, {
-        ("ogden_bars", "area"): 0.1, ("ogden_bars", "modulus"): 5e3, ("ogden_bars", "rest_length"): lengths(model),
-        ("crease", "stiffness"): 1e-3 * axis, ("crease", "rest_angle"): dihedral_angles(x, model.creases),
-        ("crease_stop", "stop_stiffness"): 1e-3 * axis, ("crease_stop", "stop_angle"): 0.75 * np.pi,
-    })  # fmt: skip
+    parameters = Parameters(
+        model,
+        {
+            ("ogden_bars", "area"): 0.1,
+            ("ogden_bars", "modulus"): 5e3,
+            ("ogden_bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): 1e-3 * axis,
+            ("crease", "rest_angle"): dihedral_angles(x, model.creases),
+            ("crease_stop", "stop_stiffness"): 1e-3 * axis,
+            ("crease_stop", "stop_angle"): 0.75 * np.pi,
+        },
+    )
     parameters.set("load", "force_z", -1.0, entities=np.arange(n, 2 * n))
     return model, parameters
 
@@ -82,25 +98,47 @@ def tent(side=0.02, stiffness=500.0) -> tuple[Model, Parameters]:
     triangles = [(0, 2, 3), (0, 3, 1), (0, 1, 5), (0, 5, 4)]
     edges, creases = hinges_of(triangles)
     model = model_of(x, ("bars", "crease", "gravity", "ground"), bars=edges, creases=creases, triangles=triangles)
-    model = replace(model, contacts=np.array([(2, 3, 0), (3, 2, 0), (4, 5, 0), (5, 4, 0)]),
-                    contact_weights=np.tile([1.0, 0, 0], (4, 1)), contact_offsets=np.zeros(4),
-                    contact_axes=np.zeros((4, 3)))  # fmt: skip
-    return model, Parameters(model, {
-        ("bars", "stiffness"): 1e4, ("bars", "rest_length"): lengths(model), ("crease", "stiffness"): 0.05,
-        ("crease", "rest_angle"): dihedral_angles(model.position, model.creases), ("inertia", "mass"): 1e-3,
-        ("ground", "stiffness"): stiffness, ("plane", "reach"): 1.0,
-    })  # fmt: skip
+    model = replace(
+        model,
+        contacts=np.array([(2, 3, 0), (3, 2, 0), (4, 5, 0), (5, 4, 0)]),
+        contact_weights=np.tile([1.0, 0, 0], (4, 1)),
+        contact_offsets=np.zeros(4),
+        contact_axes=np.zeros((4, 3)),
+    )
+    return model, Parameters(
+        model,
+        {
+            ("bars", "stiffness"): 1e4,
+            ("bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): 0.05,
+            ("crease", "rest_angle"): dihedral_angles(model.position, model.creases),
+            ("inertia", "mass"): 1e-3,
+            ("ground", "stiffness"): stiffness,
+            ("plane", "reach"): 1.0,
+        },
+    )
 
 
 def flap(*, side=0.02, stiffness=0.02, membrane=1e3, free=False) -> tuple[Model, Parameters]:
     """A triangle hinged on the y axis to another one, which is held unless `free`; it points along x."""
     x = [(0, 0, 0), (0, side, 0), (side, side / 2, 0), (-side, side / 2, 0)]
     # from node 1 to node 0 (towards -y) the left side is +x
-    model = model_of(x, PLAIN, bars=[(0, 1), (0, 2), (1, 2), (0, 3), (1, 3)], creases=[(3, 1, 0, 2)],
-                     triangles=[(0, 2, 1)], held=() if free else (0, 1, 3))  # fmt: skip
-    parameters = Parameters(model, {
-        ("bars", "stiffness"): membrane, ("bars", "rest_length"): lengths(model), ("crease", "stiffness"): stiffness,
-    })  # fmt: skip
+    model = model_of(
+        x,
+        PLAIN,
+        bars=[(0, 1), (0, 2), (1, 2), (0, 3), (1, 3)],
+        creases=[(3, 1, 0, 2)],
+        triangles=[(0, 2, 1)],
+        held=() if free else (0, 1, 3),
+    )
+    parameters = Parameters(
+        model,
+        {
+            ("bars", "stiffness"): membrane,
+            ("bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): stiffness,
+        },
+    )
     return model, parameters
 
 
@@ -121,9 +159,13 @@ def strip(cells: int, *, length=1.0, width=0.1, rigidity=1.0, membrane=1e7) -> t
     across = np.abs(along[:, 0]) < 1e-12
     stiffness = np.where(across, rigidity / d, 1e4 * rigidity / d)
     stiffness[across & (model.creases[:, 1:3] == 2).any(axis=1)] *= 2
-    parameters = Parameters(model, {
-        ("bars", "stiffness"): membrane / lengths(model), ("bars", "rest_length"): lengths(model),
-        ("crease", "stiffness"): stiffness,
-    })  # fmt: skip
+    parameters = Parameters(
+        model,
+        {
+            ("bars", "stiffness"): membrane / lengths(model),
+            ("bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): stiffness,
+        },
+    )
     parameters.set("load", "force_z", -0.5, entities=[2 * cells + 2, 2 * cells + 3])
     return model, parameters

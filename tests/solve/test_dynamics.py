@@ -17,8 +17,15 @@ G = 9.80665
 
 def run(model, values, *, steps, dt, frames=1, drive=None, **options):
     """So many steps of dt, reported in so many frames."""
-    return simulate(model, values if hasattr(values, "worlds") else quiet(model, values), drive, dt=dt,
-                    duration=steps * dt, rate=frames / (steps * dt), **options)  # fmt: skip
+    return simulate(
+        model,
+        values if hasattr(values, "worlds") else quiet(model, values),
+        drive,
+        dt=dt,
+        duration=steps * dt,
+        rate=frames / (steps * dt),
+        **options,
+    )
 
 
 # --- energy -----------------------------------------------------------------------------------------------------------
@@ -27,10 +34,17 @@ def run(model, values, *, steps, dt, frames=1, drive=None, **options):
 def ringing_sheet():
     """A free sheet of bars, creases and bending lines, thrown into large motion."""
     model = strip(3)
-    p = quiet(model, {
-        ("bars", "stiffness"): 300.0, ("bars", "rest_length"): lengths(model), ("crease", "stiffness"): 3.0,
-        ("crease", "rest_angle"): 0.6, ("panel_bending", "stiffness"): 6.0, ("inertia", "mass"): 0.05,
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 300.0,
+            ("bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): 3.0,
+            ("crease", "rest_angle"): 0.6,
+            ("panel_bending", "stiffness"): 6.0,
+            ("inertia", "mass"): 0.05,
+        },
+    )
     v = 0.5 * np.random.default_rng(4).normal(size=model.position.shape)
     return model, p, start(model, v=v)
 
@@ -38,10 +52,16 @@ def ringing_sheet():
 def swinging_hinge():
     """A free hinge swinging over a radian: nonlinear, but its motion stays regular."""
     model = hinge(1.0)
-    p = quiet(model, {
-        ("bars", "stiffness"): 300.0, ("bars", "rest_length"): lengths(model), ("crease", "stiffness"): 3.0,
-        ("crease", "rest_angle"): 0.4, ("inertia", "mass"): 0.05,
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 300.0,
+            ("bars", "rest_length"): lengths(model),
+            ("crease", "stiffness"): 3.0,
+            ("crease", "rest_angle"): 0.4,
+            ("inertia", "mass"): 0.05,
+        },
+    )
     return model, p, start(model, v=0.3 * np.random.default_rng(4).normal(size=(4, 3)))
 
 
@@ -114,8 +134,13 @@ def test_energy_less_the_work_fed_in_is_kept():
 def test_projectile_is_exact():
     model = make_model([[0.0, 0, 0]])
     v = np.array([[1.0, -2.0, 3.0]])
-    r = simulate(model, quiet(model, {("gravity", "gravity_z"): -G, ("gravity", "gravity_x"): 0.4}),
-                 duration=2.0, rate=60, state=start(model, v=v))  # fmt: skip
+    r = simulate(
+        model,
+        quiet(model, {("gravity", "gravity_z"): -G, ("gravity", "gravity_x"): 0.4}),
+        duration=2.0,
+        rate=60,
+        state=start(model, v=v),
+    )
     t = r.times[:, None]
     assert np.abs(r.x[:, 0, 0] - (v * t + 0.5 * np.array([[0.4, 0, -G]]) * t**2)).max() < 1e-12
     assert np.abs(r.v[:, 0, 0] - (v + np.array([[0.4, 0, -G]]) * t)).max() < 1e-12
@@ -127,9 +152,7 @@ def test_damped_oscillator_converges_with_second_order():
     p = quiet(model, {("bars", "stiffness"): k, ("bar_viscosity", "viscosity"): c, ("inertia", "mass"): m})
     beta = c / (2 * m)
     omega = math.sqrt(k / m - beta**2)
-    exact = 1 + math.exp(-beta * end) * (
-        x0 * math.cos(omega * end) + (v0 + beta * x0) / omega * math.sin(omega * end)
-    )
+    exact = 1 + math.exp(-beta * end) * (x0 * math.cos(omega * end) + (v0 + beta * x0) / omega * math.sin(omega * end))
     counts = np.array([200, 400, 800, 1600])
     errors = []
     for n in counts:
@@ -151,8 +174,14 @@ def test_falling_plate_reaches_the_terminal_velocity_of_the_drag_law():
 
 def test_mass_damping_decays_exponentially():
     model = make_model([[0.0, 0, 0]])
-    r = simulate(model, quiet(model, {("mass_damping", "decay_rate"): 3.0}), duration=1.0, rate=10, dt=1e-4,
-                 state=start(model, v=[[1.0, 0, 0]]))  # fmt: skip
+    r = simulate(
+        model,
+        quiet(model, {("mass_damping", "decay_rate"): 3.0}),
+        duration=1.0,
+        rate=10,
+        dt=1e-4,
+        state=start(model, v=[[1.0, 0, 0]]),
+    )
     assert r.v[:, 0, 0, 0] == pytest.approx(np.exp(-3.0 * r.times), rel=3e-7)  # (alpha dt)^2 alpha t
 
 
@@ -170,10 +199,16 @@ def test_ring_down_has_the_logarithmic_decrement_of_kelvin_and_voigt():
     model = flap(0.0)
     inertia = m * 0.81
     c = 2 * zeta * math.sqrt(k * inertia)
-    p = quiet(model, {
-        ("bars", "stiffness"): 50.0, ("bars", "rest_length"): lengths(model), ("inertia", "mass"): m,
-        ("crease", "stiffness"): k, ("crease_viscosity", "viscosity"): c[None],
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 50.0,
+            ("bars", "rest_length"): lengths(model),
+            ("inertia", "mass"): m,
+            ("crease", "stiffness"): k,
+            ("crease_viscosity", "viscosity"): c[None],
+        },
+    )
     v = np.zeros((4, 3))
     v[3, 2] = 0.05
     period = 2 * math.pi / math.sqrt(k / inertia)
@@ -192,8 +227,14 @@ BRANCHES = ((0.5, 0.05), (0.8, 0.4), (0.3, 3.0))
 
 def relaxing():
     model = hinge(0.2, held=(0, 1, 2, 3), bars=())
-    p = quiet(model, {("crease_relaxation", f"{n}_{i + 1}"): b[j] for i, b in enumerate(BRANCHES)
-                      for j, n in enumerate(("stiffness", "time"))})  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("crease_relaxation", f"{n}_{i + 1}"): b[j]
+            for i, b in enumerate(BRANCHES)
+            for j, n in enumerate(("stiffness", "time"))
+        },
+    )
     return model, p
 
 
@@ -224,8 +265,10 @@ def test_prony_series_follows_a_ramp_with_second_order():
         y, z = x0[1:] + speed[1:] * t
         return (speed[2] * y - speed[1] * z) / (y * y + z * z)
 
-    exact = -sum(quad(lambda t, k=k, tau=tau: k * math.exp((t - end) / tau) * rate(t), 0, end, epsabs=1e-13)[0]
-                 for k, tau in BRANCHES)  # fmt: skip
+    exact = -sum(
+        quad(lambda t, k=k, tau=tau: k * math.exp((t - end) / tau) * rate(t), 0, end, epsabs=1e-13)[0]
+        for k, tau in BRANCHES
+    )
     v = np.zeros((4, 3))
     v[3] = speed
     counts = np.array([50, 100, 200, 400])
@@ -255,16 +298,24 @@ def test_angle_counts_turns_in_a_rollout():
 def plate(**options):
     """Three nodes falling flat, a contact point under each."""
     x = [[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0]]
-    return make_model(x, bars=[(0, 1), (1, 2), (2, 0)], triangles=[(0, 1, 2)],
-                      contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)], **options)  # fmt: skip
+    return make_model(
+        x, bars=[(0, 1), (1, 2), (2, 0)], triangles=[(0, 1, 2)], contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)], **options
+    )
 
 
 def test_undamped_bounce_returns_to_its_height_and_damped_one_with_the_restitution_of_its_dashpot():
     """e = exp(-beta / omega (pi - arctan(2 beta omega / (omega^2 - beta^2)))) for a dashpot that cannot pull."""
     m, k, zeta = 1e-3, 500.0, np.array([0.0, 0.05, 0.2, 0.5])
     model = plate()
-    p = quiet(model, {("inertia", "mass"): m, ("ground", "stiffness"): k, ("plane", "reach"): 1.0,
-                      ("ground", "damping"): (2 * zeta * math.sqrt(k * m))[None]})  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("inertia", "mass"): m,
+            ("ground", "stiffness"): k,
+            ("plane", "reach"): 1.0,
+            ("ground", "damping"): (2 * zeta * math.sqrt(k * m))[None],
+        },
+    )
     omega0 = math.sqrt(k / m)
     beta, omega = zeta * omega0, omega0 * np.sqrt(1 - zeta**2)
     restitution = np.exp(-beta / omega * (math.pi - np.arctan2(2 * beta * omega, omega**2 - beta**2)))
@@ -277,8 +328,15 @@ def test_undamped_bounce_returns_to_its_height_and_damped_one_with_the_restituti
 
 def test_drop_under_gravity_bounces_back_without_loss():
     model = plate()
-    p = quiet(model, {("inertia", "mass"): 1e-3, ("ground", "stiffness"): 800.0, ("plane", "reach"): 1.0,
-                      ("gravity", "gravity_z"): -G})  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("inertia", "mass"): 1e-3,
+            ("ground", "stiffness"): 800.0,
+            ("plane", "reach"): 1.0,
+            ("gravity", "gravity_z"): -G,
+        },
+    )
     height = 5e-3
     state = start(model, x=model.position + np.array([0, 0, height]))
     r = simulate(model, p, duration=1.0, rate=5000, dt=1e-5, state=state)
@@ -303,12 +361,19 @@ def block_on_a_slope(friction):
     edges = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
     model = make_model(x, bars=edges, triangles=[(0, 1, 2)], contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)])
     values = {
-        ("bars", "stiffness"): 3e3, ("bars", "rest_length"): lengths(model), ("bar_viscosity", "viscosity"): 0.3,
-        ("inertia", "mass"): 1e-3, ("gravity", "gravity_z"): -G,
-        ("plane", "tilt"): TILT, ("plane", "reach"): 1e-2, ("ground", "stiffness"): 1500.0, ("ground", "damping"): 0.8,
-        ("friction", "stiffness"): 1500.0, ("friction", "damping"): 0.8,
+        ("bars", "stiffness"): 3e3,
+        ("bars", "rest_length"): lengths(model),
+        ("bar_viscosity", "viscosity"): 0.3,
+        ("inertia", "mass"): 1e-3,
+        ("gravity", "gravity_z"): -G,
+        ("plane", "tilt"): TILT,
+        ("plane", "reach"): 1e-2,
+        ("ground", "stiffness"): 1500.0,
+        ("ground", "damping"): 0.8,
+        ("friction", "stiffness"): 1500.0,
+        ("friction", "damping"): 0.8,
         ("coulomb", "friction_coefficient"): np.atleast_2d(friction),
-    }  # fmt: skip
+    }
     return model, quiet(model, values), np.array([c, 0, s])
 
 
@@ -342,12 +407,21 @@ def test_directional_friction_brakes_forward_and_backward_sliding_differently():
     # the axis is node 0 -> node 1 for every foot, whatever corner its triangle starts with
     axes = np.array([[-1.0, 1, 0], [1, 0, -1], [0, -1, 1]])
     model = plate(axes=axes)
-    p = quiet(model, {
-        ("bars", "stiffness"): 1e3, ("bars", "rest_length"): lengths(model), ("inertia", "mass"): 1e-3,
-        ("gravity", "gravity_z"): -G, ("ground", "stiffness"): 1000.0, ("ground", "damping"): 0.5,
-        ("plane", "reach"): 1e-2, ("friction", "stiffness"): 1000.0, ("coulomb", "friction_coefficient"): mu,
-        ("directional_friction", "backward_excess"): excess,
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 1e3,
+            ("bars", "rest_length"): lengths(model),
+            ("inertia", "mass"): 1e-3,
+            ("gravity", "gravity_z"): -G,
+            ("ground", "stiffness"): 1000.0,
+            ("ground", "damping"): 0.5,
+            ("plane", "reach"): 1e-2,
+            ("friction", "stiffness"): 1000.0,
+            ("coulomb", "friction_coefficient"): mu,
+            ("directional_friction", "backward_excess"): excess,
+        },
+    )
     v = np.zeros((3, 3, 3))
     v[:, 0, 0], v[:, 1, 0], v[:, 2, 1] = 1.0, -1.0, 1.0
     x = model.position - [0, 0, 1e-3 * G / 1000.0]  # in its static imprint
@@ -361,12 +435,21 @@ def test_adhesion_lets_go_at_its_pull_off_force():
     pull_off = 0.05
     pull = np.linspace(0.9, 1.1, 21)
     model = plate()
-    p = quiet(model, {
-        ("bars", "stiffness"): 1e3, ("bars", "rest_length"): lengths(model), ("inertia", "mass"): 1e-3,
-        ("ground", "stiffness"): 2000.0, ("ground", "damping"): 1.0, ("mass_damping", "decay_rate"): 20.0,
-        ("adhesion", "pull_off"): pull_off, ("adhesion", "reach"): 5e-5, ("plane", "reach"): 1e-2,
-        ("load", "force_z"): pull_off * pull[None],
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 1e3,
+            ("bars", "rest_length"): lengths(model),
+            ("inertia", "mass"): 1e-3,
+            ("ground", "stiffness"): 2000.0,
+            ("ground", "damping"): 1.0,
+            ("mass_damping", "decay_rate"): 20.0,
+            ("adhesion", "pull_off"): pull_off,
+            ("adhesion", "reach"): 5e-5,
+            ("plane", "reach"): 1e-2,
+            ("load", "force_z"): pull_off * pull[None],
+        },
+    )
     r = simulate(model, p, Drive(load=ramp(1.0, 0.5)), duration=1.0, rate=20)
     lifted = r.x[-1, 0, :, 2] > 1e-4
     assert not r.failures
@@ -381,24 +464,42 @@ def busy(worlds):
     """A sheet that drops, is driven by field and voltage and rubs on the ground, different in every world."""
     rng = np.random.default_rng(9)
     model = strip(3, height=0.06)
-    p = quiet(model, {
-        ("bars", "stiffness"): 400.0, ("bars", "rest_length"): lengths(model), ("bar_viscosity", "viscosity"): 0.05,
-        ("crease", "stiffness"): rng.uniform(0.5, 2.0, (len(model.creases), worlds)),
-        ("crease", "rest_angle"): rng.uniform(-1, 1, (1, worlds)),
-        ("crease_table", "resisting_moment"): rng.uniform(-0.1, 0.1, (1, worlds, 33)),
-        ("panel_bending", "stiffness"): 4.0, ("crease_viscosity", "viscosity"): 0.01, ("inertia", "mass"): 0.05,
-        ("crease_relaxation", "stiffness_1"): 0.5, ("crease_relaxation", "time_1"): 0.1,
-        ("gravity", "gravity_z"): -G, ("ground", "stiffness"): 300.0, ("ground", "damping"): 0.5,
-        ("plane", "reach"): 0.1, ("friction", "stiffness"): 300.0,
-        ("coulomb", "friction_coefficient"): rng.uniform(0.1, 0.9, (1, worlds)),
-        ("directional_friction", "backward_excess"): 0.2,
-        ("magnetic_torque", "remanence"): 0.1, ("magnetic_torque", "volume"): 1e-6,
-        ("magnetic_torque", "poling_1"): rng.uniform(0.5, 1.5, (1, worlds)), ("air_drag", "drag_coefficient"): 1.0,
-        ("maxwell_stress", "layers"): 3.0, ("maxwell_stress", "lever"): 1e-3, ("maxwell_stress", "width"): 0.5,
-    })  # fmt: skip
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 400.0,
+            ("bars", "rest_length"): lengths(model),
+            ("bar_viscosity", "viscosity"): 0.05,
+            ("crease", "stiffness"): rng.uniform(0.5, 2.0, (len(model.creases), worlds)),
+            ("crease", "rest_angle"): rng.uniform(-1, 1, (1, worlds)),
+            ("crease_table", "resisting_moment"): rng.uniform(-0.1, 0.1, (1, worlds, 33)),
+            ("panel_bending", "stiffness"): 4.0,
+            ("crease_viscosity", "viscosity"): 0.01,
+            ("inertia", "mass"): 0.05,
+            ("crease_relaxation", "stiffness_1"): 0.5,
+            ("crease_relaxation", "time_1"): 0.1,
+            ("gravity", "gravity_z"): -G,
+            ("ground", "stiffness"): 300.0,
+            ("ground", "damping"): 0.5,
+            ("plane", "reach"): 0.1,
+            ("friction", "stiffness"): 300.0,
+            ("coulomb", "friction_coefficient"): rng.uniform(0.1, 0.9, (1, worlds)),
+            ("directional_friction", "backward_excess"): 0.2,
+            ("magnetic_torque", "remanence"): 0.1,
+            ("magnetic_torque", "volume"): 1e-6,
+            ("magnetic_torque", "poling_1"): rng.uniform(0.5, 1.5, (1, worlds)),
+            ("air_drag", "drag_coefficient"): 1.0,
+            ("maxwell_stress", "layers"): 3.0,
+            ("maxwell_stress", "lever"): 1e-3,
+            ("maxwell_stress", "width"): 0.5,
+        },
+    )
     times = np.linspace(0, 10, 301)
-    drive = Drive(field=(0.2, sine(rng.uniform(0.5, 2, worlds), 3.0), series(times, np.sin(7 * times))),
-                  voltage=sine(1000.0, 2.0), load=0.0)  # fmt: skip
+    drive = Drive(
+        field=(0.2, sine(rng.uniform(0.5, 2, worlds), 3.0), series(times, np.sin(7 * times))),
+        voltage=sine(1000.0, 2.0),
+        load=0.0,
+    )
     return model, p, drive
 
 

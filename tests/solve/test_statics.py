@@ -187,8 +187,12 @@ def _elastica(load: float) -> float:
     s = np.linspace(0, 1, 200)
     solution = solve_bvp(
         lambda s, y: np.stack([y[1], -load * np.cos(y[0]), np.sin(y[0])]),
-        lambda a, b: np.array([a[0], b[1], a[2]]), s, np.zeros((3, 200)), tol=1e-9, max_nodes=100_000,
-    )  # fmt: skip
+        lambda a, b: np.array([a[0], b[1], a[2]]),
+        s,
+        np.zeros((3, 200)),
+        tol=1e-9,
+        max_nodes=100_000,
+    )
     return solution.y[2, -1]
 
 
@@ -300,11 +304,17 @@ def _kresling_energy(h, r, turn):
 def _kresling_gradient(q):
     q, h = np.asarray(q, float), 1e-4
     steps = h * np.eye(len(q))
-    return np.array([
-        (8 * (_kresling_energy(*(q + s)) - _kresling_energy(*(q - s)))
-         - _kresling_energy(*(q + 2 * s)) + _kresling_energy(*(q - 2 * s))) / (12 * h)
-        for s in steps
-    ])  # fmt: skip
+    return np.array(
+        [
+            (
+                8 * (_kresling_energy(*(q + s)) - _kresling_energy(*(q - s)))
+                - _kresling_energy(*(q + 2 * s))
+                + _kresling_energy(*(q - 2 * s))
+            )
+            / (12 * h)
+            for s in steps
+        ]
+    )
 
 
 def test_kresling_snap_through():
@@ -344,7 +354,8 @@ def test_path_can_be_stopped_and_continued_from_its_states():
     model, parameters = truss(0.3)
     path = continuation(model, parameters, Drive(load=1.0), stop=lambda factor, x: x[2, 2] < 0)
     assert path.reached and path.x[-1, 2, 2] < 0 and path.factor[-1] < 0.5
-    again = continuation(model, parameters, Drive(load=1.0), start=path.factor[-1], end=-2.0, state=path.state(-1),
-                         max_points=3)  # fmt: skip
+    again = continuation(
+        model, parameters, Drive(load=1.0), start=path.factor[-1], end=-2.0, state=path.state(-1), max_points=3
+    )
     assert again.x[0, 2, 2] == pytest.approx(path.x[-1, 2, 2], abs=1e-9)
     assert not again.reached and "3 points" in again.message

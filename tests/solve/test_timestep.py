@@ -16,10 +16,14 @@ RNG = np.random.default_rng(7)
 
 def bars_only():
     model = strip(3)
-    return model, quiet(model, {
-        ("bars", "stiffness"): RNG.uniform(200, 4000, len(model.bars)), ("bars", "rest_length"): rest(model),
-        ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
-    })  # fmt: skip
+    return model, quiet(
+        model,
+        {
+            ("bars", "stiffness"): RNG.uniform(200, 4000, len(model.bars)),
+            ("bars", "rest_length"): rest(model),
+            ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
+        },
+    )
 
 
 def rest(model):
@@ -28,11 +32,14 @@ def rest(model):
 
 def hinges_only():
     model = strip(3)
-    return model, quiet(model, {
-        ("crease", "stiffness"): RNG.uniform(1, 5, len(model.creases)),
-        ("panel_bending", "stiffness"): RNG.uniform(1, 9, len(model.bends)),
-        ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
-    })  # fmt: skip
+    return model, quiet(
+        model,
+        {
+            ("crease", "stiffness"): RNG.uniform(1, 5, len(model.creases)),
+            ("panel_bending", "stiffness"): RNG.uniform(1, 9, len(model.bends)),
+            ("inertia", "mass"): RNG.uniform(0.01, 0.1, len(model.position)),
+        },
+    )
 
 
 def sheet():
@@ -43,7 +50,8 @@ def sheet():
 def damped_sheet():
     model, p = sheet()
     return model, p.set("crease_viscosity", "viscosity", 0.4).set("bar_viscosity", "viscosity", 4.0).set(
-        "mass_damping", "decay_rate", 30.0)  # fmt: skip
+        "mass_damping", "decay_rate", 30.0
+    )
 
 
 def viscous_hinges():
@@ -60,13 +68,23 @@ def contact():
     """Three nodes of bars resting on stiff ground with one offset contact point, pressed in."""
     x = [[0, 0, -0.011], [1, 0, -0.01], [0.2, 0.9, -0.012]]
     model = make_model(
-        x, bars=[(0, 1), (1, 2), (2, 0)], triangles=[(0, 1, 2)], contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)],
-        weights=[[1, 0, 0], [1, 0, 0], [0.6, 0.3, 0.1]], offsets=[0, 0, -0.05],
-    )  # fmt: skip
-    p = quiet(model, {
-        ("bars", "stiffness"): 100.0, ("bars", "rest_length"): rest(model), ("inertia", "mass"): 0.02,
-        ("ground", "stiffness"): [[3000.0], [2000.0], [1000.0]], ("plane", "reach"): 0.1,
-    })  # fmt: skip
+        x,
+        bars=[(0, 1), (1, 2), (2, 0)],
+        triangles=[(0, 1, 2)],
+        contacts=[(0, 1, 2), (1, 2, 0), (2, 0, 1)],
+        weights=[[1, 0, 0], [1, 0, 0], [0.6, 0.3, 0.1]],
+        offsets=[0, 0, -0.05],
+    )
+    p = quiet(
+        model,
+        {
+            ("bars", "stiffness"): 100.0,
+            ("bars", "rest_length"): rest(model),
+            ("inertia", "mass"): 0.02,
+            ("ground", "stiffness"): [[3000.0], [2000.0], [1000.0]],
+            ("plane", "reach"): 0.1,
+        },
+    )
     # pressed by just the forces that the ground gives back
     push = Batch(model, p, LOADED, start(model)).total_force(0.0)
     for a, f in zip("xyz", np.moveaxis(-push, 2, 0), strict=True):
@@ -154,10 +172,16 @@ def test_limit_of_the_flat_reference_holds_at_every_fold_angle(apexes, angle):
 def relaxing():
     """A hinge held together by its Maxwell branches alone."""
     model = hinge(0.3, held=(0, 1, 2), bars=())
-    return model, quiet(model, {
-        ("crease_relaxation", "stiffness_1"): 2.0, ("crease_relaxation", "stiffness_2"): 3.0,
-        ("crease_relaxation", "time_1"): 1e3, ("crease_relaxation", "time_2"): 0.5, ("inertia", "mass"): 0.01,
-    })  # fmt: skip
+    return model, quiet(
+        model,
+        {
+            ("crease_relaxation", "stiffness_1"): 2.0,
+            ("crease_relaxation", "stiffness_2"): 3.0,
+            ("crease_relaxation", "time_1"): 1e3,
+            ("crease_relaxation", "time_2"): 0.5,
+            ("inertia", "mass"): 0.01,
+        },
+    )
 
 
 def sticking():
@@ -166,10 +190,15 @@ def sticking():
     free = np.zeros_like(model.position)
     free[0, :2] = 1
     model = make_model(model.position, free=free, triangles=[(0, 1, 2)], contacts=[(0, 1, 2)])
-    return model, quiet(model, {
-        ("ground", "stiffness"): 300.0, ("coulomb", "friction_coefficient"): 5.0, ("friction", "stiffness"): 900.0,
-        ("inertia", "mass"): 0.01,
-    })  # fmt: skip
+    return model, quiet(
+        model,
+        {
+            ("ground", "stiffness"): 300.0,
+            ("coulomb", "friction_coefficient"): 5.0,
+            ("friction", "stiffness"): 900.0,
+            ("inertia", "mass"): 0.01,
+        },
+    )
 
 
 @pytest.mark.parametrize("case", [*UNDAMPED, *DAMPED, relaxing, sticking], ids=lambda c: c.__name__)
