@@ -1,6 +1,87 @@
-"""Discrete-hinge simulator for active origami."""
+"""Discrete-hinge simulator for active origami.
 
-import warp as _warp
+The names below are loaded when they are first used, so that the package imports quickly.
+"""
 
-_warp.config.log_level = _warp.LOG_ERROR
-_warp.config.enable_backward = False
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from origami_sim.build import Sheet
+    from origami_sim.drive import Drive, Signal, ramp, series, sine
+    from origami_sim.effects import CATALOGUE
+    from origami_sim.errors import InputError
+    from origami_sim.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
+    from origami_sim.model import Model, Parameters, State
+    from origami_sim.pattern import (
+        Pattern,
+        cross,
+        grid,
+        kresling,
+        miura,
+        read_fold,
+        read_mesh,
+        read_pattern,
+        read_svg,
+        strip,
+        triangulate,
+        waterbomb,
+        write_fold,
+        write_mesh,
+    )
+    from origami_sim.recording import Recording, read_recording
+    from origami_sim.replay import open_replay, screenshot, write_replay
+    from origami_sim.results import format_table, load_run, save_run
+    from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.solve.dynamics import Trajectory, simulate
+    from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
+    from origami_sim.solve.timestep import stable_step
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "build": "Sheet",
+    "drive": "Drive Signal ramp series sine",
+    "effects": "CATALOGUE",
+    "errors": "InputError",
+    "materials": "MATERIALS bridge_stiffness layered_rigidity material",
+    "model": "Model Parameters State",
+    "pattern": "Pattern cross grid kresling miura strip waterbomb triangulate "
+    "read_fold read_mesh read_pattern read_svg write_fold write_mesh",
+    "recording": "Recording read_recording",
+    "replay": "open_replay screenshot write_replay",
+    "results": "format_table load_run save_run",
+    "scene": "read_calibration scene_module",
+    "solve.dynamics": "Trajectory simulate",
+    "solve.statics": "Equilibrium Path continuation equilibrium",
+    "solve.timestep": "stable_step",
+}
+_MODULES = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+__all__ = [  # noqa: RUF022  (by what they are for)
+    # a sheet
+    "Pattern", "cross", "grid", "kresling", "miura", "strip", "waterbomb",
+    "read_pattern", "read_fold", "read_svg", "read_mesh", "write_fold", "write_mesh", "triangulate",
+    "Sheet", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
+    # a model and what drives it
+    "Model", "Parameters", "State", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
+    # solutions
+    "simulate", "Trajectory", "stable_step", "equilibrium", "Equilibrium", "continuation", "Path",
+    # results
+    "save_run", "load_run", "format_table", "write_replay", "open_replay", "screenshot",
+    # recordings and scenes
+    "Recording", "read_recording", "read_calibration", "scene_module",
+    "InputError",
+]  # fmt: skip
+
+
+def __getattr__(name: str):
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

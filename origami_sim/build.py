@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from origami_sim.effects import get
@@ -21,9 +22,10 @@ class Sheet:
     Args:
         pattern: crease pattern; its own thickness, materials, stiffness and rest angles are used where given.
         thickness: of all panels [m]. material: name in `MATERIALS`. modulus, density: override it [Pa], [kg/m^3].
-        triangulation: "center" (a node in the middle of each polygon; gives rectangles, parallelograms and triangles
-            exactly the mass, centre of mass and inertia of the panel) or "diagonal" (fewer nodes; the masses of a
-            panel sit at its corners, which is right for finely divided sheets).
+        triangulation: "center" (a node in the middle of each polygon of four or more corners; gives rectangles and
+            parallelograms exactly the mass, centre of mass and inertia of the panel, with a patch the inertia to some
+            per cent) or "diagonal" (fewer nodes; the masses of a panel sit at its corners, which is right for finely
+            divided sheets). Triangles have their mass at their corners: exact mass and centre, too large an inertia.
         membrane: factor on the membrane stiffness; below 1 it buys a longer time step (keep strains under a percent).
         membrane_damping: dashpots in the bars, as a ratio of critical.
 
@@ -49,8 +51,8 @@ class Sheet:
         self._names = [m or material for m in pattern.materials]
         chosen = [_material(n, i) for i, n in enumerate(self._names)]
         self.thickness = np.where(np.isnan(pattern.thickness), thickness, pattern.thickness)
-        self.modulus = np.array([modulus or m.modulus for m in chosen])
-        self.density = np.array([density or m.density for m in chosen])
+        self.modulus = np.array([m.modulus if modulus is None else modulus for m in chosen])
+        self.density = np.array([m.density if density is None else density for m in chosen])
         self.poisson = np.array([m.poisson for m in chosen])
         for name, value in (
             ("thickness", self.thickness),
@@ -58,18 +60,21 @@ class Sheet:
             ("density", self.density),
             ("membrane", np.array([membrane])),
         ):
-            if not np.all(value > 0) or not np.all(np.isfinite(value)):
+            if not np.all(_positive(value)):
                 raise InputError(
-                    "a panel property must be positive", field=name, value=float(value.min()), allowed="> 0"
+                    "a panel property must be positive", field=name, value=_first_bad(value), allowed="> 0"
                 )
-        if membrane_damping < 0:
-            raise InputError("a damping ratio cannot be negative", field="membrane_damping", value=membrane_damping)
+        if not 0 <= membrane_damping < np.inf:
+            raise InputError(
+                "a damping ratio cannot be negative", field="membrane_damping", value=membrane_damping, allowed=">= 0"
+            )
         self.membrane, self.membrane_damping = membrane, membrane_damping
         self._rigidity = np.full(faces, np.nan)
         self._patches: list[dict] = [{} for _ in range(faces)]
-        self._lumps: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+        self._lumps: dict[int, tuple[float, np.ndarray, float]] = {}
         self._extra_mass = np.zeros(len(self.mesh.vertices))
         self._free = np.ones((len(self.mesh.vertices), 3))
+        self._labels: dict[str, tuple[str, ...]] = {}
         self._contacts: list[tuple[int, np.ndarray, float, np.ndarray, str]] = []
         self._settings: list[tuple[str, str, object, object]] = []
         self._effects = ["bars"]
@@ -118,9 +123,12 @@ class Sheet:
             damping_ratio: instead of loss_time, a ratio of critical for the crease with the lighter panel swinging.
         """
         self.on("crease")
-        index = np.arange(len(self.mesh.creases)) if creases is None else np.atleast_1d(creases)
+        index = self._index("crease", creases)
+        for name, value in (("loss_time", loss_time), ("damping_ratio", damping_ratio)):
+            if value is not None and not 0 <= value < np.inf:
+                raise InputError("a loss cannot be negative", field=name, value=value, allowed=">= 0")
         if stiffness is not None:
-            if np.any(np.asarray(stiffness) < 0):
+            if not np.all(np.asarray(stiffness, float) >= 0):
                 raise InputError(
                     "a crease stiffness cannot be negative", field="stiffness", value=stiffness, allowed=">= 0"
                 )
@@ -134,7 +142,9 @@ class Sheet:
 
     def panel(self, panels, *, rigidity: float) -> "Sheet":
         """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
-        self._rigidity[np.atleast_1d(panels)] = rigidity
+        if not np.all(_positive(rigidity)):
+            raise InputError("a bending rigidity must be positive", field="rigidity", value=rigidity, allowed="> 0 N m")
+        self._rigidity[self._index("panel", panels)] = rigidity
         return self
 
     def patch(
@@ -142,9 +152,9 @@ class Sheet:
         panel: int,
         *,
         thickness: float,
-        poling: Sequence[float] = (0, 0, 0),
-        size: Sequence[float] | None = None,
-        centre: Sequence[float] | None = None,
+        poling: ArrayLike = (0, 0, 0),
+        size: ArrayLike | None = None,
+        centre: ArrayLike | None = None,
         material: str = "mae",
         remanence: float | None = None,
         density: float | None = None,
@@ -162,32 +172,40 @@ class Sheet:
         m = _material(material, panel)
         nodes = self._nodes_of(panel)
         box = self.mesh.vertices[nodes]
-        size = np.asarray(size if size is not None else np.ptp(box, axis=0)[:2], float)
-        if thickness <= 0 or np.any(size <= 0):
+        extent = np.asarray(np.ptp(box, axis=0)[:2] if size is None else size, float)
+        density = m.density if density is None else density
+        if side not in (1, -1):
+            raise InputError("a patch lies on one side", field="side", value=side, allowed="1 (top), -1 (below)")
+        if not np.all(_positive([thickness, *extent, density])):
             raise InputError(
-                "a patch needs positive dimensions", field="patch", value=[thickness, *size], allowed="> 0 m"
+                "a patch needs positive dimensions and density",
+                field=f"patch on panel {panel}",
+                value=[float(v) for v in (thickness, *extent, density)],
+                allowed="> 0",
             )
         self._patches[panel] = {
             "thickness": float(thickness),
-            "size": size,
+            "size": extent,
             "material": m,
             "side": side,
             "centre": np.asarray(centre, float) if centre is not None else self._centroid(panel),
-            "density": density or m.density,
+            "density": density,
         }
         direction = np.asarray(poling, float)
         if np.linalg.norm(direction) > 0:
             self.magnetise(
                 panel,
                 remanence=m.remanence if remanence is None else remanence,
-                volume=thickness * size[0] * size[1],
+                volume=thickness * extent[0] * extent[1],
                 poling=direction,
             )
         return self
 
-    def magnetise(self, panel: int, *, remanence: float, volume: float, poling: Sequence[float]) -> "Sheet":
+    def magnetise(self, panel: int, *, remanence: float, volume: float, poling: ArrayLike) -> "Sheet":
         """Remanence [T] of a volume of magnet [m^3] spread over a panel, along `poling` in the reference state."""
         d = np.asarray(poling, float)
+        if d.shape != (3,) or not np.linalg.norm(d) > 0 or not np.all(np.isfinite(d)):
+            raise InputError("a magnet needs a poling direction", field="poling", value=d.tolist(), allowed="x, y, z")
         d = d / np.linalg.norm(d)
         for t in self._triangles_of(panel):
             normal = self._area_vector[t] / self.area[t]
@@ -204,27 +222,35 @@ class Sheet:
             )
         return self
 
-    def rigid_body(self, panel: int, *, mass: float, centre: Sequence[float], inertia: float) -> "Sheet":
+    def rigid_body(self, panel: int, *, mass: float, centre: ArrayLike, inertia: float) -> "Sheet":
         """Gives a panel the mass [kg], centre of mass [m] and in-plane second moment [kg m^2] of a measured body.
 
         `inertia` is that about an axis through the centre of mass across the panel's longer side.
         """
-        self._lumps[panel] = (mass, np.asarray(centre, float), np.array([inertia, 0.0]))
+        for name, value, unit in (("mass", mass, "kg"), ("inertia", inertia, "kg m^2")):
+            if not np.all(_positive(value)):
+                raise InputError("a rigid body needs it positive", field=name, value=value, allowed=f"> 0 {unit}")
+        self._triangles_of(panel)
+        self._lumps[panel] = (mass, np.asarray(centre, float), inertia)
         return self
 
     def mass(self, nodes, mass: float) -> "Sheet":
         """Adds point masses [kg]."""
-        self._extra_mass[np.atleast_1d(nodes)] += mass
+        if not np.all(np.asarray(mass, float) >= 0):
+            raise InputError("a mass cannot be negative", field="mass", value=mass, allowed=">= 0 kg")
+        np.add.at(self._extra_mass, self._index("node", nodes), mass)
         return self
 
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
         """Holds panels or nodes along the named axes."""
-        index = [*nodes, *(n for p in panels for n in self._nodes_of(p))]
+        index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
         for a in axes:
+            if a not in "xyz":
+                raise InputError("there is no such axis", field="axes", value=a, allowed="x, y, z")
             self._free[index, "xyz".index(a)] = 0.0
         return self
 
-    def gravity(self, acceleration: Sequence[float] = (0.0, 0.0, -9.80665)) -> "Sheet":
+    def gravity(self, acceleration: Sequence[float] | np.ndarray = (0.0, 0.0, -9.80665)) -> "Sheet":
         """Weight of sheet and patches; acceleration [m/s^2]."""
         gx, gy, gz = acceleration
         self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
@@ -235,10 +261,10 @@ class Sheet:
     def contact(
         self,
         panel: int,
-        point: Sequence[float],
+        point: ArrayLike,
         *,
         offset: float = 0.0,
-        axis: Sequence[float] = (1, 0, 0),
+        axis: ArrayLike = (1, 0, 0),
         name: str | None = None,
     ) -> int:
         """Adds a point that can touch the ground and returns its index.
@@ -249,13 +275,10 @@ class Sheet:
             axis: the body's forward direction in the reference state, for directional friction.
         """
         p, d = np.asarray(point, float), np.asarray(axis, float)
-        best, weights = None, None
-        for t in self._triangles_of(panel):
-            w = self._barycentric(t, p)
-            if best is None or w.min() > weights.min():
-                best, weights = t, w
-        if best is None or weights.min() < -1e-6:
-            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=list(point))
+        candidates = [(int(t), self._barycentric(t, p)) for t in self._triangles_of(panel)]
+        best, weights = max(candidates, key=lambda c: c[1].min())
+        if not weights.min() >= -1e-6:
+            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=p.tolist())
         a, b = self._edge_weights(best, d)
         self._contacts.append(
             (best, weights, offset, np.array([-a - b, a, b]), name or f"contact {len(self._contacts)}")
@@ -264,7 +287,20 @@ class Sheet:
 
     def electrode(self, group: int, *, creases=()) -> "Sheet":
         """Assigns creases to an electrode group."""
-        self._electrodes[np.atleast_1d(creases)] = group
+        self._electrodes[self._index("crease", creases)] = group
+        return self
+
+    def name(self, family: str, labels: Sequence[str]) -> "Sheet":
+        """Labels of all entities of a family ("panel", "crease", "node"), for reports and attachments.
+
+        Contact points are labelled by `contact`.
+        """
+        counts = self._counts()
+        if family not in counts:
+            raise InputError("there is no such family", field="family", value=family, allowed=", ".join(counts))
+        if len(labels) != counts[family]:
+            raise InputError("wrong number of labels", field=family, value=len(labels), allowed=str(counts[family]))
+        self._labels[family] = tuple(labels)
         return self
 
     # the model --------------------------------------------------------------------------------------------------
@@ -296,7 +332,7 @@ class Sheet:
             contact_axes=np.array([c[3] for c in self._contacts]).reshape(-1, 3),
             electrodes=self._electrodes,
             effects=tuple(self._effects),
-            names={"contact": tuple(c[4] for c in self._contacts)},
+            names={**self._labels, "contact": tuple(c[4] for c in self._contacts)},
         )
         p = Parameters(model)
         mass = self._node_masses()
@@ -326,6 +362,21 @@ class Sheet:
         return model, p
 
     # geometry -----------------------------------------------------------------------------------------------------
+
+    def _counts(self) -> dict[str, int]:
+        mesh = self.mesh
+        return {"panel": self.pattern.face_count, "crease": len(mesh.creases), "node": len(mesh.vertices)}
+
+    def _index(self, family: str, chosen: ArrayLike | None) -> np.ndarray:
+        """Indices of some entities of a family, or of all."""
+        count = self._counts()[family]
+        if chosen is None:
+            return np.arange(count)
+        index = np.atleast_1d(np.asarray(chosen, int)) if np.size(chosen) else np.zeros(0, int)
+        bad = index[(index < 0) | (index >= count)]
+        if len(bad):
+            raise InputError(f"there is no such {family}", field=family, value=int(bad[0]), allowed=f"0 to {count - 1}")
+        return index
 
     def _triangles_of(self, panel: int) -> np.ndarray:
         if not 0 <= panel < self.pattern.face_count:
@@ -436,7 +487,7 @@ class Sheet:
         origin = self._centroid(panel)
         y = (x[nodes] - origin) @ frame.T
         if panel in self._lumps:
-            mass, centre, (inertia, _) = self._lumps[panel]
+            mass, centre, inertia = self._lumps[panel]
             c = (centre - origin) @ frame.T
             target = np.array([mass, mass * c[0], mass * c[1], inertia + mass * c[0] ** 2, np.nan, mass * c[0] * c[1]])
         else:
@@ -494,6 +545,16 @@ def _moments(points: np.ndarray, masses: np.ndarray) -> np.ndarray:
             (masses * a * b).sum(),
         ]
     )
+
+
+def _positive(value) -> np.ndarray:
+    """Where a value is finite and above zero."""
+    value = np.asarray(value, float)
+    return np.isfinite(value) & (value > 0)
+
+
+def _first_bad(value: np.ndarray) -> float:
+    return float(value[~_positive(value)][0])
 
 
 def _material(name: str, panel: int):

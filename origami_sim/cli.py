@@ -6,6 +6,8 @@ went unstable; 130 interrupted, earlier results untouched.
 
 import argparse
 import json
+import math
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -17,9 +19,18 @@ from origami_sim.errors import InputError
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.recording import Recording
     from origami_sim.scene import Outcome
+    from origami_sim.solve.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS = 20.0
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one sentence, as everything else here does."""
+
+    def error(self, message: str):
+        print(f"origami-sim: {message.rstrip('.')}; see {self.prog} --help.", file=sys.stderr)
+        sys.exit(BAD_INPUT)
 
 
 class _Bar:
@@ -40,9 +51,7 @@ class _Bar:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="origami-sim", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = _Parser(prog="origami-sim", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, action: Callable, summary: str, example: str) -> argparse.ArgumentParser:
@@ -123,7 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         print("origami-sim: interrupted; earlier results are untouched.", file=sys.stderr)
         code = INTERRUPTED
-    except BrokenPipeError:
+    except BrokenPipeError:  # the reader of our output left; nothing more can be said there, not even at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = OK
     sys.exit(code)
 
@@ -132,13 +142,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(args) -> int:
-    from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.results import check_writable
+    from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module(args.scene)
-    settings = read_calibration(args.calibration or module.CALIBRATION).override(args.set)
+    settings = scene_settings(module, args.calibration).override(args.set)
     if args.settings:
         if args.json:
-            print(json.dumps({n: s.__dict__ for n, s in settings.items()}))
+            _print_json({n: s.__dict__ for n, s in settings.items()})
         else:
             for s in settings.values():
                 limits = f", {s.range[0]:g} to {s.range[1]:g}" if s.range else ""
@@ -146,11 +157,11 @@ def _run(args) -> int:
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
     folder = Path(args.out or f"runs/{args.scene}")
-    _writable(folder)
+    check_writable(folder)
     outcome = module.run(settings, progress=_Bar(args.scene))
     _save(folder, args.scene, outcome, settings.as_dict(), args.set)
     _tell(args, outcome, folder)
-    return _soundness(outcome)
+    return _soundness(outcome.trajectory)
 
 
 def _replay(args) -> int:
@@ -160,15 +171,21 @@ def _replay(args) -> int:
     if path.is_dir():
         path = path / "replay.rrd"
     if args.screenshot:
-        return OK if screenshot(path, args.screenshot, time=args.time) else NO
-    open_replay(path)
+        taken = screenshot(path, args.screenshot, time=args.time)
+        if args.json:
+            _print_json({"picture": str(args.screenshot) if taken else None})
+        return OK if taken else NO
+    viewer = open_replay(path)
+    if args.json:
+        _print_json({"replay": str(path), "viewer_process": viewer.pid})
     return OK
 
 
 def _compare(args) -> int:
     from origami_sim.compare import plot_overlay
     from origami_sim.recording import read_recording
-    from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.results import check_writable
+    from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module(args.scene)
     if not hasattr(module, "replicate"):
@@ -178,10 +195,10 @@ def _compare(args) -> int:
     for name in ("duration", "threshold"):
         if not getattr(args, name) > 0:
             raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed="> 0")
-    settings = read_calibration(module.CALIBRATION).override(args.set)
+    settings = scene_settings(module).override(args.set)
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
     folder = Path(args.out or "runs/compare")
-    _writable(folder)
+    check_writable(folder)
     comparison, motion, used, part = _replicate(module, settings, recording, args.start, args.duration, args.threshold)
     _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
     plot_overlay(comparison, folder / "overlay.png")
@@ -193,7 +210,7 @@ def _compare(args) -> int:
         print(comparison.table())
         print(comparison.sentence())
         print(f"run folder: {folder}")
-    return OK
+    return _soundness(motion)
 
 
 def _effects(args) -> int:
@@ -202,26 +219,13 @@ def _effects(args) -> int:
     chosen = [get(args.name)] if args.name else list(CATALOGUE.values())
     if args.json:
         keys = ("name", "family", "formula", "source", "matters", "confused_with", "separated_by")
-        print(
-            json.dumps(
-                [
-                    {
-                        **{k: getattr(e, k) for k in keys},
-                        "parameters": [
-                            {
-                                "name": p.name,
-                                "symbol": p.symbol,
-                                "unit": p.unit,
-                                "default": p.default,
-                                "bounds": list(p.bounds),
-                                "meaning": p.meaning,
-                            }
-                            for p in e.parameters
-                        ],
-                    }
-                    for e in chosen
-                ]
-            )
+        of_parameter = ("name", "symbol", "unit", "default", "bounds", "meaning")
+        _print_json(
+            [
+                {k: getattr(e, k) for k in keys}
+                | {"parameters": [{k: getattr(p, k) for k in of_parameter} for p in e.parameters]}
+                for e in chosen
+            ]
         )
         return OK
     for e in chosen:
@@ -231,48 +235,55 @@ def _effects(args) -> int:
             print(f"    confused with: {e.confused_with}\n    separated by: {e.separated_by}")
         print(f"    source: {e.source}")
         for p in e.parameters:
-            print(
-                f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}: {p.meaning}"
-            )
+            limits = f"default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}"
+            print(f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  {limits}: {p.meaning}")
         print()
     return OK
 
 
 def _stride(args) -> int:
     from origami_sim import regression
-    from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module(args.scene)
     if not hasattr(module, "walk"):
         raise InputError("this scene does not walk", field="scene", value=args.scene, allowed="crawler")
-    settings = read_calibration(module.CALIBRATION)
+    settings = scene_settings(module)
+    if args.cycles is not None and args.cycles < 1:
+        raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
     cycles = args.cycles or len(regression.reference(args.scene)["strides_mm"])
     motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
     report = regression.check(args.scene, regression.strides(motion, settings.frequency))
-    print(json.dumps(report.to_json()) if args.json else report.text())
+    _print_json(report.to_json()) if args.json else print(report.text())
     return OK if report.passed else NO
 
 
 def _demo(args) -> int:
     from origami_sim.recording import read_recording, stand_in_double_pendulum
     from origami_sim.report import Section, write_report
-    from origami_sim.scene import read_calibration, recordings_folder, scene_module
+    from origami_sim.results import check_writable
+    from origami_sim.scene import recordings_folder, scene_module, scene_settings
 
     began = time.perf_counter()
     out = Path(args.out)
-    _writable(out)
-    sections, worst = [], OK
-    for name in ("box", "crawler", "fold_file"):
+    scenes = ("box", "crawler", "fold_file")
+    for name in (*scenes, "pendulum_chain"):
+        check_writable(out / name)
+    say = (lambda *_, **__: None) if args.json else print
+    sections, numbers, worst = [], {}, OK
+    for name in scenes:
         module = scene_module(name)
-        settings = read_calibration(module.CALIBRATION)
-        print(f"== {name}", flush=True)
+        settings = scene_settings(module)
+        say(f"== {name}", flush=True)
         outcome = module.run(settings, progress=_Bar(name))
         _save(out / name, name, outcome, settings.as_dict(), [])
-        _tell(args, outcome, out / name)
+        if not args.json:
+            _tell(args, outcome, out / name)
         sections.append(Section.of(name, module, outcome, out / name))
-        worst = max(worst, _soundness(outcome))
+        numbers[name] = outcome.numbers
+        worst = max(worst, _soundness(outcome.trajectory))
 
-    print("== pendulum_chain", flush=True)
+    say("== pendulum_chain", flush=True)
     module = scene_module("pendulum_chain")
     folder = recordings_folder()
     real = folder / "pendulum_chain" / "double.csv" if folder else None
@@ -281,33 +292,38 @@ def _demo(args) -> int:
     else:
         note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
         source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
-    print(f"{note}: {source.name}")
+    say(f"{note}: {source.name}")
     recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    settings = read_calibration(module.CALIBRATION)
-    comparison, motion, used, part = _replicate(module, settings, recording, 0.0, 5.0, 5.0)
+    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, 5.0, 5.0)
     _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
-    print(comparison.table())
-    print(comparison.sentence())
+    worst = max(worst, _soundness(motion))
+    say(comparison.table())
+    say(comparison.sentence())
     sections.append(Section.of_comparison("pendulum_chain", module, comparison, note, out / "pendulum_chain"))
 
     page = write_report(out / "index.html", sections)
-    print(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
-    print(f"done in {time.perf_counter() - began:.0f} s")
+    say(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
+    say(f"done in {time.perf_counter() - began:.0f} s")
+    if args.json:
+        numbers["pendulum_chain"] = {"recording": note, **json.loads(comparison.to_json())}
+        _print_json({"report": str(page), "numbers": numbers, "wall": time.perf_counter() - began})
     return worst
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
 
 
-def _writable(folder: Path) -> None:
-    """Refuses a folder that cannot be written before anything is computed."""
-    import os
+def _print_json(value) -> None:
+    """One object on one line; what JSON lacks (infinity, nan) becomes null."""
+    print(json.dumps(_finite(value), allow_nan=False))
 
-    existing = folder
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        raise InputError("the output folder cannot be written", file=folder, field="--out", allowed="a writable folder")
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
@@ -334,15 +350,13 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     from origami_sim.results import format_table
 
     if args.json:
-        print(
-            json.dumps(
-                {
-                    "numbers": outcome.numbers,
-                    "folder": str(folder),
-                    "dt": outcome.trajectory.dt,
-                    "failures": [str(f) for f in outcome.trajectory.failures],
-                }
-            )
+        _print_json(
+            {
+                "numbers": outcome.numbers,
+                "folder": str(folder),
+                "dt": outcome.trajectory.dt,
+                "failures": [str(f) for f in outcome.trajectory.failures],
+            }
         )
         return
     for table in outcome.tables.values():
@@ -352,10 +366,10 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     print(f"{outcome.trajectory.step}; {outcome.trajectory.wall:.1f} s of computing; run folder: {folder}")
 
 
-def _soundness(outcome: "Outcome") -> int:
-    for failure in outcome.trajectory.failures:
+def _soundness(motion: "Trajectory") -> int:
+    for failure in motion.failures:
         print(f"origami-sim: {failure}", file=sys.stderr)
-    return UNSTABLE if outcome.trajectory.failures else OK
+    return UNSTABLE if motion.failures else OK
 
 
 def _shipped_sidecar(name: str) -> Path:

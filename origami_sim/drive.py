@@ -1,6 +1,7 @@
 """The drive: fields, voltages and loads as functions of time, as data."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,9 +68,13 @@ class Signal:
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """The signal at times t [s]; arrays of worlds and of times broadcast."""
         value = self.offset + self.amplitude * np.sin(2 * math.pi * np.asarray(self.frequency) * t + self.phase)
-        if self.times is not None:
+        if self.times is not None and self.values is not None:
             value = value + np.asarray(self.scale) * np.interp(t, self.times, self.values)
         return np.asarray(value, float)
+
+
+Value = float | np.ndarray | Signal
+"""What a channel is given: a number, one number per world, or a signal."""
 
 
 def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
@@ -111,14 +116,22 @@ class Drive:
         InputError: wrong number of components, times that do not increase, values that are not finite.
     """
 
-    def __init__(self, *, field=(0.0, 0.0, 0.0), gradient=None, voltage=0.0, temperature=0.0, load=0.0):
+    def __init__(
+        self,
+        *,
+        field: Sequence[Value] = (0.0, 0.0, 0.0),
+        gradient: Sequence[Sequence[Value]] | None = None,
+        voltage: Value | Sequence[Value] = 0.0,
+        temperature: Value = 0.0,
+        load: Value = 0.0,
+    ):
         if len(field) != 3:
             raise InputError("a field has three components", field="field", value=len(field), allowed="3")
-        gradient = gradient if gradient is not None else [[0.0] * 3] * 3
+        gradient = gradient if gradient is not None else ((0.0,) * 3,) * 3
         if len(gradient) != 3 or any(len(row) != 3 for row in gradient):
             raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
-        values = [*field, *(g for row in gradient for g in row), temperature, load, *voltages]
+        values: list = [*field, *(g for row in gradient for g in row), temperature, load, *voltages]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
         self.signals = {n: as_signal(v) for n, v in zip(names, values, strict=True)}
 
@@ -162,10 +175,10 @@ class Drive:
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
         """Knot times of all sampled channels together, and the values of every channel there [channel, knot]."""
-        sampled = [s for s in self.signals.values() if s.times is not None]
-        times = np.unique(np.concatenate([s.times for s in sampled])) if sampled else np.zeros(0)
+        sampled = [s.times for s in self.signals.values() if s.times is not None]
+        times = np.unique(np.concatenate(sampled)) if sampled else np.zeros(0)
         values = np.zeros((len(self.signals), len(times)))
         for k, s in enumerate(self.signals.values()):
-            if s.times is not None:
+            if s.times is not None and s.values is not None:
                 values[k] = np.interp(times, s.times, s.values)
         return times, values

@@ -4,6 +4,8 @@ import math
 
 import warp as wp
 
+from origami_sim import _warp  # noqa: F401  settings
+
 scalar = wp.float64
 
 
@@ -39,11 +41,13 @@ def dihedral(xi: wp.vec3d, xj: wp.vec3d, xk: wp.vec3d, xl: wp.vec3d):
     n2 = wp.cross(e, rl)
     ee = wp.dot(e, e)
     length = wp.sqrt(ee)
-    h.angle = wp.atan2(wp.dot(wp.cross(n1, n2), e) / length, wp.dot(n1, n2))
+    # (n1 x n2) . e / |e|, where n1 x n2 = e (ri . n2)
+    h.angle = wp.atan2(wp.dot(ri, n2) * length, wp.dot(n1, n2))
     h.gi = n1 * (length / wp.dot(n1, n1))
     h.gl = n2 * (length / wp.dot(n2, n2))
-    ai = wp.dot(ri, e) / ee
-    al = wp.dot(rl, e) / ee
+    inverse = scalar(1.0) / ee
+    ai = wp.dot(ri, e) * inverse
+    al = wp.dot(rl, e) * inverse
     h.gj = -(scalar(1.0) - ai) * h.gi - (scalar(1.0) - al) * h.gl
     h.gk = -ai * h.gi - al * h.gl
     return h
@@ -53,19 +57,29 @@ def dihedral(xi: wp.vec3d, xj: wp.vec3d, xk: wp.vec3d, xl: wp.vec3d):
 def unwrap(angle: scalar, before: scalar):
     """The angle, shifted by whole turns to lie within half a turn of its earlier value."""
     turn = scalar(2.0) * scalar(math.pi)  # an expression inside scalar() would be single precision
-    return angle + turn * wp.round((before - angle) / turn)
+    out = angle
+    if wp.abs(before - angle) > scalar(math.pi):
+        out = angle + turn * wp.round((before - angle) / turn)
+    return out
 
 
 @wp.func
 def normal_gradients(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d):
     t = Tangents()
     c = wp.cross(x2 - x1, x3 - x1)
-    double_area = wp.length(c)
-    t.n = c / double_area
-    t.g1 = wp.cross(t.n, x3 - x2) / double_area
-    t.g2 = wp.cross(t.n, x1 - x3) / double_area
-    t.g3 = wp.cross(t.n, x2 - x1) / double_area
+    inverse = scalar(1.0) / wp.length(c)  # of twice the area
+    t.n = c * inverse
+    t.g1 = wp.cross(t.n, x3 - x2) * inverse
+    t.g2 = wp.cross(t.n, x1 - x3) * inverse
+    t.g3 = wp.cross(t.n, x2 - x1) * inverse
     return t
+
+
+@wp.func
+def panel_normal(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d):
+    """The normal alone, to the bit that of `normal_gradients`."""
+    c = wp.cross(x2 - x1, x3 - x1)
+    return c * (scalar(1.0) / wp.length(c))
 
 
 @wp.func

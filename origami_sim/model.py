@@ -243,9 +243,8 @@ class State:
         )
 
     def copy(self) -> "State":
-        return State(
-            *(v.copy() if isinstance(v, np.ndarray) else v for v in (getattr(self, f.name) for f in fields(self)))
-        )
+        arrays = {f.name: getattr(self, f.name).copy() for f in fields(self) if f.name != "step"}
+        return State(**arrays, step=self.step)
 
     def select(self, worlds: np.ndarray) -> "State":
         """These worlds, copied; an index may repeat."""

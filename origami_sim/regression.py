@@ -1,12 +1,24 @@
 """Stride per cycle: how a walker advances, cycle by cycle, and whether it still does what it did."""
 
+import hashlib
 import json
-from importlib import resources
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib import metadata, resources
+from pathlib import Path
 
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.scene import Settings
 from origami_sim.solve.dynamics import Trajectory
+
+PAPER = 25.0
+"""Stride that the seed paper reports for its crawler [mm per cycle]."""
+
+SKIP = 2
+"""Cycles before the gait counts as steady."""
 
 
 def strides(motion: Trajectory, frequency: float, *, world: int = 0) -> np.ndarray:
@@ -17,28 +29,136 @@ def strides(motion: Trajectory, frequency: float, *, world: int = 0) -> np.ndarr
     """
     per_cycle = 1.0 / (frequency * (motion.times[1] - motion.times[0]))
     n = round(per_cycle)
-    if abs(per_cycle - n) > 1e-6 * n:
-        raise InputError("frames do not fall on whole cycles", field="rate", value=per_cycle, allowed="a whole number of frames")
+    if n < 1 or abs(per_cycle - n) > 1e-6 * n:
+        raise InputError("frames do not fall on whole cycles", field="rate", value=per_cycle,
+                         allowed="a whole number of frames")  # fmt: skip
     x = motion.centre_of_mass()[::n, world, 0]
     if len(x) < 2:
         raise InputError("the run is shorter than one cycle", field="duration", value=float(motion.times[-1]))
     return np.diff(x)
 
 
-def stride_table(motion: Trajectory, frequency: float, *, skip: int = 2) -> tuple[dict, dict[str, float]]:
-    """Table by cycle, and mean, spread (standard deviation) and trend of the cycles after the first `skip` [mm]."""
-    each = strides(motion, frequency) * 1e3
-    cycle = np.arange(1, len(each) + 1)
+def summary(each: Sequence[float], *, skip: int = SKIP) -> dict[str, float]:
+    """Mean, spread (standard deviation) and trend of the cycles after the first `skip`, in the unit of `each`."""
+    each = np.asarray(each, float)
     steady = each[skip:] if len(each) > skip + 1 else each
     trend = float(np.polyfit(np.arange(len(steady)), steady, 1)[0]) if len(steady) > 1 else 0.0
-    numbers = {
-        "stride_mm": float(steady.mean()), "spread_mm": float(steady.std()), "trend_mm_per_cycle": trend,
-        "cycles": float(len(steady)),
+    return {"mean": float(steady.mean()), "spread": float(steady.std()), "trend": trend, "cycles": len(steady)}
+
+
+def stride_table(motion: Trajectory, frequency: float, *, skip: int = SKIP) -> tuple[dict, dict[str, float]]:
+    """Table by cycle, and mean, spread (standard deviation) and trend of the cycles after the first `skip` [mm]."""
+    each = strides(motion, frequency) * 1e3
+    s = summary(each, skip=skip)
+    numbers = {"stride_mm": s["mean"], "spread_mm": s["spread"], "trend_mm_per_cycle": s["trend"],
+               "cycles": float(s["cycles"])}  # fmt: skip
+    return {"cycle": np.arange(1, len(each) + 1), "stride_mm": each}, numbers
+
+
+def settings_hash(settings: Settings) -> str:
+    """Digest of all values of a calibration."""
+    return hashlib.sha256(json.dumps(settings.as_dict(), sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Report:
+    """Comparison with a stored reference; lengths in mm.
+
+    Attributes:
+        name: of the reference. strides, expected: by cycle, as far as both go.
+        now, then: mean, spread and trend of the steady cycles, of this run and of the reference.
+        tolerance: allowed difference of any of them. paper: the published stride, or None.
+        same_settings: whether the calibration is the stored one; None if it was not given.
+        passed: whether every stride, the mean, the spread and the trend lie within the tolerance.
+    """
+
+    name: str
+    strides: tuple[float, ...]
+    expected: tuple[float, ...]
+    now: dict[str, float]
+    then: dict[str, float]
+    tolerance: float
+    paper: float | None
+    same_settings: bool | None
+    passed: bool
+
+    def table(self) -> dict[str, np.ndarray]:
+        """By cycle: stride, reference and difference [mm]."""
+        a, b = np.array(self.strides), np.array(self.expected)
+        return {"cycle": np.arange(1, len(a) + 1), "stride_mm": a, "reference_mm": b, "difference_mm": a - b}
+
+    def to_json(self) -> dict:
+        """Everything, as plain values."""
+        return asdict(self)
+
+    def text(self) -> str:
+        """A small table and what it says."""
+        lines = [f"{'':8}{'now':>9}{'stored':>9}{'change':>9}   [mm per cycle]"]
+        lines += [f"{k:8}{self.now[k]:9.3f}{self.then[k]:9.3f}{self.now[k] - self.then[k]:+9.3f}"
+                  for k in ("mean", "spread", "trend")]  # fmt: skip
+        lines.append(
+            f"{self.name}: " + ("within" if self.passed else "NOT within") + f" {self.tolerance:g} mm of the reference"
+        )
+        if self.same_settings is False:
+            lines.append("the settings differ from those of the reference")
+        if self.paper:
+            lines.append(f"paper: {self.paper:g} mm per cycle; this run {self.now['mean'] / self.paper - 1:+.1%}")
+        return "\n".join(lines)
+
+
+def _file(name: str, folder: Path | None) -> Path:
+    return (folder or Path(str(resources.files("origami_sim.calibrations")))) / f"{name}_stride.json"
+
+
+def reference(name: str, *, folder: Path | None = None) -> dict:
+    """Stored strides of a scene (JSON beside the calibrations).
+
+    Raises:
+        InputError: there is none, or it is malformed.
+    """
+    path = _file(name, folder)
+    try:
+        data = json.loads(path.read_text())
+        if not data["strides_mm"] or not data["tolerance_mm"] > 0:
+            raise ValueError
+    except OSError:
+        raise InputError(
+            "has no stored strides", file=path, allowed="store them with origami-sim regress --store"
+        ) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError("is not a stored reference", file=path, allowed="strides_mm and tolerance_mm > 0") from None
+    return data
+
+
+def check(name: str, strides: Sequence[float], *, settings: Settings | None = None,
+          folder: Path | None = None) -> Report:  # fmt: skip
+    """Compares strides by cycle [m] with the stored reference of that name, over the cycles that both have."""
+    data = reference(name, folder=folder)
+    n = min(len(strides), len(data["strides_mm"]))
+    if n < 1:
+        raise InputError("there are no strides to compare", field="strides", allowed="one or more cycles")
+    a, b = (tuple(float(x) for x in row[:n]) for row in (1e3 * np.asarray(strides, float), data["strides_mm"]))
+    now, then, tolerance = summary(a), summary(b), float(data["tolerance_mm"])
+    differences = [*np.subtract(a, b), *(now[k] - then[k] for k in ("mean", "spread", "trend"))]
+    same = None if settings is None else settings_hash(settings) == data.get("settings")
+    within = bool(np.all(np.abs(differences) <= tolerance))  # false for nan
+    return Report(name, a, b, now, then, tolerance, data.get("paper_mm"), same, within)
+
+
+def store(name: str, strides: Sequence[float], *, settings: Settings, tolerance: float = 0.5,
+          paper: float | None = PAPER,
+          folder: Path | None = None) -> Path:  # fmt: skip
+    """Writes a reference in one step and returns its file: strides by cycle (given in m), settings, versions."""
+    path = _file(name, folder)
+    data = {
+        "strides_mm": [round(1e3 * float(x), 4) for x in strides], "tolerance_mm": tolerance, "paper_mm": paper,
+        "settings": settings_hash(settings), "values": settings.as_dict(),
+        "versions": {p: metadata.version(p) for p in ("origami-sim", "warp-lang", "numpy")},
     }  # fmt: skip
-    return {"cycle": cycle, "stride_mm": each}, numbers
-
-
-def reference(name: str) -> dict:
-    """Stored strides of a scene (JSON of the package's calibrations)."""
-    path = resources.files("origami_sim.calibrations") / f"{name}_stride.json"
-    return json.loads(path.read_text())
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(json.dumps(data, indent=1) + "\n")
+        os.replace(part, path)
+    except OSError as e:
+        raise InputError(f"cannot be written ({e.strerror})", file=path) from None
+    return path

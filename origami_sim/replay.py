@@ -910,7 +910,7 @@ def _write_recording(recording: Recording, scene: _Scene, out: _Writer):
             out.stream.log(
                 path,
                 rr.Points3D.from_fields(
-                    colors=[COLOURS["marker"]], radii=[0.015 * scene.size], labels=[channel.name], show_labels=[False]
+                    colors=[COLOURS["marker"]], radii=[0.015 * scene.size], labels=[channel.name], show_labels=False
                 ),
                 static=True,
             )

@@ -138,6 +138,19 @@ def save_run(
     return load_run(target)
 
 
+def check_writable(path: str | Path):
+    """Refuses, before anything is computed, a folder into which `save_run` could not write.
+
+    Raises:
+        InputError: it cannot be written, is a file, or holds other things than a run.
+    """
+    target = Path(path).expanduser().absolute()
+    with _writing(target):
+        _check_target(target)
+        existing = next(p for p in target.parents if p.exists())
+        os.rmdir(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=existing))
+
+
 def load_run(path: str | Path) -> Run:
     """Reads a run folder.
 

@@ -12,9 +12,12 @@ from types import ModuleType
 
 import numpy as np
 
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters
 from origami_sim.recording.units import UNITS
 from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.statics import equilibrium
 
 NAMES = ("box", "crawler", "bifold", "pendulum_chain", "fold_file", "mae_crease")
 """The scenes that ship with the package."""
@@ -96,7 +99,7 @@ def _parse(setting: Setting, text: str, file: Path):
         return text.lower() == "true"
     if isinstance(setting.value, str):
         return text
-    match = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*(.*)", text)
+    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", text)
     if not match:
         raise InputError(
             "not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}"
@@ -148,34 +151,66 @@ def read_calibration(source: str | Path) -> Settings:
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
         raise InputError(f"is not valid TOML ({e})", file=path) from None
-    settings = []
-    for name, table in data.items():
-        if not isinstance(table, dict) or "value" not in table or not {"unit", "source", "meaning"} <= set(table):
-            raise InputError("a setting needs value, unit, source and meaning", file=path, field=name)
-        unknown = set(table) - _KEYS
-        if unknown:
-            raise InputError("unknown key", file=path, field=f"{name}.{min(unknown)}", allowed=", ".join(sorted(_KEYS)))
-        value = table["value"]
-        if not isinstance(value, (int, float, str, bool)):
-            raise InputError("a setting is a number, a word or a switch", file=path, field=name, value=value)
-        if isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        limits = tuple(table["range"]) if "range" in table else None
-        settings.append(
-            _checked(
-                Setting(
-                    name,
-                    value,
-                    table["unit"],
-                    table["source"],
-                    table["meaning"],
-                    limits,
-                    tuple(table.get("choices", ())),
-                ),
-                path,
+    return Settings([_setting(name, table, path) for name, table in data.items()], path)
+
+
+def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
+    """The settings of a scene: its own calibration, or a file that gives all of the same settings in the same units.
+
+    Raises:
+        InputError: what `read_calibration` refuses; a setting that is missing, unknown or in another unit.
+    """
+    own = read_calibration(module.CALIBRATION)
+    if calibration is None:
+        return own
+    given = read_calibration(calibration)
+    for name in own:
+        if name not in given:
+            raise InputError("the calibration lacks a setting of this scene", file=given.file, field=name)
+        if given[name].unit != own[name].unit:
+            raise InputError(
+                "wrong unit", file=given.file, field=f"{name}.unit", value=given[name].unit, allowed=own[name].unit
             )
-        )
-    return Settings(settings, path)
+        if isinstance(given[name].value, str) != isinstance(own[name].value, str):
+            raise InputError(
+                "wrong kind of value",
+                file=given.file,
+                field=name,
+                value=given[name].value,
+                allowed="a word" if isinstance(own[name].value, str) else "a number",
+            )
+    for name in given:
+        if name not in own:
+            raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
+    return given
+
+
+def _setting(name: str, table: object, path: Path) -> Setting:
+    if not isinstance(table, dict) or not {"value", "unit", "source", "meaning"} <= set(table):
+        raise InputError("a setting needs value, unit, source and meaning", file=path, field=name)
+    unknown = set(table) - _KEYS
+    if unknown:
+        raise InputError("unknown key", file=path, field=f"{name}.{min(unknown)}", allowed=", ".join(sorted(_KEYS)))
+    for key in ("unit", "source", "meaning"):
+        if not isinstance(table[key], str):
+            raise InputError("not a word", file=path, field=f"{name}.{key}", value=table[key])
+    value = table["value"]
+    if not isinstance(value, (int, float, str, bool)):
+        raise InputError("a setting is a number, a word or a switch", file=path, field=name, value=value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    limits, choices = table.get("range"), table.get("choices", [])
+    if limits is not None:
+        numbers = isinstance(limits, list) and all(isinstance(v, (int, float)) for v in limits)
+        if not numbers or len(limits) != 2 or not limits[0] <= limits[1]:
+            raise InputError(
+                "a range is two numbers", file=path, field=f"{name}.range", value=limits, allowed="[smallest, largest]"
+            )
+        limits = (float(limits[0]), float(limits[1]))
+    if not isinstance(choices, list) or not all(isinstance(c, str) for c in choices):
+        raise InputError("choices are words", file=path, field=f"{name}.choices", value=choices)
+    setting = Setting(name, value, table["unit"], table["source"], table["meaning"], limits, tuple(choices))
+    return _checked(setting, path)
 
 
 @dataclass
@@ -197,6 +232,28 @@ class Outcome:
 
 
 Progress = Callable[[float], None]
+
+
+def follow(
+    model: Model, parameters: Parameters, drives: Sequence[Drive], measure: Callable[[np.ndarray], np.ndarray | float]
+) -> tuple[np.ndarray, list[str]]:
+    """Follows an equilibrium over a series of drives.
+
+    Returns:
+        `measure` of the positions [N, 3] at each drive, nan where no equilibrium was found; a sentence for each such
+        drive.
+    """
+    state, values, notes = None, [], []
+    for n, drive in enumerate(drives):
+        found = equilibrium(model, parameters, drive, state=state)
+        value = np.asarray(measure(found.x), float)
+        if found.converged:
+            state = found.state
+        else:
+            value = np.full_like(value, np.nan)
+            notes.append(f"no equilibrium in row {n + 1} of the table: {found.message}")
+        values.append(value)
+    return np.array(values), notes
 
 
 def scene_module(name: str) -> ModuleType:

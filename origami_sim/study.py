@@ -3,9 +3,9 @@
     python -m origami_sim.study crawler --out runs/study_crawler
     python -m origami_sim.study crawler --out runs/study_crawler --fine --cycles 10 --device cuda:0
 
-Three stages, each resumed where it was interrupted: maps over pairs of unknowns around the calibration, candidates on
-the maps that give the target with a steady gait, and trials of the candidates (half the step, a finer mesh, 5 % more
-and less of every parameter).
+Four stages, each resumed where it was interrupted: maps over pairs of unknowns around the calibration; samples over
+all of them at once; a screening of the points that give the target with a steady gait, by 5 % of the most delicate
+parameters; and full trials of the best (half the step, a finer mesh, 5 % more and less of every parameter).
 """
 
 import argparse
@@ -21,6 +21,7 @@ from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import qmc
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
@@ -80,6 +81,16 @@ VARIED = (
 """Parameters that are changed by 5 % when a candidate is tried."""
 
 
+SAMPLED = {
+    "big_moment": (0.1, 0.35), "friction_ratio": (1.5, 4.0), "foot_height": (0.0, 0.002), "span": (0.015, 0.023),
+    "loss_time": (0.003, 0.008), "foot_friction": (0.1, 0.4),
+}  # fmt: skip
+"""Ranges of the samples: where the maps show a steady gait."""
+
+DELICATE = ("thickness", "big_moment", "modulus", "span", "rear_width", "big_length", "small_length")
+"""Parameters that a point is screened by before it gets a full trial."""
+
+
 @dataclass(frozen=True)
 class Trial:
     """One world of a study.
@@ -131,12 +142,18 @@ class Store:
         if file.exists():
             try:
                 data = json.loads(file.read_text())
-                self.results = {k: Result(tuple(v["strides"]), v["dt"], v["failure"]) for k, v in data["results"].items()}
+                self.results = {
+                    k: Result(tuple(v["strides"]), v["dt"], v["failure"]) for k, v in data["results"].items()
+                }
                 version = data["version"]
             except (ValueError, KeyError, TypeError, AttributeError):
-                raise InputError("is not a study's results", file=file, allowed="an empty folder or a study's") from None
+                raise InputError(
+                    "is not a study's results", file=file, allowed="an empty folder or a study's"
+                ) from None
             if version != _version():
-                raise InputError("was made by another version", file=file, field="version", value=version, allowed=_version())
+                raise InputError(
+                    "was made by another version", file=file, field="version", value=version, allowed=_version()
+                )
 
     def save(self):
         rows = {
@@ -161,7 +178,9 @@ def _write(file: Path, text: str):
             f.write(text)
         os.replace(f.name, file)
     except OSError as e:
-        raise InputError(f"cannot be written ({e.strerror})", file=file, allowed="a folder that can be written") from None
+        raise InputError(
+            f"cannot be written ({e.strerror})", file=file, allowed="a folder that can be written"
+        ) from None
 
 
 def apply(s: Settings, **values: float) -> Settings:
@@ -177,8 +196,8 @@ def apply(s: Settings, **values: float) -> Settings:
 
 
 def run_trials(
-    scene: str, trials: Sequence[Trial], store: Store, *, device: str = "cpu", threads: int | None = None, chunk: int = 16,
-    progress: Callable[[int, int], None] | None = None,
+    scene: str, trials: Sequence[Trial], store: Store, *, device: str = "cpu", threads: int | None = None,
+    chunk: int = 16, progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:  # fmt: skip
     """Results of all trials, taken from the store where it has them; the store is saved after every chunk.
 
@@ -253,8 +272,9 @@ def stack(parameters: Sequence[Parameters]) -> Parameters:
 def _stack_drives(drives: Sequence[Drive]) -> Drive:
     """Sinusoidal fields of several worlds, side by side."""
     signals = [[d[c] for d in drives] for c in ("field_x", "field_y", "field_z")]
+    names = ("offset", "amplitude", "frequency", "phase")
     return Drive(field=[
-        Signal(**{n: np.array([getattr(s, n) for s in row], float) for n in ("offset", "amplitude", "frequency", "phase")})
+        Signal(**{n: np.array([getattr(s, n) for s in row], float) for n in names})
         for row in signals
     ])  # fmt: skip
 
@@ -298,7 +318,9 @@ def stride_map(x: Axis, y: Axis, trials: tuple[tuple[Trial, ...], ...], store: S
                      np.array([[r.spread for r in row] for row in results]))  # fmt: skip
 
 
-def candidates(maps: Sequence[StrideMap], *, target: float = TARGET, window: float = 3.0) -> list[tuple[float, dict, Trial]]:
+def candidates(
+    maps: Sequence[StrideMap], *, target: float = TARGET, window: float = 3.0
+) -> list[tuple[float, dict, Trial]]:
     """Points within `window` [mm] of the target with a steady gait, the best conditioned first.
 
     The rank is the largest change of stride to a neighbour on the map [mm]; a point next to a failed or an unsteady
@@ -318,11 +340,24 @@ def candidates(maps: Sequence[StrideMap], *, target: float = TARGET, window: flo
     return [c for c in sorted(out, key=lambda c: c[0]) if not (c[2].key in seen or seen.add(c[2].key))]
 
 
-def checks(t: Trial, *, change: float = 0.05) -> dict[str, Trial]:
-    """What a candidate is put through, by name: half the step, a finer mesh, and every parameter by +-change."""
+def sampled(base: Settings, n: int, cycles: int, seed: int = 0) -> list[tuple[dict, Trial]]:
+    """Points of a Latin hypercube over `SAMPLED`, rounded to three digits."""
+    unit = qmc.LatinHypercube(len(SAMPLED), rng=np.random.default_rng(seed)).random(n)
+    out = []
+    for row in unit:
+        where = {k: float(f"{lo + u * (hi - lo):.3g}") for (k, (lo, hi)), u in zip(SAMPLED.items(), row, strict=True)}
+        out.append((where, Trial(apply(base, **where), cycles)))
+    return out
+
+
+def checks(t: Trial, names: Sequence[str] = VARIED, *, change: float = 0.05) -> dict[str, Trial]:
+    """What a candidate is put through, by name: half the step, a finer mesh, and parameters by +-change."""
     s = t.settings
-    out = {"as it is": t, "step / 2": Trial(s, t.cycles, 0.5 * t.step), "cell x 0.7": Trial(s.replace(cell=0.7 * s.cell), t.cycles)}
-    for name in VARIED:
+    out = {"as it is": t}
+    if names is VARIED:
+        out["step / 2"] = Trial(s, t.cycles, 0.5 * t.step)
+        out["cell x 0.7"] = Trial(s.replace(cell=0.7 * s.cell), t.cycles)
+    for name in names:
         for factor in (1 - change, 1 + change):
             value = s[name].value * factor
             low, high = s[name].range or (-np.inf, np.inf)
@@ -336,7 +371,7 @@ class Verdict:
     """How a candidate did.
 
     Attributes:
-        stride: [mm]. spread, halved, finer: relative. worst: name of the most harmful 5 % change. worst_change: relative.
+        stride: [mm]. spread, halved, finer: relative changes. worst, worst_change: the most harmful 5 % change.
         changes: relative change of stride by check.
     """
 
@@ -356,17 +391,24 @@ class Verdict:
 def judge(found: Mapping[str, Result]) -> Verdict:
     """Verdict from the results of `checks`; a failed world counts as a change of 100 %."""
     base = found["as it is"]
-    changes = {n: float(np.nan_to_num((r.stride - base.stride) / base.stride, nan=1.0)) for n, r in found.items() if n != "as it is"}
+    changes = {
+        n: float(np.nan_to_num((r.stride - base.stride) / base.stride, nan=1.0))
+        for n, r in found.items()
+        if n != "as it is"
+    }
     varied = {n: c for n, c in changes.items() if n.endswith("%")}
     worst = max(varied, key=lambda n: abs(varied[n]))
-    return Verdict(base.stride, base.spread, changes["step / 2"], changes["cell x 0.7"], worst, varied[worst], changes)
+    return Verdict(base.stride, base.spread, changes.get("step / 2", np.nan), changes.get("cell x 0.7", np.nan), worst,
+                   varied[worst], changes)  # fmt: skip
 
 
 # drawing --------------------------------------------------------------------------------------------------------------
 
 
-def draw_maps(maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, mark: Settings | None = None, note: str = ""):
-    """Stride maps side by side: colour and lines [mm per cycle], the target's line bold, unsteady points crossed out."""
+def draw_maps(
+    maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, mark: Settings | None = None, note: str = ""
+):
+    """Stride maps side by side: lines [mm per cycle], the target's bold, unsteady points crossed out."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -374,8 +416,10 @@ def draw_maps(maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, 
 
     columns = min(3, len(maps))
     rows = -(-len(maps) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(4.6 * columns, 3.9 * rows + 0.5), squeeze=False, layout="constrained")
-    levels = np.arange(-60, 61, 5)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(4.6 * columns, 3.9 * rows + 0.5), squeeze=False, layout="constrained"
+    )
+    levels = np.arange(-60, 61, 10)
     filled = None
     for ax, m in zip(axes.flat, maps, strict=False):
         x, y = np.array(m.x.values) * m.x.scale, np.array(m.y.values) * m.y.scale
@@ -387,8 +431,8 @@ def draw_maps(maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, 
             ax.clabel(bold, fmt=f"{target:g} mm", fontsize=9)
         gx, gy = np.meshgrid(x, y)
         steady = (m.spread < STEADY).T
-        ax.plot(gx[steady], gy[steady], ".", color="0.15", ms=3)
-        ax.plot(gx[~steady], gy[~steady], "x", color="0.15", ms=5)
+        ax.plot(gx[steady], gy[steady], ".", color="0.15", ms=3, clip_on=False)
+        ax.plot(gx[~steady], gy[~steady], "x", color="0.15", ms=5, clip_on=False)
         if mark is not None:
             here = [mark.foot_friction_back / mark.foot_friction if a.name == "friction_ratio" else mark[a.name].value
                     for a in (m.x, m.y)]  # fmt: skip
@@ -398,7 +442,9 @@ def draw_maps(maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, 
         ax.set_axis_off()
     if filled is not None:
         figure.colorbar(filled, ax=axes, label="stride [mm per cycle]", shrink=0.8)
-    figure.suptitle("star: calibration; dot: steady; cross: spread over 2 % or failed" + (f"; {note}" if note else ""), fontsize=10)
+    figure.suptitle(
+        "star: calibration; dot: steady; cross: spread over 2 % or failed" + (f"; {note}" if note else ""), fontsize=10
+    )
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=110)
     plt.close(figure)
@@ -408,32 +454,53 @@ def draw_maps(maps: Sequence[StrideMap], file: Path, *, target: float = TARGET, 
 
 
 def study(
-    scene: str, base: Settings, out: Path, *, cycles: int = 6, fine: bool = False, tried: int = 3, device: str = "cpu",
-    threads: int | None = None, say: Callable[[str], None] = print,
+    scene: str, base: Settings, out: Path, *, cycles: int = 6, fine: bool = False, samples: int = 0, seed: int = 0,
+    screened: int = 6, tried: int = 2, device: str = "cpu", threads: int | None = None,
+    say: Callable[[str], None] = print,
 ) -> dict:  # fmt: skip
-    """Maps, candidates and trials; writes results.json, maps.png and report.json into `out` and returns the report."""
+    """Maps, samples, screening and trials; writes results.json, maps.png and report.json into `out`."""
     store = Store(out / "results.json")
     axes = {n: a.refined() if fine else a for n, a in AXES.items()}
     grids = [(axes[x], axes[y], map_trials(base, axes[x], axes[y], cycles)) for x, y in MAPS]
 
-    def show(what: str):
-        return lambda done, total: print(f"\r{what}: {done} of {total} worlds", end="", file=sys.stderr, flush=True)
+    def go(trials: Sequence[Trial], what: str) -> list[Result]:
+        def show(done: int, total: int):
+            print(f"\r{what}: {done} of {total} worlds", end="\n" if done == total else "", file=sys.stderr, flush=True)
+
+        return run_trials(scene, trials, store, device=device, threads=threads, progress=show)
 
     every = [t for *_, grid in grids for row in grid for t in row]
-    run_trials(scene, every, store, device=device, threads=threads, progress=show("maps"))
-    print(file=sys.stderr)
+    go(every, "maps")
     maps = [stride_map(x, y, grid, store) for x, y, grid in grids]
     draw_maps(maps, out / "maps.png", mark=base, note=f"field {1e3 * base.field:g} mT, {base.frequency:g} Hz")
     best = candidates(maps)
-    say(f"{len({t.key for t in every})} worlds; {len(best)} points within 3 mm of {TARGET:g} mm, steady, with steady neighbours")
-    chosen = [({}, Trial(base, cycles)), *((where, t) for _, where, t in best[:tried])]
-    jobs = [(where, t, checks(t)) for where, t in chosen]
-    run_trials(scene, [t for *_, c in jobs for t in c.values()], store, device=device, threads=threads,
-               progress=show("trials"))  # fmt: skip
-    print(file=sys.stderr)
-    report: dict = {"version": _version(), "settings": base.as_dict(), "cycles": cycles, "target_mm": TARGET, "candidates": [],
-                    "points": [{"change_mm": c, **w, "stride_mm": store.results[t.key].stride} for c, w, t in best]}  # fmt: skip
-    for where, _, names in jobs:
+    points = sampled(base, samples, cycles, seed)
+    found = go([t for _, t in points], "samples")
+    near = [(abs(r.stride - TARGET), w, t) for (w, t), r in zip(points, found, strict=True)
+            if abs(r.stride - TARGET) <= 3 and r.spread < STEADY]  # fmt: skip
+    worlds = len({t.key for t in every})
+    say(f"{worlds} worlds on maps, {len(best)} within 3 mm of {TARGET:g} mm and steady, as are their "
+        f"neighbours; {len(points)} samples, {len(near)} of them within 3 mm and steady")  # fmt: skip
+
+    pool = [({}, Trial(base, cycles)), *((w, t) for _, w, t in best[:screened])]
+    pool += [(w, t) for _, w, t in sorted(near, key=lambda c: c[0])[:screened]]
+    screens = [checks(t, DELICATE) for _, t in pool]
+    go([t for c in screens for t in c.values()], "screening")
+    judged = [(judge({n: store.results[t.key] for n, t in c.items()}), *p) for c, p in zip(screens, pool, strict=True)]
+    rows = sorted(judged[1:], key=lambda j: abs(j[0].worst_change))
+    for v, w, _ in rows:
+        say(f"screened {w}: {v.stride:.1f} mm, worst {v.worst}: {v.worst_change:+.1%}")
+    jobs = [(w, checks(t)) for _, w, t in [judged[0], *rows[:tried]]]
+    go([t for _, c in jobs for t in c.values()], "trials")
+    report: dict = {
+        "version": _version(), "settings": base.as_dict(), "cycles": cycles, "target_mm": TARGET,
+        "worlds": len(store.results),
+        "screened": [
+            {"where": w, "stride_mm": v.stride, "worst": v.worst, "worst_change": v.worst_change} for v, w, _ in rows
+        ],
+        "candidates": [],
+    }  # fmt: skip
+    for where, names in jobs:
         v = judge({n: store.results[t.key] for n, t in names.items()})
         report["candidates"].append({"where": where, **v.__dict__, "changes": dict(v.changes), "accepted": v.accepted})
         say(f"{where or 'the calibration itself'}: {v.stride:.1f} mm, spread {v.spread:.2%}, step / 2 {v.halved:+.2%}, "
@@ -449,12 +516,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog="example: origami-sim study crawler --out runs/study_crawler --set cell=3.8mm",
     )  # fmt: skip
     parser.add_argument("scene", choices=("crawler",))
-    parser.add_argument("--out", type=Path, default=Path("runs/study_crawler"), help="folder for results, maps and report")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/study_crawler"), help="folder for results, maps and report"
+    )
     parser.add_argument("--calibration", default="crawler", help="a TOML file, or the name of a shipped one")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     parser.add_argument("--cycles", type=int, default=6, help="cycles of the field; the second half counts")
     parser.add_argument("--fine", action="store_true", help="twice as many values on each axis")
-    parser.add_argument("--tried", type=int, default=3, help="candidates to try")
+    parser.add_argument("--samples", type=int, default=64, help="points sampled over all unknowns at once")
+    parser.add_argument("--seed", type=int, default=0, help="of the samples")
+    parser.add_argument(
+        "--screened", type=int, default=6, help="points to screen, from the maps and from the samples each"
+    )
+    parser.add_argument("--tried", type=int, default=2, help="points to try in full")
     parser.add_argument("--device", default="cpu", help="cpu or cuda:0")
     parser.add_argument("--threads", type=int, help="CPU threads (default: all cores)")
     a = parser.parse_args(arguments)
@@ -462,7 +536,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if a.cycles < 4:
             raise InputError("too few cycles for a steady gait", field="cycles", value=a.cycles, allowed=">= 4")
         base = read_calibration(a.calibration).override(a.set)
-        study(a.scene, base, a.out, cycles=a.cycles, fine=a.fine, tried=a.tried, device=a.device, threads=a.threads)
+        study(a.scene, base, a.out, cycles=a.cycles, fine=a.fine, samples=a.samples, seed=a.seed, screened=a.screened,
+              tried=a.tried, device=a.device, threads=a.threads)  # fmt: skip
     except InputError as e:
         print(e, file=sys.stderr)
         return 2

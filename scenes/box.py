@@ -11,9 +11,8 @@ from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings
+from origami_sim.scene import Outcome, Progress, Settings, follow
 from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
 
 CALIBRATION = "box"
 FIELDS = np.array([0.010, 0.020, 0.050, 0.100, 0.150, 0.200])
@@ -80,20 +79,17 @@ def inclination(x: np.ndarray, faces: list[tuple[int, ...]]) -> np.ndarray:
     return np.array(out)
 
 
-def flap_angles(s: Settings, fields: np.ndarray) -> np.ndarray:
-    """Equilibrium inclinations of the four flaps [rad], [field, flap], followed up from zero field."""
+def flap_angles(s: Settings, fields: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Equilibrium inclinations of the four flaps [rad], [field, flap], followed up from zero field; and what failed."""
     model, parameters, _ = build(s)
     faces = pattern(s).faces
-    state, out = None, []
-    for b in fields:
-        state = equilibrium(model, parameters, Drive(field=(0, 0, b)), state=state).state
-        out.append(inclination(state.x[:, 0], faces))
-    return np.array(out)
+    return follow(model, parameters, [Drive(field=(0, 0, b)) for b in fields], lambda x: inclination(x, faces))
 
 
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """The table of angle against field by statics, and the motion for the replay."""
-    statics = np.degrees(flap_angles(s, FIELDS * np.sign(s.field or 1.0)))
+    angles, notes = flap_angles(s, FIELDS)
+    statics = np.degrees(angles)
     model, parameters, signals = build(s)
     motion = simulate(model, parameters, signals, duration=3.0, rate=60, progress=progress)
     final = np.degrees(inclination(motion.x[-1, :, 0], pattern(s).faces))
@@ -108,7 +104,9 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         motion,
         {"flap_angle": table},
         summary=[
-            f"dynamics end at {final.mean():.2f} deg in {s.field * 1e3:.0f} mT (four flaps within {np.ptp(final):.2g} deg)"
+            *notes,
+            f"dynamics end at {final.mean():.2f} deg, driven to {s.field * 1e3:.0f} mT "
+            f"(four flaps within {np.ptp(final):.2g} deg)",
         ],
         numbers={
             "flap_deg": float(final.mean()),

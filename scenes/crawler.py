@@ -58,19 +58,22 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not
     sheet.panel(np.arange(len(cells)), rigidity=bonded * (s.twist if s.guided else 1.0))
     for number, size, sign, factor in (
-        (1, (s.big_length, s.big_width), s.polarity, s.big_moment), (2, (s.small_length, s.small_width), -s.polarity, 1.0),
+        (1, (s.big_length, s.big_width), s.polarity, s.big_moment),
+        (2, (s.small_length, s.small_width), -s.polarity, 1.0),
     ):  # fmt: skip
         inside = np.flatnonzero(owner == number)
         for panel in inside:
-            sheet.patch(int(panel), thickness=s.patch_thickness, size=(cells[panel], size[1]), poling=(s.heading * sign, 0, 0),
-                        remanence=s.remanence * factor, density=s.patch_density)  # fmt: skip
+            sheet.patch(int(panel), thickness=s.patch_thickness, size=(cells[panel], size[1]),
+                        poling=(s.heading * sign, 0, 0), remanence=s.remanence * factor,
+                        density=s.patch_density)  # fmt: skip
 
     # feet at both ends, belly everywhere: two points per station share the ground's stiffness
     last = len(cells) - 1
     feet, ends = [], ((0, x[0], width[0]), (last, x[-1], width[-1]))
     for panel, at, w in ends:
-        feet += [sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height, axis=(s.heading, 0, 0), name=f"foot at x = {at:.3f}")
-                 for y in (-1, 1)]  # fmt: skip
+        for y in (-1, 1):
+            feet.append(sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height,
+                                      axis=(s.heading, 0, 0), name=f"foot at x = {at:.3f}"))  # fmt: skip
         sheet.mass([2 * (panel + (panel == last)), 2 * (panel + (panel == last)) + 1], s.foot_mass / 2)
     for k in range(1, len(x) - 1):
         for y in (-1, 1):
@@ -84,7 +87,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     sheet.gravity((0, 0, -s.gravity))
     model, parameters = sheet.build()
-    if not s.patch_height:
+    if not s.patch_height:  # a planar chain carries its masses on its line
         model = model.with_effects(without=("eccentric_weight",))
         parameters = parameters.for_model(model)
     model.position[:, 2] = s.thickness / 2 + s.foot_height

@@ -7,11 +7,10 @@ import numpy as np
 
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, ramp
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings
+from origami_sim.scene import Outcome, Progress, Settings, follow
 from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
 
 CALIBRATION = "mae_crease"
 
@@ -35,17 +34,17 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     model, parameters, drive = build(s)
     fields = np.linspace(0, s.field, 11)[1:]
-    state, angles = None, []
-    for b in fields:
-        state = equilibrium(model, parameters, Drive(field=(0, 0, b)), state=state).state
-        angles.append(np.degrees(state.angles[0, 0]))
+    drives = [Drive(field=(0, 0, b)) for b in fields]
+    angles, notes = follow(model, parameters, drives, lambda x: dihedral_angles(x, model.creases)[0])
+    angles = np.degrees(angles)
     motion = simulate(model, parameters, drive, duration=2.0, rate=60, progress=progress)
     final = float(np.degrees(motion.creases[-1, 0, 0]))
     return Outcome(
         motion,
-        {"fold_angle": {"field_mT": fields * 1e3, "angle_deg": np.array(angles)}},
+        {"fold_angle": {"field_mT": fields * 1e3, "angle_deg": angles}},
         summary=[
-            f"{angles[-1]:.4f} deg in {s.field * 1e3:.0f} mT by statics, {final:.4f} deg by dynamics after 1 s of rest"
+            *notes,
+            f"{angles[-1]:.4f} deg in {s.field * 1e3:.0f} mT by statics, {final:.4f} deg by dynamics after 1 s of rest",
         ],
         numbers={"angle_deg": float(angles[-1]), "dynamic_angle_deg": final},
     )

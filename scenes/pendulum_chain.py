@@ -24,20 +24,20 @@ WIDTH, MOUNT, REACH = 0.02, 0.04, 0.25
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     """Mount, arm 1 and arm 2 hanging straight; node masses give each arm its mass, centre and inertia."""
     lengths = [MOUNT, s.length_1] + ([REACH] if s.mass_2 > 0 else [])
-    sheet = Sheet(strip(lengths, WIDTH), thickness=0.005, material="aluminium", triangulation="center")
+    pattern = strip(lengths, WIDTH)
+    pattern.vertices = pattern.vertices[:, [2, 1, 0]] * (1, 1, -1)  # hanging down
+    sheet = Sheet(pattern, thickness=0.005, material="aluminium", triangulation="center")
     sheet.fix(panels=[0])
-    sheet.rigid_body(1, mass=s.mass_1, centre=(MOUNT + s.centre_1, 0, 0), inertia=s.inertia_1)
+    sheet.rigid_body(1, mass=s.mass_1, centre=(0, 0, -MOUNT - s.centre_1), inertia=s.inertia_1)
     if s.mass_2 > 0:
-        sheet.rigid_body(2, mass=s.mass_2, centre=(MOUNT + s.length_1 + s.centre_2, 0, 0), inertia=s.inertia_2)
+        sheet.rigid_body(2, mass=s.mass_2, centre=(0, 0, -MOUNT - s.length_1 - s.centre_2), inertia=s.inertia_2)
     sheet.on("bars").set("bars", stiffness=s.membrane_stiffness)
     sheet.set("panel_bending", stiffness=s.membrane_stiffness * (WIDTH / 10) ** 2)
     sheet.set("crease_viscosity", viscosity=np.array([s.viscosity_1, s.viscosity_2][: len(lengths) - 1]))
     sheet.gravity((0, 0, -s.gravity))
     sheet.membrane_damping = 0.0
+    sheet.name("panel", ("mount", "arm1", "arm2")[: len(lengths)])
     model, parameters = sheet.build()
-    model.names["panel"] = ("mount", "arm1", "arm2")[: len(lengths)]
-    hanging = model.position.copy()  # turn the strip so that x points down
-    model.position[:] = np.stack([np.zeros(len(hanging)), hanging[:, 1], -hanging[:, 0]], axis=1)
     return model, parameters, Drive()
 
 

@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 
+from origami_sim import _warp  # noqa: F401  settings
 from origami_sim.effects._effect import CONTACTS, DRIVES, FAMILIES, HINGES, Effect, Memory, Parameter, scalar
 from origami_sim.errors import InputError
 

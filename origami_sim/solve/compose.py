@@ -14,6 +14,7 @@ import warp as wp
 
 from origami_sim import kinematics
 from origami_sim.effects import CONTACTS, HINGES, Effect, get
+from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
 """First drive channel of each quantity; voltages of further electrode groups follow."""
@@ -31,6 +32,12 @@ FIXED_SLOTS = (
     ("drive", "scale"),
 )
 """Parameters that every model has besides those of its effects."""
+
+NATURAL = wp.constant(0x7FFFFFFF)
+"""Masked with this, an index is seen to be no negative one, and every access to an array is spared that test."""
+
+CPU_FLAGS = "-fno-slp-vectorize"
+"""Two numbers of a vector stored by halves and loaded whole wait for the store; without packing they do not."""
 
 _ARGUMENTS = """
     mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
@@ -51,7 +58,7 @@ def rollout({arguments}
     power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
 ):
-    w = first_world + wp.tid()
+    w = (first_world + wp.tid()) & NATURAL
     if status[0, w] >= 0:
         return
 {hoist}
@@ -71,15 +78,17 @@ def rollout({arguments}
             half = scalar(0.0)
         time = dt * scalar(start + s + 1)
         # kick and drift; v becomes the prediction of the velocity at the end of the step
-        for n in range(mask.shape[0]):
+        for row in range(mask.shape[0]):
+            n = row & NATURAL
             ahead = V[n, w] + half * A[n, w]
             X[n, w] = X[n, w] + h * ahead
             V[n, w] = ahead + half * A[n, w]
             F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
 {body}
         # second kick, with the new acceleration
-        for n in range(mask.shape[0]):
-            new = wp.cw_mul(mask[n], F[n, w]) / {mass}
+        for row in range(mask.shape[0]):
+            n = row & NATURAL
+            new = wp.cw_mul(mask[n], F[n, w]) * (scalar(1.0) / {mass})
             V[n, w] = V[n, w] + half * (new - A[n, w])
             A[n, w] = new
             speed = wp.dot(V[n, w], V[n, w])
@@ -98,7 +107,7 @@ def evaluate({arguments}
     forces: wp.array3d(dtype=vec3), energies: wp.array2d(dtype=scalar), gaps: wp.array2d(dtype=scalar),
     first_world: int, time: scalar,
 ):
-    w = first_world + wp.tid()
+    w = (first_world + wp.tid()) & NATURAL
     h = scalar(0.0)
 {hoist}
 {body}
@@ -109,42 +118,14 @@ _TOTAL_HEAD = """
 def total({arguments}
     F: wp.array2d(dtype=vec3), first_world: int, time: scalar,
 ):
-    w = first_world + wp.tid()
+    w = (first_world + wp.tid()) & NATURAL
     h = scalar(0.0)
-    for n in range(mask.shape[0]):
+    for row in range(mask.shape[0]):
+        n = row & NATURAL
         F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
 {hoist}
 {body}
 """
-
-
-@wp.func
-def wave(
-    P: wp.array(dtype=wp.float64),
-    layout: wp.array2d(dtype=wp.int32),
-    first: int,
-    k: int,
-    w: int,
-    series_times: wp.array(dtype=wp.float64),
-    series_values: wp.array2d(dtype=wp.float64),
-    t: wp.float64,
-):
-    """Drive channel k at time t: offset + amplitude sin(omega t + phase) + scale * sampled series."""
-    value = P[layout[first, 0] + k * layout[first, 1] + w * layout[first, 2]]
-    amplitude = P[layout[first + 1, 0] + k * layout[first + 1, 1] + w * layout[first + 1, 2]]
-    if amplitude != wp.float64(0.0):
-        omega = P[layout[first + 2, 0] + k * layout[first + 2, 1] + w * layout[first + 2, 2]]
-        phase = P[layout[first + 3, 0] + k * layout[first + 3, 1] + w * layout[first + 3, 2]]
-        value += amplitude * wp.sin(omega * t + phase)
-    knots = series_times.shape[0]
-    if knots > 1:
-        scale = P[layout[first + 4, 0] + k * layout[first + 4, 1] + w * layout[first + 4, 2]]
-        if scale != wp.float64(0.0):
-            i = wp.clamp(wp.lower_bound(series_times, t), 1, knots - 1)
-            t0 = series_times[i - 1]
-            s = wp.clamp((t - t0) / (series_times[i] - t0), wp.float64(0.0), wp.float64(1.0))
-            value += scale * (series_values[k, i - 1] + s * (series_values[k, i] - series_values[k, i - 1]))
-    return value
 
 
 class _Text:
@@ -194,7 +175,7 @@ class _Composer:
 
     def value(self, owner: str, name: str, entity: str) -> str:
         i = self.index[owner, name]
-        return f"P[o{i} + {entity} * e{i}]"
+        return f"P[(o{i} + {entity} * e{i}) & NATURAL]"
 
     def hoist(self) -> str:
         """Parameter addresses of this world, read once."""
@@ -299,8 +280,9 @@ class _Composer:
         effects = self.family("node")
         if not effects:
             return
-        t("for n in range(mask.shape[0]):")
+        t("for row in range(mask.shape[0]):")
         t.depth += 1
+        t("n = row & NATURAL")
         t(f"mass = {self.value('inertia', 'mass', 'n')}")
         t("x = X[n, w]")
         t("v = V[n, w]")
@@ -316,13 +298,14 @@ class _Composer:
         effects = self.family("bar")
         if not effects:
             return
-        t("for b in range(bars.shape[0]):")
+        t("for row in range(bars.shape[0]):")
         t.depth += 1
-        t("p = bars[b][0]")
-        t("q = bars[b][1]")
+        t("b = row & NATURAL")
+        t("p = bars[b][0] & NATURAL")
+        t("q = bars[b][1] & NATURAL")
         t("span = X[q, w] - X[p, w]")
         t("length = wp.length(span)")
-        t("along = span / length")
+        t("along = span * (scalar(1.0) / length)")
         if any("rate" in e.arguments or e.exchanges_work for e in effects):
             t("rate = wp.dot(along, V[q, w] - V[p, w])")
         if mode != "evaluate":
@@ -353,9 +336,9 @@ class _Composer:
             count, shift = "hinges.shape[0] - crease_count", "crease_count"
         t(f"for c in range({count}):")
         t.depth += 1
-        t(f"r = c + {shift}")
+        t(f"r = (c + {shift}) & NATURAL")
         for i, node in enumerate("ijkl"):
-            t(f"{node} = hinges[r][{i}]")
+            t(f"{node} = hinges[r][{i}] & NATURAL")
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("angle = kinematics.unwrap(g.angle, angles[r, w])")
         if any("turn" in e.arguments for e in effects):
@@ -386,10 +369,11 @@ class _Composer:
         effects = self.family("triangle")
         if not effects:
             return
-        t("for c in range(triangles.shape[0]):")
+        t("for row in range(triangles.shape[0]):")
         t.depth += 1
+        t("c = row & NATURAL")
         for i in (1, 2, 3):
-            t(f"n{i} = triangles[c][{i - 1}]")
+            t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
             t(f"x{i} = X[n{i}, w]")
             t(f"v{i} = V[n{i}, w]")
         if "field" in self.drives:
@@ -412,20 +396,21 @@ class _Composer:
         effects = self.family(*CONTACTS)
         if not effects:
             return
-        t("for c in range(contacts.shape[0]):")
+        t("for row in range(contacts.shape[0]):")
         t.depth += 1
+        t("c = row & NATURAL")
         for i in (1, 2, 3):
-            t(f"n{i} = contacts[c][{i - 1}]")
+            t(f"n{i} = contacts[c][{i - 1}] & NATURAL")
         t("share = weights[c]")
         t("off = offsets[c]")
         t("at = share[0] * X[n1, w] + share[1] * X[n2, w] + share[2] * X[n3, w]")
-        t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
-        t("at = at + off * patch.n")
+        t("at = at + off * kinematics.panel_normal(X[n1, w], X[n2, w], X[n3, w])")
         t("gap = wp.dot(up, at) - plane_height")
         if mode == "evaluate":
             t("gaps[c, w] = gap")
         t("if gap < reach:")
         t.depth += 1
+        t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
         # velocity of the contact point: d(normal) = -sum (n . dx_i) grad_i
         t("velocity = share[0] * V[n1, w] + share[1] * V[n2, w] + share[2] * V[n3, w]")
         t(
@@ -524,10 +509,14 @@ def compose(names: tuple[str, ...]) -> Program:
         "vec3": wp.vec3d,
         "kinematics": kinematics,
         "wave": wave,
+        "NATURAL": NATURAL,
     }
     for e in effects:
         scope[f"{e.name}_force"] = e.force
         if e.energy is not None:
             scope[f"{e.name}_energy"] = e.energy
     exec(compile(source, filename, "exec"), scope)
+    if hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
+        common = wp.config.cpu_compiler_flags or "-march=native"
+        scope["rollout"].module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
     return Program(effects, composer.slots, source, scope["rollout"], scope["evaluate"], scope["total"])

@@ -429,11 +429,11 @@ class _System:
             v0 = np.random.default_rng(0).standard_normal(n)  # fixed, so that runs repeat
             find = spla.eigsh if symmetric else spla.eigs
             values, vectors = find(k, k=min(count, n - 2), sigma=-2 * shift, which="LM", v0=v0)
-        order = np.argsort(values.real)[:count]
+        order = np.argsort(np.real(values))[:count]
         mode = np.zeros(self.model.position.size)
-        mode[self.free] = vectors[:, order[0]].real
+        mode[self.free] = np.real(vectors[:, order[0]])
         peak = mode[np.abs(mode).argmax()]
-        return values.real[order], (mode / (peak or 1.0)).reshape(-1, 3)
+        return np.real(values)[order], (mode / (peak or 1.0)).reshape(-1, 3)
 
     @staticmethod
     def _definite(k: sp.csc_array, largest: float, least: float) -> tuple[_Factor, float]:

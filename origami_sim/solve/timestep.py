@@ -78,7 +78,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
                 value=given,
                 allowed=f"1 or {worlds}",
             )
-    free = model.free.any(axis=1)
+    free = model.free.max(axis=1) > 0
     sums = {"stiffness": np.zeros((n, worlds)), "damping": np.zeros((n, worlds))}
     largest = np.zeros((n, worlds))
     cause = np.full((n, worlds), "", dtype=object)
