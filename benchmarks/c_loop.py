@@ -69,33 +69,40 @@ class CLoop:
         self.node = fill(NODE, len(model.position), x=model.position, free=model.free, mass=value("inertia", "mass"),
                          **{f"g{c}": value("gravity", f"gravity_{c}") for c in "xyz"})  # fmt: skip
         b, h, t, k = model.bars, np.concatenate([model.creases, model.bends]), model.triangles, model.contacts
-        self.bar = fill(BAR, len(b), p=b[:, 0], q=b[:, 1], stiffness=value("bars", "stiffness"), rest=value("bars", "rest_length"))
+        self.bar = fill(
+            BAR, len(b), p=b[:, 0], q=b[:, 1], stiffness=value("bars", "stiffness"), rest=value("bars", "rest_length")
+        )
         loss = np.concatenate([value("crease_viscosity", "viscosity"), np.zeros(len(model.bends))])
         self.hinge = fill(
             HINGE, len(h), i=h[:, 0], j=h[:, 1], k=h[:, 2], l=h[:, 3], viscosity=loss,
             stiffness=np.concatenate([value("crease", "stiffness"), value("panel_bending", "stiffness")]),
             rest=np.concatenate([value("crease", "rest_angle"), value("panel_bending", "rest_angle")]),
         )  # fmt: skip
-        m = {c: value("magnetic_torque", n) for c, n in (("remanence", "remanence"), ("volume", "volume"), ("a", "poling_1"), ("b", "poling_2"), ("c", "poling_n"))}
+        magnet = {"remanence": "remanence", "volume": "volume", "a": "poling_1", "b": "poling_2", "c": "poling_n"}
+        m = {c: value("magnetic_torque", n) for c, n in magnet.items()}
         self.triangle = fill(TRIANGLE, len(t), n1=t[:, 0], n2=t[:, 1], n3=t[:, 2], **m)
         self.contact = fill(
             CONTACT, len(k), off=model.contact_offsets,
             **{f"n{i + 1}": k[:, i] for i in range(3)}, **{f"w{i + 1}": model.contact_weights[:, i] for i in range(3)},
             **{f"a{i + 1}": model.contact_axes[:, i] for i in range(3)},
             kn=value("ground", "stiffness"), cn=value("ground", "damping"), mu=value("coulomb", "friction_coefficient"),
-            back=value("directional_friction", "backward_excess"), kt=value("friction", "stiffness"), ct=value("friction", "damping"),
+            back=value("directional_friction", "backward_excess"),
+            kt=value("friction", "stiffness"), ct=value("friction", "damping"),
         )  # fmt: skip
         waves = drive.slots()
-        field = [float(waves[n][c].flat[0]) for c in range(3) for n in ("offset", "amplitude", "angular_frequency", "phase")]
+        numbers = ("offset", "amplitude", "angular_frequency", "phase")
+        field = [float(waves[n][c].flat[0]) for c in range(3) for n in numbers]
         plane = [float(value("plane", n)[0]) for n in ("tilt", "azimuth", "height", "reach")]
         self._world = _World(
             len(self.node), len(b), len(model.creases), len(h), len(t), len(k),
             *(a.ctypes.data for a in (self.node, self.bar, self.hinge, self.triangle, self.contact)),
-            (ctypes.c_double * 12)(*field), (ctypes.c_double * 4)(*plane), (ctypes.c_double * 8)(), (ctypes.c_int * 2)(-1, -1),
+            (ctypes.c_double * 12)(*field), (ctypes.c_double * 4)(*plane), (ctypes.c_double * 8)(),
+            (ctypes.c_int * 2)(-1, -1),
         )  # fmt: skip
 
     def advance(self, steps: int, dt: float, speed_limit: float):
-        self._lib.run(ctypes.byref(self._world), self._steps_done, steps, ctypes.c_double(dt), ctypes.c_double(speed_limit))
+        numbers = (ctypes.c_double(dt), ctypes.c_double(speed_limit))
+        self._lib.run(ctypes.byref(self._world), self._steps_done, steps, *numbers)
         self._steps_done = max(self._steps_done, 0) + steps
 
     @property

@@ -135,11 +135,10 @@ void run(world *w, int first_step, int steps, double dt, double speed_limit) {
             node *p1 = &w->node[e->n1], *p2 = &w->node[e->n2], *p3 = &w->node[e->n3];
             vec n, g1, g2, g3;
             vec foot = add(add(mul(e->w1, p1->x), mul(e->w2, p2->x)), mul(e->w3, p3->x));
-            vec c0 = cross(sub(p2->x, p1->x), sub(p3->x, p1->x));
-            foot = add(foot, mul(e->off, mul(1 / norm(c0), c0)));
+            normal_gradients(p1->x, p2->x, p3->x, &n, &g1, &g2, &g3);
+            foot = add(foot, mul(e->off, n));
             double gap = dot(up, foot) - w->height;
             if (gap < w->reach) {
-                normal_gradients(p1->x, p2->x, p3->x, &n, &g1, &g2, &g3);
                 vec v = add(add(mul(e->w1, p1->v), mul(e->w2, p2->v)), mul(e->w3, p3->v));
                 v = sub(v, mul(e->off, add(add(mul(dot(n, p1->v), g1), mul(dot(n, p2->v), g2)), mul(dot(n, p3->v), g3))));
                 double rate = dot(up, v);
@@ -197,4 +196,14 @@ void run(world *w, int first_step, int steps, double dt, double speed_limit) {
             return;
         }
     }
+}
+
+/* n dependent additions, one per cycle: timed, they tell the frequency of the core. */
+unsigned long additions(long n) {
+    unsigned long x = 0;
+    for (long i = 0; i < n; i += 8) {
+#define ADD __asm__ volatile("" : "+r"(x)); x += 3;
+        ADD ADD ADD ADD ADD ADD ADD ADD
+    }
+    return x;
 }

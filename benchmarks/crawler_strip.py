@@ -58,10 +58,8 @@ def strip(worlds: int = 1) -> tuple[Model, Parameters, Drive]:
     np.add.at(mass, triangles, DENSITY * THICKNESS * area / 3)
     lengths = np.linalg.norm(np.diff(position[bars], axis=1)[:, 0], axis=-1)
     magnet = np.tile(np.array([0.0, 1.0, 0.0, -1.0, 0.0]), 2)  # two patches, poled against each other
-    along = np.stack([np.tile([1.0, 0.0], (CELLS, 1)), np.tile([0.0, 1.0], (CELLS, 1))]).reshape(-1, 2)
-    along[CELLS:] = (0.0, 1.0)
-    # in-plane poling along x: first triangle (x2 - x1), second (x3 - x1) - (its station), here (x2 - x3)
-    along[CELLS:] = (1.0, -1.0)
+    # poled along x: x2 - x1 of a cell's first triangle, x2 - x3 of its second
+    along = np.repeat([[1.0, 0.0], [1.0, -1.0]], CELLS, axis=0)
     p = Parameters(model)
     mu = np.linspace(0.2, 0.6, worlds) if worlds > 1 else np.array([0.3])
     for owner, name, value in (

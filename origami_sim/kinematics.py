@@ -76,13 +76,6 @@ def normal_gradients(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d):
 
 
 @wp.func
-def panel_normal(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d):
-    """The normal alone, to the bit that of `normal_gradients`."""
-    c = wp.cross(x2 - x1, x3 - x1)
-    return c * (scalar(1.0) / wp.length(c))
-
-
-@wp.func
 def corner_rows(f1: wp.vec3d, f2: wp.vec3d, f3: wp.vec3d):
     return wp.matrix_from_rows(f1, f2, f3)
 

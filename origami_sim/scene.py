@@ -76,7 +76,7 @@ class Settings(Mapping[str, Setting]):
         """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI."""
         values = {}
         for text in assignments:
-            name, equals, given = text.partition("=")
+            name, equals, given = (part.strip() for part in text.partition("="))
             if not equals or name not in self._settings:
                 raise InputError(
                     "cannot apply this setting",
@@ -85,7 +85,7 @@ class Settings(Mapping[str, Setting]):
                     value=text,
                     allowed="name=value with name one of " + ", ".join(self._settings),
                 )
-            values[name] = _parse(self._settings[name], given.strip(), self.file)
+            values[name] = _parse(self._settings[name], given, self.file)
         return self.replace(**values)
 
     def as_dict(self) -> dict:
@@ -99,12 +99,12 @@ def _parse(setting: Setting, text: str, file: Path):
         return text.lower() == "true"
     if isinstance(setting.value, str):
         return text
-    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", text)
+    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d.].*)?", text)
     if not match:
         raise InputError(
             "not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}"
         )
-    number, unit = float(match[1]), match[2]
+    number, unit = float(match[1]), match[2] or ""
     if not unit or unit == setting.unit:
         return number
     kind = _FACTORS.get(setting.unit, ("", 1.0))[0]

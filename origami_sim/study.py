@@ -419,7 +419,7 @@ def draw_maps(
     figure, axes = plt.subplots(
         rows, columns, figsize=(4.6 * columns, 3.9 * rows + 0.5), squeeze=False, layout="constrained"
     )
-    levels = np.arange(-60, 61, 10)
+    levels = np.arange(-60, 61, 5)
     filled = None
     for ax, m in zip(axes.flat, maps, strict=False):
         x, y = np.array(m.x.values) * m.x.scale, np.array(m.y.values) * m.y.scale
@@ -431,8 +431,8 @@ def draw_maps(
             ax.clabel(bold, fmt=f"{target:g} mm", fontsize=9)
         gx, gy = np.meshgrid(x, y)
         steady = (m.spread < STEADY).T
-        ax.plot(gx[steady], gy[steady], ".", color="0.15", ms=3, clip_on=False)
-        ax.plot(gx[~steady], gy[~steady], "x", color="0.15", ms=5, clip_on=False)
+        ax.plot(gx[steady], gy[steady], ".", color="0.15", ms=3)
+        ax.plot(gx[~steady], gy[~steady], "x", color="0.15", ms=5)
         if mark is not None:
             here = [mark.foot_friction_back / mark.foot_friction if a.name == "friction_ratio" else mark[a.name].value
                     for a in (m.x, m.y)]  # fmt: skip
@@ -442,11 +442,10 @@ def draw_maps(
         ax.set_axis_off()
     if filled is not None:
         figure.colorbar(filled, ax=axes, label="stride [mm per cycle]", shrink=0.8)
-    figure.suptitle(
-        "star: calibration; dot: steady; cross: spread over 2 % or failed" + (f"; {note}" if note else ""), fontsize=10
-    )
+    key = "star: where the maps cross; dot: steady; cross: spread over 2 % or failed"
+    figure.suptitle(key + (f"; {note}" if note else ""), fontsize=10)
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=110)
+    figure.savefig(file, dpi=85)
     plt.close(figure)
 
 

@@ -77,7 +77,8 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         sheet.mass([2 * (panel + (panel == last)), 2 * (panel + (panel == last)) + 1], s.foot_mass / 2)
     for k in range(1, len(x) - 1):
         for y in (-1, 1):
-            sheet.contact(k, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2)
+            cell = k if s.heading > 0 else k - 1  # of the two cells at a station, the one ahead
+            sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2)
     sheet.set("ground", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
     sheet.set("friction", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
     sheet.set("coulomb", friction_coefficient=s.belly_friction)

@@ -29,9 +29,10 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings
+from origami_sim.scene import Outcome, Progress, Settings, follow
 from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
+
+from .mae_cantilever import as_beam
 
 CALIBRATION = "de_bender"
 VOLTAGES = np.array([500.0, 1000.0, 2000.0, 3000.0, 4000.0])
@@ -45,8 +46,9 @@ REFERENCE = {
 plane strain, solved independently."""
 
 REFERENCE_TIP = {
-    1: np.array([0.0093, 0.0374, 0.1511, 0.3438, 0.6117]), 5: np.array([0.0011, 0.0042, 0.0170, 0.0383, 0.0681]),
-}  # fmt: skip
+    1: np.array([0.0093, 0.0374, 0.1511, 0.3438, 0.6117]),
+    5: np.array([0.0011, 0.0042, 0.0170, 0.0383, 0.0681]),
+}
 """Tip displacement over length at VOLTAGES by tape layers, with thinning, electrode 15 of 19 mm wide."""
 
 CURVATURE = 60.0
@@ -79,8 +81,13 @@ def section(s: Settings, tape_layers: float) -> Section:
     mu, alpha = ogden(s)
     shear = 0.5 * float(mu @ alpha)
     if not shear > 0:
-        raise InputError("the Ogden constants have no positive shear modulus", file=s.file, field="ogden_mu_1",
-                         value=shear, allowed="sum of mu alpha > 0")  # fmt: skip
+        raise InputError(
+            "the Ogden constants have no positive shear modulus",
+            file=s.file,
+            field="ogden_mu_1",
+            value=shear,
+            allowed="sum of mu alpha > 0",
+        )
     tape, stack = tape_layers * s.tape_thickness, round(s.layers) * s.layer_thickness
     moduli = (s.tape_modulus / (1 - s.tape_poisson**2), 4 * shear)
     stiff = moduli[0] * tape, moduli[1] * stack
@@ -95,8 +102,11 @@ def ogden(s: Settings) -> tuple[np.ndarray, np.ndarray]:
 
 
 def passive_moment(s: Settings, at: Section, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moment per width [N] that bends the section to a curvature [1/m], and the share of a constant true pressure's
-    moment in p H a there."""
+    """What it takes to bend a section to some curvatures [1/m].
+
+    Returns:
+        Moment per width [N]; moment of a true stress p of constant size over p H a [-].
+    """
     mu, alpha = (v[:, None, None] for v in ogden(s))
     nodes, weights = np.polynomial.legendre.leggauss(12)
     z, w = 0.5 * at.stack * (1 + nodes), 0.5 * at.stack * weights
@@ -150,43 +160,58 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
     mass = np.concatenate([[halves[1]], halves[1:-2] + halves[2:-1], [halves[-2]]]) / lengths
 
     mean = float(thick.mean())
-    sheet = Sheet(strip(list(lengths), s.width), thickness=mean, modulus=s.membrane_stiffness / mean,
-                  density=s.density, membrane_damping=s.membrane_damping)  # fmt: skip
+    sheet = Sheet(
+        strip(list(lengths), s.width),
+        thickness=mean,
+        modulus=s.membrane_stiffness / mean,
+        density=s.density,
+        membrane_damping=s.membrane_damping,
+    )
     sheet.density[:] = mass / mean
     sheet.fix(panels=[0]).fix(nodes=range(2 * len(lengths) + 2), axes="y")
     # the drive acts within the hinges; only weight and inertia load the panels' diagonals
-    largest = np.concatenate([[at[0].rigidity], np.maximum([a.rigidity for a in at[1:]], [a.rigidity for a in at[:-1]]),
-                              [at[-1].rigidity]])  # fmt: skip
+    largest = np.concatenate(
+        [[at[0].rigidity], np.maximum([a.rigidity for a in at[1:]], [a.rigidity for a in at[:-1]]), [at[-1].rigidity]]
+    )
     for panel, d in enumerate(largest):
         sheet.panel(panel, rigidity=s.twist * d)
     order = np.argsort(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0], kind="stable")
     tables = {key: _Table(s, a) for key, a in sections.items()} if s.section == "ogden" else {}
     stiffness = np.zeros(len(order))
     stack = {
-        "permittivity": s.permittivity * s.pressure_share, "layer_thickness": s.layer_thickness,
-        "layers": float(round(s.layers)), "width": s.electrode_width, "constraint": 1.0, "side": -1.0,
-    }  # fmt: skip
+        "permittivity": s.permittivity * s.pressure_share,
+        "layer_thickness": s.layer_thickness,
+        "layers": float(round(s.layers)),
+        "width": s.electrode_width,
+        "constraint": 1.0,
+        "side": -1.0,
+    }
     for h, crease in enumerate(order):
         g, a, length = owner[h], at[h], part[h]
         stiffness[crease] = a.rigidity * s.width / length
         if tables:
             turn = CURVATURE * length
-            sheet.set("crease_table", [crease], angle_min=-turn, angle_max=turn,
-                      resisting_moment=tables[g.tape_layers].moments(s.thinning)[None, None] * s.width)  # fmt: skip
+            sheet.set(
+                "crease_table",
+                [crease],
+                angle_min=-turn,
+                angle_max=turn,
+                resisting_moment=tables[g.tape_layers].moments(s.thinning)[None, None] * s.width,
+            )
         if not g.electrode:
             continue
         sheet.set("maxwell_stress", [crease], lever=a.lever, **stack)
         if s.thinning and not tables:
-            sheet.set("thickness_thinning", [crease], first=a.tape - a.neutral, neutral=0.0, hinge_length=length,
-                      **stack)  # fmt: skip
+            sheet.set(
+                "thickness_thinning", [crease], first=a.tape - a.neutral, neutral=0.0, hinge_length=length, **stack
+            )
     if not tables:
         sheet.crease(stiffness=stiffness, rest_angle=0.0)
     sheet.set("crease_viscosity", viscosity=s.loss_time * stiffness).set("mass_damping", decay_rate=s.decay_rate)
     gx, gz = {"weightless": (0, 0), "hanging": (1, 0), "lifting": (0, 1)}[s.orientation]
     sheet.gravity((gx * s.gravity, 0, gz * s.gravity))
     model, parameters = sheet.build()
-    pairs = parameters["inertia", "mass"].reshape(-1, 2)  # by station: both corners alike, so that nothing twists
-    parameters.set("inertia", "mass", np.repeat(pairs.mean(axis=1), 2))
+    as_beam(model, parameters, s.membrane_stiffness * s.width)
     return model, parameters, drive(s)
 
 
@@ -208,14 +233,21 @@ def drive(s: Settings) -> Drive:
 
 def segments(s: Settings, hinges: float) -> list[Segment]:
     """The electroded length and the bare tip."""
-    return [Segment(s.electrode_length, round(hinges), s.tape_layers, True),
-            Segment(s.length - s.electrode_length, 1, s.tape_layers, False)]  # fmt: skip
+    return [
+        Segment(s.electrode_length, round(hinges), s.tape_layers, True),
+        Segment(s.length - s.electrode_length, 1, s.tape_layers, False),
+    ]
 
 
 def build(s: Settings, *, hinges: float | None = None) -> tuple[Model, Parameters, Drive]:
     if s.length <= s.electrode_length:
-        raise InputError("the strip ends beyond its electrode", file=s.file, field="length", value=s.length,
-                         allowed=f"> {s.electrode_length:g} m")  # fmt: skip
+        raise InputError(
+            "the strip ends beyond its electrode",
+            file=s.file,
+            field="length",
+            value=s.length,
+            allowed=f"> {s.electrode_length:g} m",
+        )
     return chain(s, segments(s, hinges or s.hinges))
 
 
@@ -230,30 +262,30 @@ def tip(x: np.ndarray, length: float) -> float:
     return float(np.linalg.norm(x[-2:].mean(axis=0) - (length, 0, 0)) / length)
 
 
-def settle(built: tuple[Model, Parameters, Drive], voltages: Sequence[float] | np.ndarray) -> list[np.ndarray]:
-    """Equilibrium positions [N, 3], each voltage from the shape at the one before it."""
+def settle(
+    built: tuple[Model, Parameters, Drive], voltages: Sequence[float] | np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Equilibrium positions without voltage [N, 3] and at each voltage [V, N, 3], followed up; and what failed."""
     model, parameters, _ = built
-    state, out = None, []
-    for v in voltages:
-        state = equilibrium(model, parameters, Drive(voltage=float(v)), state=state).state
-        out.append(state.x[:, 0])
-    return out
+    drives = [Drive(voltage=float(v)) for v in (0.0, *voltages)]
+    x, notes = follow(model, parameters, drives, lambda x: x)
+    return x[0], x[1:], notes
 
 
-def bend(s: Settings, voltages: Sequence[float] | np.ndarray = VOLTAGES) -> dict[str, np.ndarray]:
-    """Mean curvature of the electroded part [1/m] and R/L, by statics.
+def bend(s: Settings, voltages: Sequence[float] | np.ndarray = VOLTAGES) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Mean curvature of the electroded part [1/m] and R/L, by statics; and what failed.
 
     With gravity the displacement is counted from the shape without voltage.
     """
-    built = build(s)
-    rest, *shapes = settle(built, [0.0, *voltages])
+    rest, shapes, notes = settle(build(s), voltages)
     last = round(s.hinges)
     turn = np.array([inclinations(x)[last] - inclinations(rest)[last] for x in shapes])
     moved = np.array([np.linalg.norm(x[-2:].mean(axis=0) - rest[-2:].mean(axis=0)) for x in shapes])
     return {
-        "voltage_kV": np.asarray(voltages) / 1e3, "curvature_per_m": turn / s.electrode_length,
+        "voltage_kV": np.asarray(voltages) / 1e3,
+        "curvature_per_m": turn / s.electrode_length,
         "r_over_l": moved / s.length,
-    }  # fmt: skip
+    }, notes
 
 
 def gravity_number(s: Settings) -> float:
@@ -264,18 +296,23 @@ def gravity_number(s: Settings) -> float:
 
 
 def exponent(voltages: np.ndarray, response: np.ndarray) -> float:
-    """Exponent of a power law, fitted from 1 kV up."""
-    high = np.asarray(voltages) >= 1000.0
-    return float(np.polyfit(np.log(np.asarray(voltages)[high]), np.log(response[high]), 1)[0])
+    """Exponent of a power law, fitted from 1 kV up; nan with fewer than two points."""
+    known = (np.asarray(voltages) >= 1000.0) & (response > 0)
+    if known.sum() < 2:
+        return float("nan")
+    return float(np.polyfit(np.log(np.asarray(voltages)[known]), np.log(response[known]), 1)[0])
 
 
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """Curvature and displacement by statics, and the motion for the replay."""
     voltages = s.voltage * VOLTAGES / VOLTAGES[-1]
-    full = bend(s, voltages)
-    constant = bend(s.replace(thinning=False), voltages)
-    table = {**full, "constant_t_per_m": constant["curvature_per_m"],
-             "excess_percent": 100 * (full["curvature_per_m"] / constant["curvature_per_m"] - 1)}  # fmt: skip
+    full, notes = bend(s, voltages)
+    constant, more = bend(s.replace(thinning=False), voltages)
+    table = {
+        **full,
+        "constant_t_per_m": constant["curvature_per_m"],
+        "excess_percent": 100 * (full["curvature_per_m"] / constant["curvature_per_m"] - 1),
+    }
     known = REFERENCE_TIP.get(round(s.tape_layers))
     if known is not None and s.thinning and s.orientation == "weightless" and s.voltage == VOLTAGES[-1]:
         table["reference_r_over_l"] = known
@@ -284,16 +321,26 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     final = tip(motion.x[-1, :, 0], s.length)
     power = exponent(voltages, full["curvature_per_m"])
     return Outcome(
-        motion, {"bending": {**table}}, units={"voltage_kV": "kV", "curvature_per_m": "1/m", "constant_t_per_m": "1/m"},
+        motion,
+        {"bending": {**table}},
+        units={"voltage_kV": "kV", "curvature_per_m": "1/m", "constant_t_per_m": "1/m"},
         summary=[
-            f"R/L = {full['r_over_l'][-1]:.4f} at {s.voltage / 1e3:g} kV by statics, {final:.4f} at the end of the motion",
-            f"curvature goes as the voltage to the power {power:.3f}; thinning adds {table['excess_percent'][-1]:.2f} % "
-            f"at the largest; w g L^3 / D = {gravity_number(s):.2f}",
+            *notes,
+            *more,
+            f"R/L = {full['r_over_l'][-1]:.4f} at {s.voltage / 1e3:g} kV by statics, {final:.4f} at the end of the "
+            "motion",
+            f"curvature goes as the voltage to the power {power:.3f}; thinning adds "
+            f"{table['excess_percent'][-1]:.2f} % at the largest; w g L^3 / D = {gravity_number(s):.2f}",
         ],
-        numbers={"r_over_l": float(full["r_over_l"][-1]), "curvature_per_m": float(full["curvature_per_m"][-1]),
-                 "exponent": power, "excess_percent": float(table["excess_percent"][-1]), "dynamic_r_over_l": final,
-                 "gravity_number": gravity_number(s)},
-    )  # fmt: skip
+        numbers={
+            "r_over_l": float(full["r_over_l"][-1]),
+            "curvature_per_m": float(full["curvature_per_m"][-1]),
+            "exponent": power,
+            "excess_percent": float(table["excess_percent"][-1]),
+            "dynamic_r_over_l": final,
+            "gravity_number": gravity_number(s),
+        },
+    )
 
 
 if __name__ == "__main__":

@@ -9,13 +9,14 @@ a stack without any is symmetric and does not bend.
 from collections.abc import Sequence
 
 import numpy as np
-from origami_sim.scenes.de_bender import Segment, chain, exponent, inclinations, settle
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Outcome, Progress, Settings
 from origami_sim.solve.dynamics import simulate
+
+from .de_bender import Segment, chain, exponent, inclinations, settle
 
 CALIBRATION = "de_fold"
 VOLTAGES = np.array([1000.0, 2000.0, 3000.0, 4000.0])
@@ -29,12 +30,21 @@ def segments(s: Settings, hinges: float) -> list[Segment]:
     bare = s.length - s.electrode_length
     for name, value in (("notch_length", arm), ("electrode_length", bare)):
         if not value > 0:
-            raise InputError("notch, electrode and strip must each be longer than the one before", file=s.file,
-                             field=name, value=getattr(s, name), allowed="notch_length < electrode_length < length")  # fmt: skip
+            raise InputError(
+                "notch, electrode and strip must each be longer than the one before",
+                file=s.file,
+                field=name,
+                value=getattr(s, name),
+                allowed="notch_length < electrode_length < length",
+            )
     n = round(hinges)
     each = max(1, round(n * arm / s.notch_length))
-    return [Segment(arm, each, s.tape_layers, True), Segment(s.notch_length, n, s.notch_tape_layers, True),
-            Segment(arm, each, s.tape_layers, True), Segment(bare, 1, s.tape_layers, False)]  # fmt: skip
+    return [
+        Segment(arm, each, s.tape_layers, True),
+        Segment(s.notch_length, n, s.notch_tape_layers, True),
+        Segment(arm, each, s.tape_layers, True),
+        Segment(bare, 1, s.tape_layers, False),
+    ]
 
 
 def build(s: Settings, *, hinges: float | None = None) -> tuple[Model, Parameters, Drive]:
@@ -47,21 +57,29 @@ def turns(parts: Sequence[Segment], x: np.ndarray) -> np.ndarray:
     return np.diff(inclinations(x)[borders])
 
 
-def fold(s: Settings, voltages: Sequence[float] | np.ndarray = VOLTAGES) -> dict[str, np.ndarray]:
-    """Angles of notch and arms together by statics [deg], counted from the shape without voltage, and their sum."""
+def fold(s: Settings, voltages: Sequence[float] | np.ndarray = VOLTAGES) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Angles of notch and arms by statics [deg], counted from the shape without voltage, and their sum; what failed.
+
+    The localisation is the mean curvature of the notch over that of the arms.
+    """
     parts = segments(s, s.hinges)
-    rest, *shapes = settle(build(s), [0.0, *voltages])
+    rest, shapes, notes = settle(build(s), voltages)
     angle = np.degrees([turns(parts, x) - turns(parts, rest) for x in shapes])
     notch, arms = angle[:, 1], angle[:, 0] + angle[:, 2]
     per_length = (notch / s.notch_length) / (arms / (s.electrode_length - s.notch_length))
-    return {"voltage_kV": np.asarray(voltages) / 1e3, "notch_deg": notch, "arms_deg": arms, "total_deg": notch + arms,
-            "localisation": per_length}  # fmt: skip
+    return {
+        "voltage_kV": np.asarray(voltages) / 1e3,
+        "notch_deg": notch,
+        "arms_deg": arms,
+        "total_deg": notch + arms,
+        "localisation": per_length,
+    }, notes
 
 
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """Angles by statics, and the motion for the replay."""
     voltages = s.voltage * VOLTAGES / VOLTAGES[-1]
-    table = fold(s, voltages)
+    table, notes = fold(s, voltages)
     if s.voltage == VOLTAGES[-1] and s.orientation == "weightless":
         table |= {f"reference_{k}": v for k, v in REFERENCE.items()}
     power = exponent(voltages, table["notch_deg"])
@@ -70,16 +88,24 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     final = float(np.degrees(turns(segments(s, s.motion_hinges), motion.x[-1, :, 0])[1]))
     notch, arms = float(table["notch_deg"][-1]), float(table["arms_deg"][-1])
     return Outcome(
-        motion, {"fold_angle": {**table}}, units={"voltage_kV": "kV", "localisation": "1"},
+        motion,
+        {"fold_angle": {**table}},
+        units={"voltage_kV": "kV", "localisation": "1"},
         summary=[
+            *notes,
             f"at {s.voltage / 1e3:g} kV the notch folds by {notch:.2f} deg and the arms bend by {arms:.2f} deg by "
             f"statics; the notch ends the motion at {final:.2f} deg",
             f"the notch bends {table['localisation'][-1]:.1f} times as sharply as the arms; its angle goes as the "
             f"voltage to the power {power:.3f}",
         ],
-        numbers={"notch_deg": notch, "arms_deg": arms, "exponent": power, "dynamic_notch_deg": final,
-                 "localisation": float(table["localisation"][-1])},
-    )  # fmt: skip
+        numbers={
+            "notch_deg": notch,
+            "arms_deg": arms,
+            "exponent": power,
+            "dynamic_notch_deg": final,
+            "localisation": float(table["localisation"][-1]),
+        },
+    )
 
 
 if __name__ == "__main__":

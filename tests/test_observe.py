@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.observe import channel_frames, observe
 from origami_sim.recording import Channel, Recording
@@ -22,9 +21,7 @@ def channel(kind, values, unit="rad", **attachment) -> Channel:
 
 
 def recording(times, *channels) -> Recording:
-    return Recording(
-        name="test", times=np.asarray(times, float), channels={c.name: c for c in channels}, drive=Drive(), metadata={}
-    )
+    return Recording(name="test", times=np.asarray(times, float), channels={c.name: c for c in channels})
 
 
 def test_panel_angles_follow_the_direction_of_the_panel(motion):
@@ -68,7 +65,10 @@ def test_frames_between_those_of_the_run_are_interpolated(motion):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (channel("panel_angle", [0.0, 0.0], panel="arm7"), r"nothing of that name.*channels\.c\.panel.*arm7.*arm1, arm2"),
+        (
+            channel("panel_angle", [0.0, 0.0], panel="arm7"),
+            r"nothing of that name.*channels\.c\.panel.*arm7.*arm1, arm2",
+        ),
         (channel("panel_angle", [0.0, 0.0], panel=9), r"nothing of that name.*9"),
         (channel("crease_angle", [0.0, 0.0], crease=5), r"nothing of that name.*crease.*5.*0 to 1"),
         (channel("marker", np.zeros((2, 3)), unit="m", node=999), r"nothing of that name.*node.*999"),

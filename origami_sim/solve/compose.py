@@ -404,13 +404,13 @@ class _Composer:
         t("share = weights[c]")
         t("off = offsets[c]")
         t("at = share[0] * X[n1, w] + share[1] * X[n2, w] + share[2] * X[n3, w]")
-        t("at = at + off * kinematics.panel_normal(X[n1, w], X[n2, w], X[n3, w])")
+        t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
+        t("at = at + off * patch.n")
         t("gap = wp.dot(up, at) - plane_height")
         if mode == "evaluate":
             t("gaps[c, w] = gap")
         t("if gap < reach:")
         t.depth += 1
-        t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
         # velocity of the contact point: d(normal) = -sum (n . dx_i) grad_i
         t("velocity = share[0] * V[n1, w] + share[1] * V[n2, w] + share[2] * V[n3, w]")
         t(

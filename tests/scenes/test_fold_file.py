@@ -84,7 +84,9 @@ def test_a_path_is_read_before_a_shipped_name(settings, tmp_path):
     shipped = Path(fold_file.__file__).with_name("waterbomb.fold")
     own = tmp_path / "own.fold"
     own.write_bytes(shipped.read_bytes())
-    assert fold_file.load(settings.replace(pattern=str(own))).equals(fold_file.load(settings.replace(pattern="waterbomb.fold")))
+    assert fold_file.load(settings.replace(pattern=str(own))).equals(
+        fold_file.load(settings.replace(pattern="waterbomb.fold"))
+    )
 
 
 SQUARE = {
@@ -130,6 +132,10 @@ def test_bad_patterns_are_one_sentence(settings, tmp_path, change, words):
 def test_files_that_are_no_patterns(settings, tmp_path):
     torn = tmp_path / "torn.fold"
     torn.write_text('{"vertices_coords": [[0, 0')
-    for given, words in (("nowhere.fold", "no such file"), ("picture.png", "unknown pattern format"), (str(torn), "JSON")):
+    for given, words in (
+        ("nowhere.fold", "no such file"),
+        ("picture.png", "unknown pattern format"),
+        (str(torn), "JSON"),
+    ):
         with pytest.raises(InputError, match=words):
             fold_file.run(settings.replace(pattern=given))

@@ -24,7 +24,7 @@ def moments(sheet: Sheet) -> tuple[float, np.ndarray, np.ndarray]:
     return m.sum(), centre, (m[:, None, None] * d[:, :, None] * d[:, None, :]).sum(0)
 
 
-# mass ------------------------------------------------------------------------------------------------------------------
+# mass ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,8 @@ def moments(sheet: Sheet) -> tuple[float, np.ndarray, np.ndarray]:
 )
 def test_centred_parallelograms_have_the_mass_centre_and_inertia_of_the_plate(u, v):
     u, v, origin = np.array(u), np.array(v), np.array([0.1, -0.05])
-    sheet = Sheet(one_face([origin, origin + u, origin + u + v, origin + v]), thickness=1e-3, triangulation="center")
+    corners = [origin, origin + u, origin + u + v, origin + v]
+    sheet = Sheet(one_face(corners), thickness=1e-3, triangulation="center")
     mass, centre, second = moments(sheet)
     exact = MATERIALS["pdms"].density * 1e-3 * abs(u[0] * v[1] - u[1] * v[0])
     assert mass == pytest.approx(exact, rel=1e-12)
@@ -114,7 +115,7 @@ def test_point_masses_add():
     assert loaded - plain == pytest.approx(3e-3, rel=1e-9)
 
 
-# membrane ----------------------------------------------------------------------------------------------------------------
+# membrane ----------------------------------------------------------------------------------------------------------
 
 
 def equilateral(rows: int, columns: int, side: float) -> Pattern:
@@ -159,7 +160,9 @@ def test_equilateral_bars_are_plane_stress_with_a_third(strain):
 def test_any_mesh_is_exact_in_equal_biaxial_strain():
     """U / area = E t e^2 / (1 - nu)."""
     sheet = Sheet(strip([0.01, 0.023], [0.01, 0.02, 0.005]), thickness=1e-3, modulus=2e6).crease(stiffness=1e-3)
-    assert membrane_energy(sheet, 1e-3 * np.eye(2)) == pytest.approx(2e6 * 1e-3 * 1e-6 * 1.5 * sheet.area.sum(), rel=1e-9)
+    assert membrane_energy(sheet, 1e-3 * np.eye(2)) == pytest.approx(
+        2e6 * 1e-3 * 1e-6 * 1.5 * sheet.area.sum(), rel=1e-9
+    )
 
 
 def test_membrane_factor_and_patch_scale_the_bars():
@@ -170,7 +173,7 @@ def test_membrane_factor_and_patch_scale_the_bars():
     assert patched == pytest.approx((1 + 2 * 0.78 / 1.5) * base, rel=1e-12)
 
 
-# bending -----------------------------------------------------------------------------------------------------------------
+# bending -----------------------------------------------------------------------------------------------------------
 
 
 def bent_energies(sheet: Sheet, direction: float, curvature: float) -> tuple[np.ndarray, np.ndarray]:
@@ -292,7 +295,7 @@ def test_the_patterns_own_properties_win():
     assert parameters["crease", "rest_angle"][0, 0] == 0.25
 
 
-# bad input -----------------------------------------------------------------------------------------------------------
+# bad input -----------------------------------------------------------------------------------------------------
 
 
 def sheet(**options) -> Sheet:

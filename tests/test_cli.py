@@ -1,0 +1,383 @@
+"""The command line: what it prints, its exit codes, and that bad input leaves everything as it was."""
+
+import hashlib
+import json
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from origami_sim import cli, scene
+from origami_sim.drive import Drive, series
+from origami_sim.errors import InputError
+from origami_sim.recording import stand_in_double_pendulum
+from origami_sim.results import load_run
+from origami_sim.scene import read_calibration, scene_module
+from origami_sim.scenes import mae_crease
+from origami_sim.solve.dynamics import simulate
+
+COMMANDS = ("run", "replay", "compare", "effects", "stride", "demo")
+SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
+QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
+
+
+@pytest.fixture
+def call(capfd, tmp_path, monkeypatch):
+    """Runs a command line in an empty folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as e:
+            cli.main([str(a) for a in arguments])
+        return e.value.code, *capfd.readouterr()
+
+    return run
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Every file below a folder with the digest of its bytes."""
+    return {
+        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() if p.is_file() else "folder"
+        for p in sorted(folder.rglob("*"))
+    }
+
+
+# what it prints --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(call, command):
+    code, out, _ = call(command, "--help")
+    assert code == 0
+    assert re.search(rf"example: origami-sim {command}\b", out)
+    assert "--json" in out
+
+
+def test_help_lists_commands_and_exit_codes(call):
+    code, out, _ = call("--help")
+    assert code == 0
+    assert all(c in out for c in COMMANDS)
+    assert "Exit codes" in out
+
+
+def test_run_box_prints_its_table_and_leaves_a_run(call, tmp_path):
+    code, out, err = call("run", "box")
+    assert (code, err) == (0, "")
+    assert "reference_deg" in out
+    assert "81.39" in out
+    assert re.search(r"dt = .* of the limit .* set at node", out)
+    run = load_run(tmp_path / "runs" / "box")
+    assert run.manifest["scene"] == "box"
+    assert run.units["field_mT"] == "mT"
+    assert run.replay.is_file()
+
+
+def test_overrides_reach_the_run_with_their_units(call, tmp_path):
+    code, out, _ = call("run", "box", "--set", "gap=3.81mm", "--set", "gravity=0", "--json", "--out", "here")
+    assert code == 0
+    result = json.loads(out)
+    assert result["numbers"]["flap_deg"] == pytest.approx(83, abs=0.7)
+    assert result["failures"] == []
+    manifest = load_run(tmp_path / "here").manifest
+    assert manifest["overrides"] == {"gap": "3.81mm", "gravity": "0"}
+    assert manifest["settings"]["gap"] == pytest.approx(0.00381)
+
+
+def test_settings_are_listed_with_their_sources(call, tmp_path):
+    code, out, _ = call("run", "box", "--settings", "--set", "gap=3mm")
+    assert code == 0
+    assert "gap = 0.003 m, 0.001 to 0.006" in out
+    assert all(s.source in out for s in read_calibration("box").values())
+    code, out, _ = call("run", "box", "--settings", "--json")
+    assert json.loads(out)["gap"]["unit"] == "m"
+    assert contents(tmp_path) == {}
+
+
+def test_a_calibration_file_replaces_the_scenes_own(call, tmp_path):
+    shipped = Path(scene.__file__).parents[1] / "calibrations" / "fold_file.toml"
+    own = tmp_path / "own.toml"
+    own.write_text(shipped.read_text().replace('value = "miura.fold"', 'value = "waterbomb.fold"'))
+    code, out, _ = call("run", "fold_file", "--calibration", own, *QUICK)
+    assert code == 0
+    assert "6 creases folded" in out
+
+
+def test_effects_lists_the_whole_catalogue(call):
+    from origami_sim.effects import CATALOGUE
+
+    code, out, _ = call("effects")
+    assert code == 0
+    for effect in CATALOGUE.values():
+        assert f"{effect.name}  ({effect.family})" in out
+        assert effect.formula in out
+    code, out, _ = call("effects", "--json")
+    assert [e["name"] for e in json.loads(out)] == list(CATALOGUE)
+    assert "Infinity" not in out
+    code, out, _ = call("effects", "crease")
+    assert code == 0
+    assert out.startswith("crease  (crease)")
+
+
+def test_compare_with_a_stand_in_recording(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=1.5)
+    code, out, err = call("compare", recording, "--scene", "pendulum_chain", "--sidecar", SIDECAR, "--duration", 1)
+    assert (code, err) == (0, "")
+    assert "theta1" in out
+    assert "fit" in out
+    folder = tmp_path / "runs" / "compare"
+    assert (folder / "overlay.png").stat().st_size > 10_000
+    columns = load_run(folder).tables["comparison"]
+    assert len(columns["time_s"]) == 1001
+    code, out, _ = call(
+        "compare", recording, "--scene", "pendulum_chain", "--sidecar", SIDECAR, "--duration", 0.5, "--json"
+    )
+    assert code == 0
+    assert set(json.loads(out)["channels"]) == {"theta1", "theta2"}
+
+
+def test_screenshot_of_a_run(call, tmp_path):
+    assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
+    code, _, err = call("replay", "here", "--screenshot", "picture.png", "--json")
+    if code == 1:
+        pytest.skip(err.strip() or "no renderer here")
+    assert code == 0
+    assert (tmp_path / "picture.png").stat().st_size > 5_000
+
+
+def test_progress_is_shown_only_to_somebody_who_watches(capsys, monkeypatch):
+    cli._Bar("box")(0.5)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    bar = cli._Bar("box")
+    bar(0.5)
+    bar(0.5)
+    bar(1.0)
+    shown = capsys.readouterr().err
+    assert shown.count("50 %") == 1
+    assert re.search(r"100 % in [\d.]+ s\n$", shown)
+
+
+# exit codes --------------------------------------------------------------------------------------------------------
+
+
+def test_code_1_where_the_answer_is_no(call, monkeypatch):
+    assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
+    monkeypatch.setattr("origami_sim.replay.screenshot", lambda *_, **__: False)
+    code, out, _ = call("replay", "here", "--screenshot", "picture.png", "--json")
+    assert code == 1
+    assert json.loads(out) == {"picture": None}
+
+
+def test_code_3_names_world_time_place_and_cause(call, tmp_path):
+    code, out, err = call(
+        "run", "fold_file", "--set", "crease_stiffness=100", "--set", "membrane=1e-5", "--json", *QUICK
+    )
+    assert code == 3
+    sentence = r"origami-sim: world 0 went unstable at t = [\d.e-]+ s at node \d+: .+ strained by \d+%.*smaller step"
+    assert re.match(sentence, err)
+    assert len(err.splitlines()) == 1
+    assert len(json.loads(out)["failures"]) == 1
+    assert load_run(tmp_path / "runs" / "fold_file").trajectory.failures  # kept, to see what happened
+
+
+def test_code_130_and_earlier_results_untouched_after_an_interrupt(call, tmp_path):
+    assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
+    before = contents(tmp_path)
+    watch = "import origami_sim.cli as c\nc._Bar.__call__ = lambda self, f: print(f, flush=True)\nc.main()"
+    arguments = ["run", "fold_file", "--out", "here", "--set", "fold_time=100"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", watch, *arguments],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    try:
+        for _ in range(3):  # it computes
+            assert process.stdout.readline().strip()
+        process.send_signal(signal.SIGINT)
+        process.stdout.close()
+        process.stdout = None
+        _, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert err == "origami-sim: interrupted; earlier results are untouched.\n"
+    assert contents(tmp_path) == before
+
+
+def test_a_reader_that_leaves_is_no_error(tmp_path):
+    code = subprocess.run(
+        f"set -o pipefail; {sys.executable} -m origami_sim.cli effects | head -1",
+        shell=True, executable="/bin/bash", cwd=tmp_path, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert code.returncode == 0
+    assert code.stderr == ""
+
+
+# bad input ---------------------------------------------------------------------------------------------------------
+
+
+def refused(call, tmp_path, arguments, words):
+    """One sentence, code 2, nothing on standard output, no file touched."""
+    before = contents(tmp_path)
+    code, out, err = call(*arguments)
+    assert code == 2, (out, err)
+    assert out == ""
+    assert re.search(words, err), err
+    assert err.startswith("origami-sim: ")
+    assert len(err.splitlines()) == 1
+    assert err.endswith(".\n")
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], r"required: COMMAND"),
+        (["fly"], r"invalid choice: 'fly'.*run.*demo"),
+        (["run"], r"required: scene"),
+        (["run", "box", "--colour", "red"], r"unrecognized arguments: --colour red"),
+        (["run", "castle"], r"no such scene.*castle.*box, crawler, bifold"),
+        (["run", "box", "--set", "gapp=1mm"], r"box\.toml: cannot apply this setting.*gapp.*gap"),
+        (["run", "box", "--set", "gap=1m"], r"out of its range.*'gap'.*0\.001 to 0\.006 m"),
+        (["run", "box", "--set", "gap=1V"], r"wrong unit.*'gap'.*'V'.*m, cm, mm"),
+        (["run", "box", "--set", "thickness=-1mm"], r"out of its range.*thickness"),
+        (["run", "fold_file", "--set", "material=steel"], r"not one of the choices.*steel.*pdms"),
+        (["run", "box", "--calibration", "none.toml"], r"none\.toml: cannot be read"),
+        (["run", "box", "--calibration", "mae_crease"], r"mae_crease\.toml: .*lacks a setting"),
+        (["run", "fold_file", "--set", "pattern=none.fold"], r"none\.fold: no such file"),
+        (["run", "fold_file", "--set", "pattern=none.step"], r"unknown pattern format.*\.step.*\.fold"),
+        (["effects", "telekinesis"], r"no such effect.*telekinesis.*adhesion"),
+        (["replay", "nowhere"], r"nowhere: there is no such replay"),
+        (["stride", "box"], r"does not walk.*box.*crawler"),
+        (["stride", "--cycles", "0"], r"whole cycles.*--cycles.*0"),
+        (["compare", "none.csv", "--scene", "pendulum_chain"], r"none\.csv.*cannot be read"),
+        (["compare", "none.csv", "--scene", "box"], r"cannot replicate.*box.*pendulum_chain"),
+        (["compare", "none.csv", "--scene", "pendulum_chain", "--duration", "0"], r"must be positive.*--duration"),
+        (["compare", "none.csv", "--scene", "pendulum_chain", "--threshold", "nan"], r"must be positive.*--threshold"),
+    ],
+    ids=lambda v: " ".join(v) if isinstance(v, list) else "",
+)
+def test_bad_arguments(call, tmp_path, arguments, words):
+    refused(call, tmp_path, arguments, words)
+
+
+SHEET = {
+    "vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1]],
+    "faces_vertices": [[0, 1, 2], [0, 2, 3]],
+    "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]],
+    "edges_assignment": ["B", "B", "B", "B", "V"],
+    "edges_foldAngle": [0, 0, 0, 0, 90],
+    "frame_unit": "cm",
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"vertices_coords": None}, r"vertices_coords"),
+        ({"faces_vertices": [[0, 1, 2], [0, 2, 7]]}, r"faces_vertices.*7"),
+        ({"vertices_coords": [[0, 0], [1, 0], [2, 0], [0, 1]]}, r"area"),
+        ({"faces_vertices": [[0, 1, 2], [0, 2, 3], [2, 0, 1]]}, r"faces_vertices"),
+        ({"vertices_coords": [[0, 0], [1, float("nan")], [1, 1], [0, 1]]}, r"bad\.fold: number that JSON.*NaN.*finite"),
+        ({"frame_unit": "parsec"}, r"frame_unit.*parsec.*m, cm, mm"),
+        ({"faces_osim:thickness": [-0.001, 0.001]}, r"thickness.*-0\.001"),
+        ({"faces_osim:material": ["pdms", "steel"]}, r"steel.*pdms"),
+        ({"edges_osim:stiffness": [1, 1, 1, 1, -2]}, r"stiffness.*-2"),
+    ],
+)
+def test_malformed_patterns(call, tmp_path, change, words):
+    path = tmp_path / "bad.fold"
+    path.write_text(json.dumps({k: v for k, v in {**SHEET, **change}.items() if v is not None}))
+    refused(call, tmp_path, ["run", "fold_file", "--set", f"pattern={path}"], words)
+
+
+def test_earlier_results_survive_a_refused_run(call, tmp_path):
+    assert call("run", "fold_file", *QUICK)[0] == 0
+    torn = tmp_path / "torn.fold"
+    torn.write_text("{")
+    refused(call, tmp_path, ["run", "fold_file", "--set", f"pattern={torn}"], r"torn\.fold.*JSON")
+
+
+def test_output_folders_that_cannot_be_written(call, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("mine")
+    monkeypatch.setattr(mae_crease, "run", lambda *_, **__: pytest.fail("computed before the folder was checked"))
+    for out, words in (
+        ("file", r"file: is a file; a run is a folder"),
+        ("file/below", r"file/below: cannot be written"),
+        ("mine", r"mine: is a folder with other things in it"),
+        ("/proc/nothing/here", r"/proc/nothing/here: cannot be written"),
+    ):
+        refused(call, tmp_path, ["run", "mae_crease", "--out", out], words)
+    refused(call, tmp_path, ["demo", "--out", "file"], r"cannot be written")
+
+
+def rows(count=3000, rate=1000.0) -> list[str]:
+    t = np.arange(count) / rate
+    noise = np.random.default_rng(0).normal(0, 1e-4, (2, count))
+    theta = np.stack([2.6 + 0.1 * np.sin(7 * t), 3.5 + 0.1 * np.cos(5 * t)]) + noise
+    return [f"{a:.6f},{b:.8f},{c:.8f}" for a, b, c in zip(t, *theta, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("edit", "sidecar", "words"),
+    [
+        (lambda r: r[:1000] + r[1200:], None, r"bad\.csv.*gap"),
+        (lambda r: [*r[:1000], re.sub(r",.*,", ",,", r[1000]), *r[1001:]], None, r"bad\.csv.*theta1"),
+        (lambda r: [*r[:1000], "1.0,a,b", *r[1001:]], None, r"bad\.csv"),
+        (lambda r: r[::-1], None, r"bad\.csv.*time"),
+        (lambda r: r, ('unit = "rad"', 'unit = "mm"'), r"toml.*unit.*mm"),
+        (lambda r: r, ('unit = "s"', 'unit = "fortnight"'), r"toml.*fortnight"),
+        (lambda r: r, ('column = "theta1_rad"', 'column = "phi"'), r"phi"),
+        (lambda r: r, ('panel = "arm1"', 'panel = "arm7"'), r"arm7.*arm1"),
+    ],
+    ids=["gap", "missing", "words", "backwards", "length as angle", "unit of time", "column", "attachment"],
+)
+def test_bad_recordings(call, tmp_path, edit, sidecar, words):
+    path, toml = tmp_path / "bad.csv", tmp_path / "bad.toml"
+    path.write_text("time_s,theta1_rad,theta2_rad\n" + "\n".join(edit(rows())) + "\n")
+    toml.write_text(SIDECAR.read_text().replace(*(sidecar or ("", "")), 1))
+    refused(call, tmp_path, ["compare", path, "--scene", "pendulum_chain", "--duration", "0.2"], words)
+
+
+def test_a_window_outside_the_recording(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
+    arguments = ["compare", recording, "--scene", "pendulum_chain", "--sidecar", SIDECAR]
+    refused(call, tmp_path, [*arguments, "--start", "9"], r"window|frames|recording")
+    refused(call, tmp_path, [*arguments, "--start", "nan"], r"window|frames|recording")
+
+
+def test_no_pickle_is_opened(call, tmp_path):
+    """A run folder from elsewhere cannot run code here."""
+    assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
+    states = tmp_path / "here" / "states.npz"
+    with np.load(states) as given:
+        arrays = dict(given)
+    arrays["x"] = np.array([{"a": 1}], dtype=object)
+    np.savez(states, **arrays)
+    with pytest.raises(InputError, match=r"states\.npz"):
+        load_run(tmp_path / "here")
+
+
+# the same for the Python interface -----------------------------------------------------------------------------------
+
+
+def test_drives_that_end_early_and_steps_above_the_limit():
+    model, parameters, drive = mae_crease.build(read_calibration("mae_crease"))
+    short = Drive(field=(0, 0, series([0.0, 0.5], [0.0, 0.1])))
+    with pytest.raises(InputError, match=r"drive ends before the run does.*field_z.*0\.5.*samples up to 1 s"):
+        simulate(model, parameters, short, duration=1.0)
+    with pytest.raises(InputError, match=r"time step is above the stability limit.*dt.*0\.001.*0 < dt <= .*bend"):
+        simulate(model, parameters, drive, duration=1.0, dt=1e-3)
+    for bad in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match=r"positive"):
+            simulate(model, parameters, drive, duration=bad)
