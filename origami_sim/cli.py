@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
         return p
 
     p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
-    p.add_argument("scene", help="box, crawler, bifold, pendulum_chain, fold_file or mae_crease")
+    p.add_argument("scene", help=", ".join(import_module("origami_sim.scenes").NAMES))
     p.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
     )
@@ -253,7 +254,7 @@ def _stride(args) -> int:
         raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
     cycles = args.cycles or len(regression.reference(args.scene)["strides_mm"])
     motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
-    report = regression.check(args.scene, regression.strides(motion, settings.frequency))
+    report = regression.check(args.scene, regression.strides(motion, settings.frequency), settings=settings)
     _print_json(report.to_json()) if args.json else print(report.text())
     return OK if report.passed else NO
 

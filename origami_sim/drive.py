@@ -65,6 +65,12 @@ class Signal:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether the signal is zero at all times."""
+        sampled = self.values is not None and np.any(self.scale) and np.any(self.values)
+        return not (np.any(self.offset) or np.any(self.amplitude) or sampled)
+
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """The signal at times t [s]; arrays of worlds and of times broadcast."""
         value = self.offset + self.amplitude * np.sin(2 * math.pi * np.asarray(self.frequency) * t + self.phase)

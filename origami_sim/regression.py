@@ -9,6 +9,7 @@ from importlib import metadata, resources
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
 from origami_sim.scene import Settings
@@ -38,9 +39,9 @@ def strides(motion: Trajectory, frequency: float, *, world: int = 0) -> np.ndarr
     return np.diff(x)
 
 
-def summary(each: Sequence[float], *, skip: int = SKIP) -> dict[str, float]:
-    """Mean, spread (standard deviation) and trend of the cycles after the first `skip`, in the unit of `each`."""
-    each = np.asarray(each, float)
+def summary(values: ArrayLike, *, skip: int = SKIP) -> dict[str, float]:
+    """Mean, spread (standard deviation) and trend of the cycles after the first `skip`, in the unit of `values`."""
+    each = np.asarray(values, float)
     steady = each[skip:] if len(each) > skip + 1 else each
     trend = float(np.polyfit(np.arange(len(steady)), steady, 1)[0]) if len(steady) > 1 else 0.0
     return {"mean": float(steady.mean()), "spread": float(steady.std()), "trend": trend, "cycles": len(steady)}
@@ -130,7 +131,7 @@ def reference(name: str, *, folder: Path | None = None) -> dict:
     return data
 
 
-def check(name: str, strides: Sequence[float], *, settings: Settings | None = None,
+def check(name: str, strides: Sequence[float] | np.ndarray, *, settings: Settings | None = None,
           folder: Path | None = None) -> Report:  # fmt: skip
     """Compares strides by cycle [m] with the stored reference of that name, over the cycles that both have."""
     data = reference(name, folder=folder)
@@ -145,7 +146,7 @@ def check(name: str, strides: Sequence[float], *, settings: Settings | None = No
     return Report(name, a, b, now, then, tolerance, data.get("paper_mm"), same, within)
 
 
-def store(name: str, strides: Sequence[float], *, settings: Settings, tolerance: float = 0.5,
+def store(name: str, strides: Sequence[float] | np.ndarray, *, settings: Settings, tolerance: float = 0.5,
           paper: float | None = PAPER,
           folder: Path | None = None) -> Path:  # fmt: skip
     """Writes a reference in one step and returns its file: strides by cycle (given in m), settings, versions."""

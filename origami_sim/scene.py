@@ -19,7 +19,7 @@ from origami_sim.recording.units import UNITS
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.statics import equilibrium
 
-NAMES = ("box", "crawler", "bifold", "pendulum_chain", "fold_file", "mae_crease")
+NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
 
 _KEYS = {"value", "unit", "range", "choices", "source", "meaning", "uncertainty"}

@@ -359,9 +359,9 @@ def checks(t: Trial, names: Sequence[str] = VARIED, *, change: float = 0.05) -> 
         out["cell x 0.7"] = Trial(s.replace(cell=0.7 * s.cell), t.cycles)
     for name in names:
         for factor in (1 - change, 1 + change):
-            value = s[name].value * factor
+            value = getattr(s, name) * factor
             low, high = s[name].range or (-np.inf, np.inf)
-            if value != s[name].value and low <= value <= high:
+            if value != getattr(s, name) and low <= value <= high:
                 out[f"{name} {100 * (factor - 1):+.0f} %"] = Trial(s.replace(**{name: value}), t.cycles)
     return out
 
@@ -434,8 +434,8 @@ def draw_maps(
         ax.plot(gx[steady], gy[steady], ".", color="0.15", ms=3)
         ax.plot(gx[~steady], gy[~steady], "x", color="0.15", ms=5)
         if mark is not None:
-            here = [mark.foot_friction_back / mark.foot_friction if a.name == "friction_ratio" else mark[a.name].value
-                    for a in (m.x, m.y)]  # fmt: skip
+            ratio = mark.foot_friction_back / mark.foot_friction
+            here = [ratio if a.name == "friction_ratio" else getattr(mark, a.name) for a in (m.x, m.y)]
             ax.plot(here[0] * m.x.scale, here[1] * m.y.scale, "*", color="gold", mec="k", ms=14, clip_on=False)
         ax.set(xlabel=m.x.label, ylabel=m.y.label)
     for ax in list(axes.flat)[len(maps) :]:

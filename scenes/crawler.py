@@ -75,12 +75,14 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
             feet.append(sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height,
                                       axis=(s.heading, 0, 0), name=f"foot at x = {at:.3f}"))  # fmt: skip
         sheet.mass([2 * (panel + (panel == last)), 2 * (panel + (panel == last)) + 1], s.foot_mass / 2)
+    belly = []  # at every station, shared by the cells on either side, so that fore and aft look the same
     for k in range(1, len(x) - 1):
-        for y in (-1, 1):
-            cell = k if s.heading > 0 else k - 1  # of the two cells at a station, the one ahead
-            sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2)
+        for cell in (k - 1, k):
+            belly += [sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2) for y in (-1, 1)]
     sheet.set("ground", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
     sheet.set("friction", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
+    for effect in ("ground", "friction"):
+        sheet.set(effect, belly, stiffness=s.ground_stiffness / 4, damping=s.ground_damping / 4)
     sheet.set("coulomb", friction_coefficient=s.belly_friction)
     sheet.set("coulomb", feet, friction_coefficient=s.foot_friction)
     sheet.set("directional_friction", feet, backward_excess=s.foot_friction_back - s.foot_friction)

@@ -313,7 +313,17 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         "constant_t_per_m": constant["curvature_per_m"],
         "excess_percent": 100 * (full["curvature_per_m"] / constant["curvature_per_m"] - 1),
     }
-    known = REFERENCE_TIP.get(round(s.tape_layers))
+    whole = s.replace(electrode_width=s.width)
+    (thin, few), (thick, none) = (bend(whole.replace(thinning=on), voltages) for on in (True, False))
+    section_table = {
+        "voltage_kV": voltages / 1e3,
+        "thinning_per_m": thin["curvature_per_m"],
+        "constant_t_per_m": thick["curvature_per_m"],
+    }
+    if (s.tape_layers, True) in REFERENCE and s.orientation == "weightless" and s.voltage == VOLTAGES[-1]:
+        section_table["reference_thinning_per_m"] = REFERENCE[s.tape_layers, True]
+        section_table["reference_constant_t_per_m"] = REFERENCE[s.tape_layers, False]
+    known = REFERENCE_TIP.get(s.tape_layers)
     if known is not None and s.thinning and s.orientation == "weightless" and s.voltage == VOLTAGES[-1]:
         table["reference_r_over_l"] = known
     model, parameters, signals = build(s, hinges=s.motion_hinges)
@@ -322,11 +332,13 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     power = exponent(voltages, full["curvature_per_m"])
     return Outcome(
         motion,
-        {"bending": {**table}},
-        units={"voltage_kV": "kV", "curvature_per_m": "1/m", "constant_t_per_m": "1/m"},
+        {"bending": {**table}, "electrode_over_the_whole_width": section_table},
+        units={"voltage_kV": "kV", **{c: "1/m" for c in (*table, *section_table) if c.endswith("_per_m")}},
         summary=[
             *notes,
             *more,
+            *few,
+            *none,
             f"R/L = {full['r_over_l'][-1]:.4f} at {s.voltage / 1e3:g} kV by statics, {final:.4f} at the end of the "
             "motion",
             f"curvature goes as the voltage to the power {power:.3f}; thinning adds "

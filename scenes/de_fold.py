@@ -90,7 +90,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     return Outcome(
         motion,
         {"fold_angle": {**table}},
-        units={"voltage_kV": "kV", "localisation": "1"},
+        units={"voltage_kV": "kV", **{c: "deg" for c in table if c.endswith("_deg")}},
         summary=[
             *notes,
             f"at {s.voltage / 1e3:g} kV the notch folds by {notch:.2f} deg and the arms bend by {arms:.2f} deg by "

@@ -130,7 +130,6 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     return Outcome(
         motion,
         {"fold_angle": {**angles}},
-        units={"field_mT": "mT"},
         summary=[
             *notes,
             f"in {s.field * 1e3:.0f} mT the outer patches stand at {angles['end_deg'][-1]:.1f} deg, the inner ones at "

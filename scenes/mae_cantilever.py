@@ -151,7 +151,6 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     return Outcome(
         motion,
         {"shape": {**table}, "mesh": {**study}},
-        units={"field_mT": "mT", "tip_deg": "deg"},
         summary=[
             *notes,
             f"R/L = {last:.4f} in {s.field * 1e3:.0f} mT with {s.cells:.0f} cells by statics, {final:.4f} with "

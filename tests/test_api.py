@@ -68,6 +68,17 @@ def test_version_is_that_of_the_distribution():
     assert tomllib.loads(project.read_text())["project"]["version"] == origami_sim.__version__
 
 
+def test_every_folder_is_installed():
+    import tomllib
+
+    root = Path(origami_sim.__file__).parents[1]
+    if not (root / "pyproject.toml").is_file():
+        pytest.skip("not a checkout")
+    listed = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    inside = {f"origami_sim.{p.parent.name}" for p in (root / "origami_sim").glob("*/__init__.py")}
+    assert set(listed) == {"origami_sim", "origami_sim.scenes", "origami_sim.calibrations"} | inside
+
+
 HEAVY = ("warp", "numpy", "scipy", "rerun", "matplotlib", "pyarrow", "trimesh")
 
 

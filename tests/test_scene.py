@@ -35,7 +35,7 @@ def test_every_setting_says_where_it_comes_from(file):
 
 
 def test_unknown_scene():
-    with pytest.raises(InputError, match=r"no such scene.*castle.*box, crawler, bifold"):
+    with pytest.raises(InputError, match=r"no such scene.*castle.*bifold, box, crawler"):
         scene_module("castle")
 
 

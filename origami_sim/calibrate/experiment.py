@@ -1,11 +1,12 @@
 """Calibration from measured curves: least squares with bounds, profile-likelihood intervals, what cannot be known.
 
-Every fit goes through `fit`: it minimises the residuals within bounds, estimates the noise from them, follows the profile
-of every parameter to the ends of its interval and says which parameters the curve determines only in combination.
+Every fit goes through `fit`: it minimises the residuals within bounds, estimates the noise from them, follows the
+profile of every parameter to the ends of its interval and says which ones the curve determines only in combination.
 
 References: Raue et al. 2009, Bioinformatics 25, 1923 (profile likelihood and identifiability); Seber & Wild, Nonlinear
-Regression (2003), 5.9; Wood 2011, J. R. Stat. Soc. B 73, 3 (smoothing by restricted maximum likelihood); Emri & Tschoegl
-1993, Rheol. Acta 32, 311 (non-negative spectra); Fung, Biomechanics (1993), 7.6 (quasi-linear viscoelasticity).
+Regression (2003), 5.9; Wood 2011, J. R. Stat. Soc. B 73, 3 (smoothing by restricted maximum likelihood); Emri and
+Tschoegl 1993, Rheol. Acta 32, 311 (non-negative spectra); Fung, Biomechanics (1993), 7.6 (quasi-linear
+viscoelasticity).
 """
 
 import csv
@@ -14,6 +15,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -34,7 +36,7 @@ FLAT = 1e-5
 """A direction of the scaled Jacobian with a singular value below this fraction of the largest is unknown."""
 
 
-# --- reading -----------------------------------------------------------------------------------------------------------
+# --- reading ----------------------------------------------------------------------------------------------------------
 
 
 def read_columns(path: str | Path, columns: Mapping[str, tuple[str | None, str]]) -> dict[str, np.ndarray]:
@@ -91,7 +93,9 @@ def _curve(x, y, names: tuple[str, str], fewest: int, *, strict: bool = True) ->
     for name, values in zip(names, (x, y), strict=True):
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            raise InputError(f"point {bad[0] + 1} of the curve is not a finite number", field=name, value=values[bad[0]])
+            raise InputError(
+                f"point {bad[0] + 1} of the curve is not a finite number", field=name, value=values[bad[0]]
+            )
     if len(x) < fewest:
         raise InputError("too few points on the curve", field=names[0], value=len(x), allowed=f"{fewest} or more")
     step = np.diff(x)
@@ -106,7 +110,7 @@ def _curve(x, y, names: tuple[str, str], fewest: int, *, strict: bool = True) ->
     return (x, y) if step[0] > 0 else (x[::-1], y[::-1])
 
 
-# --- the fit -----------------------------------------------------------------------------------------------------------
+# --- the fit ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -223,8 +227,8 @@ def fit(
     warnings = list(identifiability(residual, parameters, best))
     if rho > 0.5:
         warnings.append(
-            f"neighbouring residuals are correlated ({rho:.2f}): the model leaves something out; intervals were widened "
-            f"by {math.sqrt(widen):.1f}, but a wrong model is not made right by that"
+            f"neighbouring residuals are correlated ({rho:.2f}): the model leaves something out; intervals were "
+            f"widened by {math.sqrt(widen):.1f}, but a wrong model is not made right by that"
         )
     bounds = np.column_stack([best, best])
     if intervals:
@@ -319,7 +323,7 @@ def identifiability(residual, parameters: Sequence[Parameter], at: np.ndarray) -
     return tuple(out)
 
 
-# --- crease ------------------------------------------------------------------------------------------------------------
+# --- crease -----------------------------------------------------------------------------------------------------------
 
 
 def fit_crease(angle, moment, *, within: tuple[float, float] | None = None) -> Fit:
@@ -474,7 +478,7 @@ def fit_crease_table(angle, moment, *, ends: tuple[float, float] | None = None, 
     )  # fmt: skip
 
 
-# --- relaxation --------------------------------------------------------------------------------------------------------
+# --- relaxation -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -515,7 +519,8 @@ def read_hold(
     """A relaxation test from a CSV file; the elastic force during the ramp follows l - l^-2 (neo-Hookean).
 
     Args:
-        path: the file. time_unit, displacement_unit, force_unit: of its columns. gauge_length: [m]. columns: their names.
+        path: the file. time_unit, displacement_unit, force_unit: of its columns. gauge_length: [m].
+        columns: names of time, displacement and force.
 
     Raises:
         InputError: as `read_columns`; a time that turns back, no hold, a force that is not tensile.
@@ -524,25 +529,27 @@ def read_hold(
         raise InputError("not a gauge length", file=path, field="gauge_length", value=gauge_length, allowed="> 0 m")
     data = read_columns(
         path,
-        dict(
-            zip(columns, ((time_unit, "time"), (displacement_unit, "length"), (force_unit, "force")), strict=True)
-        ),
+        dict(zip(columns, ((time_unit, "time"), (displacement_unit, "length"), (force_unit, "force")), strict=True)),
     )
     time, displacement, force = (data[c] for c in columns)
-    _curve(time, displacement, (columns[0], columns[1]), 20)
-    _curve(time, force, (columns[0], columns[2]), 20)
+    _curve(time, displacement, (columns[0], columns[1]), 30)
+    _curve(time, force, (columns[0], columns[2]), 30)
     if not time[1] > time[0]:
         raise InputError("the time runs backwards", file=path, field=columns[0], value=float(time[1]))
     final = displacement[-1]
     end = int(np.argmax(displacement >= 0.999 * final))
-    if not final > 0 or np.abs(displacement[end:] - final).max() > 0.02 * final:
+    if not final > 0 or len(time) - end < 20 or np.abs(displacement[end:] - final).max() > 0.02 * final:
         raise InputError("there is no hold at the end of the ramp", file=path, field=columns[1], value=float(final))
     stretch = 1 + np.clip(np.append(displacement[:end], final), 0, final) / gauge_length
     elastic = np.maximum.accumulate(stretch - stretch**-2)
     if not (force[end:] > 0).all():
         raise InputError("the held force is not tensile", file=path, field=columns[2], allowed="> 0")
     return Hold(
-        Path(path).stem, time[end + 1 :] - time[end], force[end + 1 :], time[: end + 1] - time[end], elastic / elastic[-1]
+        Path(path).stem,
+        time[end + 1 :] - time[end],
+        force[end + 1 :],
+        time[: end + 1] - time[end],
+        elastic / elastic[-1],
     )
 
 
@@ -590,7 +597,9 @@ class PronyFit:
             instantaneous: stiffness of the crease before any relaxation [N m/rad].
         """
         if len(self.times) > 3:
-            raise InputError("crease_relaxation has three branches", field="terms", value=len(self.times), allowed="1 to 3")
+            raise InputError(
+                "crease_relaxation has three branches", field="terms", value=len(self.times), allowed="1 to 3"
+            )
         out = {("crease", "stiffness"): instantaneous * self.rest}
         for k, (tau, g) in enumerate(zip(self.times, self.weights, strict=True), start=1):
             out["crease_relaxation", f"stiffness_{k}"] = instantaneous * float(g)
@@ -645,13 +654,14 @@ def fit_prony(holds: Sequence[Hold], *, terms: int | None = None, most: int = 8,
                          allowed=f"more than {10 * shortest:g} s after the ramp")  # fmt: skip
     thin = [thinned(h, shortest) for h in holds]
     spectrum = _spectrum(thin, shortest, longest)
-    series, criteria = {}, {}
+    series: dict[int, Any] = {}
+    criteria: dict[int, float] = {}
     for m in [terms] if terms is not None else range(1, most + 1):
         series[m] = _series(thin, m, spectrum, shortest, longest)
         criteria[m] = series[m][1]
-        if terms is None and m > min(criteria, key=criteria.get) + 1:
+        if terms is None and m > min(criteria, key=criteria.__getitem__) + 1:
             break
-    chosen = min(criteria, key=criteria.get)
+    chosen = min(criteria, key=criteria.__getitem__)
     parameters, _, model = series[chosen]
     residual = model
     start = [
@@ -685,9 +695,8 @@ def fit_prony(holds: Sequence[Hold], *, terms: int | None = None, most: int = 8,
     decades = math.log10(longest / shortest)
     warnings = [w for w in found.warnings if "profile is flat" not in w]
     if times[0] < 0.2 * max(-h.ramp_time[0] for h in holds):
-        warnings.append(
-            f"terms faster than the ramp ({max(-h.ramp_time[0] for h in holds):.2g} s) rest on its assumed elastic force"
-        )
+        slow = max(-float(h.ramp_time[0]) for h in holds)
+        warnings.append(f"terms faster than the ramp ({slow:.2g} s) rest on its assumed elastic force")
     if times[-1] > longest:
         warnings.append("the slowest time exceeds the hold: the rest force is extrapolated")
     order = np.argsort(times)
@@ -770,7 +779,7 @@ def _series(holds, terms, spectrum, shortest, longest):
     return p, bic, residual
 
 
-# --- ring-down ---------------------------------------------------------------------------------------------------------
+# --- ring-down --------------------------------------------------------------------------------------------------------
 
 
 def fit_ring_down(time, angle, *, inertia: float | None = None) -> Fit:
@@ -830,7 +839,8 @@ def fit_ring_down(time, angle, *, inertia: float | None = None) -> Fit:
     free = least_squares(
         lambda p: angle - predicted(p[0] * square, p[1] * lowest, p[2]), [1.0, loss / lowest, rest], max_nfev=200
     )
-    error = np.linalg.pinv(free.jac.T @ free.jac) * 2 * free.cost / max(len(t) - 5, 1)
+    jacobian = np.asarray(free.jac)
+    error = np.linalg.pinv(jacobian.T @ jacobian) * 2 * free.cost / max(len(t) - 5, 1)
     if free.x[1] < -3 * math.sqrt(abs(error[1, 1])) and free.x[1] * lowest * t[-1] < -1e-3:
         raise InputError(
             "the amplitude grows: the viscosity would be negative",
@@ -839,8 +849,10 @@ def fit_ring_down(time, angle, *, inertia: float | None = None) -> Fit:
             allowed=">= 0 1/s",
         )
     if not free.x[0] > 0:
-        raise InputError("the stiffness would be negative", field="stiffness_per_inertia", value=float(free.x[0] * square),
-                         allowed="> 0 1/s^2")  # fmt: skip
+        square = float(free.x[0] * square)
+        raise InputError(
+            "the stiffness would be negative", field="stiffness_per_inertia", value=square, allowed="> 0 1/s^2"
+        )
     known = inertia or 1.0
     names = (
         (("stiffness", "N m/rad"), ("viscosity", "N m s/rad"))
@@ -872,7 +884,7 @@ def fit_ring_down(time, angle, *, inertia: float | None = None) -> Fit:
     return _with_curve(found, time, angle, model, "time [s]", "angle [rad]")
 
 
-# --- results -----------------------------------------------------------------------------------------------------------
+# --- results ----------------------------------------------------------------------------------------------------------
 
 
 def calibration(found, *, title: str, command: str, source: str, prefix: str = "") -> Calibration:
@@ -885,7 +897,7 @@ def calibration(found, *, title: str, command: str, source: str, prefix: str = "
     note = f"{source}; {LEVEL:.0%} interval"
     if isinstance(found, Fit):
         quantities = [
-            Quantity(prefix + p.name, float(v), p.unit, p.meaning, f"{note} by profile likelihood", tuple(map(float, i)))
+            Quantity(prefix + p.name, float(v), p.unit, p.meaning, f"{note} by profile likelihood", _pair(i))
             for p, v, i in zip(found.parameters, found.values, found.intervals, strict=True)
         ]
     elif isinstance(found, TableFit):
@@ -901,7 +913,9 @@ def calibration(found, *, title: str, command: str, source: str, prefix: str = "
         if found.rest_angle is not None:
             quantities.insert(
                 2,
-                Quantity(prefix + "rest_angle", found.rest_angle, "rad", "angle of zero torque", note, found.rest_interval),
+                Quantity(
+                    prefix + "rest_angle", found.rest_angle, "rad", "angle of zero torque", note, found.rest_interval
+                ),
             )
     elif isinstance(found, PronyFit):
         worst = max(found.error.values())
@@ -912,30 +926,38 @@ def calibration(found, *, title: str, command: str, source: str, prefix: str = "
         ]  # fmt: skip
         if found.held_out:
             worst = max(found.held_out.values())
-            quantities.append(Quantity(prefix + "held_out_error", worst, "1",
-                                       "largest relative rms residual of a hold predicted from the others", source))  # fmt: skip
+            meaning = "largest relative rms residual of a hold predicted from the others"
+            quantities.append(Quantity(prefix + "held_out_error", worst, "1", meaning, source))
         for k, (tau, g) in enumerate(zip(found.times, found.weights, strict=True), start=1):
             quantities += [
                 Quantity(f"{prefix}time_{k}", float(tau), "s", f"relaxation time of term {k}",
-                         f"{note} by profile likelihood", tuple(map(float, found.time_intervals[k - 1]))),
-                Quantity(f"{prefix}weight_{k}", float(g), "1", f"g_{k}: share of term {k} in the instantaneous stiffness",
-                         f"{note}, linearised", tuple(map(float, found.intervals[k - 1]))),
+                         f"{note} by profile likelihood", _pair(found.time_intervals[k - 1])),
+                Quantity(f"{prefix}weight_{k}", float(g), "1",
+                         f"g_{k}: share of term {k} in the instantaneous stiffness", f"{note}, linearised",
+                         _pair(found.intervals[k - 1])),
             ]  # fmt: skip
     else:
         raise InputError("not a fit", field="found", value=type(found).__name__, allowed="Fit, TableFit, PronyFit")
     return Calibration(title, command, tuple(quantities), tuple(found.warnings))
 
 
+def _pair(interval) -> tuple[float, float]:
+    low, high = interval
+    return float(low), float(high)
+
+
 def summary(found: Calibration) -> str:
     """Values with their intervals, one per line, for the terminal."""
     lines = []
+    interval: Any
     for q in found.quantities:
+        interval = q.interval
         if isinstance(q.value, tuple):
             lines.append(f"{q.name} = {len(q.value)} knots, {min(q.value):.4g} to {max(q.value):.4g} {q.unit}")
         elif isinstance(q.value, (str, bool)):
             lines.append(f"{q.name} = {q.value}")
         else:
-            lines.append(f"{q.name} = {significant(q.value, q.interval)} {'' if q.unit == '1' else q.unit}".rstrip())
+            lines.append(f"{q.name} = {significant(q.value, interval)} {'' if q.unit == '1' else q.unit}".rstrip())
     return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
 
 

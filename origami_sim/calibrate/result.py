@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -183,7 +184,7 @@ def significant(value: float, interval: tuple[float, float] | None) -> str:
 def _flat(q: Quantity) -> Sequence[Quantity]:
     if not isinstance(q.value, tuple):
         return [q]
-    intervals = q.interval or (None,) * len(q.value)
+    intervals: Any = q.interval or (None,) * len(q.value)
     return [
         Quantity(f"{q.name}_{k:02d}", v, q.unit, f"{q.meaning}, knot {k} of {len(q.value)}", q.source, i, q.range)
         for k, (v, i) in enumerate(zip(q.value, intervals, strict=True))
@@ -202,11 +203,12 @@ def _folded(flat: Sequence[Quantity]) -> list[Quantity]:
             out += members
             continue
         first = members[0]
-        intervals = tuple(m.interval for m in members)
+        intervals: Any = tuple(m.interval for m in members)
+        values: Any = tuple(m.value for m in members)
         out.append(
             Quantity(
                 name,
-                tuple(m.value for m in members),
+                values,
                 first.unit,
                 first.meaning.removesuffix(f", knot 0 of {len(members)}"),
                 first.source,
@@ -237,6 +239,7 @@ def _check(q: Quantity, path: Path) -> None:
                 "a table needs one interval per number", file=path, field=q.name, value=len(q.interval),
                 allowed=str(len(q.value)),
             )  # fmt: skip
+    item: Any
     for item in _flat(q):
         if numeric and not math.isfinite(item.value):
             raise InputError("not a finite number", file=path, field=item.name, value=item.value)

@@ -84,10 +84,13 @@ class Batch:
                 allowed=f">= {int(model.electrodes.max()) + 1}",
             )
         uses_gradient = any("gradient" in e.drives for e in self.program.effects)
-        if not uses_gradient and any(np.any(s.offset) or np.any(s.amplitude) or s.times is not None
-                                     for n, s in drive.signals.items() if n.startswith("gradient")):  # fmt: skip
-            raise InputError("the drive has a field gradient that no effect of the model uses", field="gradient",
-                             allowed="switch on field_gradient")  # fmt: skip
+        gradients = [s for n, s in drive.signals.items() if n.startswith("gradient")]
+        if not uses_gradient and not all(s.is_zero for s in gradients):
+            raise InputError(
+                "the drive has a field gradient that no effect of the model uses",
+                field="gradient",
+                allowed="switch on field_gradient",
+            )
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()

@@ -94,9 +94,9 @@ def test_excess_of_thinning(settings, layers, excess):
 
 def test_a_linear_section_lacks_three_per_cent_where_the_stack_strains(settings):
     """4 % of strain at 4 kV with one layer of tape: outside the linear section's 2 %; all else is inside."""
-    for (layers, thinning), table in CURVATURE.items():
-        error = curvature(cut(settings, layers, thinning, section="linear")) / table - 1
-        assert np.abs(error[:-1]).max() < 0.02
+    for layers in (1, 5):
+        error = curvature(cut(settings, layers, section="linear"), VOLTAGES[3:]) / CURVATURE[layers, True][3:] - 1
+        assert np.abs(error[0]) < 0.02
         assert error[-1] == pytest.approx(-0.03 if layers == 1 else 0.004, abs=0.004)
 
 

@@ -33,9 +33,12 @@ def lumped(patches: int, fields) -> np.ndarray:
     angle, out, before = 0.1 * sign, [], 1e-3
     for b in fields:
         for step in np.geomspace(before, b, 12):
-            found = root(lambda a, b=step: stiffness * bending @ a - sign * moment * b * np.cos(a), angle, tol=1e-12)
-            assert found.success
-            angle = found.x
+
+            def moments(a, b=step):
+                return bending @ a - sign * moment / stiffness * b * np.cos(a)
+
+            angle = root(moments, angle, tol=1e-12).x
+            assert np.abs(moments(angle)).max() < 1e-9
         before = b
         out.append(np.degrees(angle))
     return np.array(out)

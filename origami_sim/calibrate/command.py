@@ -1,0 +1,279 @@
+"""`origami-sim calibrate`: calibrations from measured curves and finite elements, each re-creatable by its command.
+
+    origami-sim calibrate crease crease_torque/unit075.csv --angle-unit deg --moment-unit 'N mm' --out crease.toml
+    origami-sim calibrate relaxation A.csv B.csv --gauge-length 80mm --out vhb.toml
+    origami-sim calibrate ring-down swing.csv --angle-unit rad --time-unit s --inertia 1e-4 --out hinge.toml
+    origami-sim calibrate bridge --gap 2.54mm --thickness 1.27mm --width 25.4mm --modulus 1.5MPa --out crease_box.toml
+    origami-sim calibrate again crease.toml
+
+A file that is not found is sought among the recordings (`scene.recordings_folder`).
+"""
+
+import argparse
+import math
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from origami_sim.errors import InputError
+
+if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
+    from origami_sim.calibrate.result import Calibration
+
+PROGRAM = "origami-sim calibrate"
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished calibration: its content, and the fit for the plot (None for finite elements)."""
+
+    calibration: "Calibration"
+    fit: Any = None
+
+
+class _Parser(argparse.ArgumentParser):
+    """Raises InputError instead of leaving the program, for stored commands."""
+
+    def error(self, message):
+        raise InputError(f"cannot read this command ({message})", value=self.prog)
+
+
+def register(parser: argparse.ArgumentParser) -> None:
+    """Adds the subcommands and their options to the parser of `origami-sim calibrate`."""
+    commands = parser.add_subparsers(dest="calibration", required=True, metavar="HOW", parser_class=type(parser))
+
+    def command(name: str, summary: str) -> argparse.ArgumentParser:
+        p = commands.add_parser(name, help=summary, description=summary + ".")
+        p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
+        if name != "again":
+            p.add_argument("--out", metavar="TOML", help="calibration file to write")
+            p.add_argument("--plot", metavar="PNG", help="picture of fit and residual to write")
+            p.add_argument("--note", metavar="TEXT", help="what to say about the source, e.g. an assumed unit")
+        return p
+
+    p = command("crease", "Crease law from a torque-angle curve")
+    p.add_argument("curve", help="CSV file")
+    p.add_argument("--columns", default="angle_deg,torque", help="angle and moment (default angle_deg,torque)")
+    p.add_argument("--angle-unit", help="unit of the angle: rad, deg, ...")
+    p.add_argument("--moment-unit", help="unit of the moment that holds the angle: 'N m', 'mN m', 'N mm'")
+    p.add_argument("--linear", action="store_true", help="one stiffness instead of a table of 33 moments")
+    p.add_argument("--within", metavar="LOW,HIGH", help="part of the curve to use, in the angle's unit")
+
+    p = command("relaxation", "Prony series from stress relaxation, joint over several tests")
+    p.add_argument("curves", nargs="+", help="CSV files")
+    p.add_argument("--columns", default="time_s,displacement_mm,force_n", help="time, displacement and force")
+    p.add_argument("--time-unit", default="s", help="default s")
+    p.add_argument("--displacement-unit", default="mm", help="default mm")
+    p.add_argument("--force-unit", default="N", help="default N")
+    p.add_argument("--gauge-length", required=True, help="with its unit, e.g. 80mm")
+    p.add_argument("--terms", type=int, help="terms of the series (default: the least BIC)")
+
+    p = command("ring-down", "Stiffness and viscosity of a crease from a free swing")
+    p.add_argument("curve", help="CSV file")
+    p.add_argument("--columns", default="time_s,angle_rad", help="time and angle (default time_s,angle_rad)")
+    p.add_argument("--time-unit", help="unit of the time")
+    p.add_argument("--angle-unit", help="unit of the angle")
+    p.add_argument("--inertia", type=float, help="about the crease [kg m^2]; without it only ratios can be known")
+
+    p = command("bridge", "Crease law of an elastomer bridge by finite elements")
+    for name, what in (("gap", "between the patches"), ("thickness", "of the sheet"), ("width", "along the crease")):
+        p.add_argument(f"--{name}", required=True, help=f"{what}, with its unit: 2.54mm")
+    p.add_argument("--modulus", required=True, help="Young's modulus of the sheet: 1.5MPa")
+    p.add_argument("--poisson", type=float, default=0.49, help="of sheet and patches (default 0.49)")
+    p.add_argument("--share", type=float, default=0.0, help="C01/(C10+C01) of the sheet (default 0: neo-Hookean)")
+    p.add_argument("--patch-modulus", default="rigid", help="Young's modulus of the patches, or rigid (default)")
+    p.add_argument("--patch-thickness", default="3.175mm", help="default 3.175mm")
+    p.add_argument("--largest", default="100deg", help="end of the table on both sides (default 100deg)")
+    p.add_argument("--fineness", type=int, default=2, help="mesh, 1 to 4 (default 2)")
+
+    p = command("again", "Repeat the stored command of a calibration and compare the values")
+    p.add_argument("file", help="a calibration written by this program")
+    p.add_argument("--tolerance", type=float, default=1e-3, help="relative, of each number (default 1e-3)")
+
+
+def build(arguments: Sequence[str]) -> Done:
+    """The calibration of a command line, without writing anything.
+
+    Args:
+        arguments: what follows `origami-sim calibrate`, or a stored command split into words.
+
+    Raises:
+        InputError: a malformed command, and whatever the calibration itself refuses.
+    """
+    words = list(arguments)
+    if words[:2] == PROGRAM.split():
+        words = words[2:]
+    parser = _Parser(prog=PROGRAM, add_help=False)
+    register(parser)
+    args = parser.parse_args(words)
+    if args.calibration == "again":
+        raise InputError("a stored command cannot be 'again'", field="command", allowed="crease, relaxation, ...")
+    return calibrate(args)
+
+
+def calibrate(args: argparse.Namespace) -> Done:
+    """The calibration that parsed arguments ask for; its stored command leaves out --plot and --json."""
+    from origami_sim.calibrate import experiment
+
+    command = _command(args)
+    if args.calibration == "crease":
+        angle_name, moment_name = _names(args.columns, 2)
+        path = _found(args.curve)
+        data = experiment.read_columns(
+            path, {angle_name: (args.angle_unit, "angle"), moment_name: (args.moment_unit, "moment")}
+        )
+        within = None
+        if args.within:
+            low, high = (_number(w + str(args.angle_unit), "angle", "--within") for w in _names(args.within, 2))
+            within = (low, high)
+        angle, moment = data[angle_name], data[moment_name]
+        if args.linear:
+            fit = experiment.fit_crease(angle, moment, within=within)
+        else:
+            keep = slice(None) if within is None else (angle >= within[0]) & (angle <= within[1])
+            fit = experiment.fit_crease_table(angle[keep], moment[keep])
+        source = f"{args.curve}, moment in {args.moment_unit}"
+        title = f"Crease from the torque-angle curve {path.name}"
+    elif args.calibration == "relaxation":
+        time_name, displacement_name, force_name = _names(args.columns, 3)
+        holds = [
+            experiment.read_hold(
+                _found(curve),
+                time_unit=args.time_unit,
+                displacement_unit=args.displacement_unit,
+                force_unit=args.force_unit,
+                gauge_length=_number(args.gauge_length, "length", "--gauge-length"),
+                columns=(time_name, displacement_name, force_name),
+            )
+            for curve in args.curves
+        ]
+        fit = experiment.fit_prony(holds, terms=args.terms)
+        source = ", ".join(args.curves)
+        title = f"Relaxation of {len(holds)} tests, joint: g(t) = rest + sum weight_i exp(-t / time_i), g(0) = 1"
+    elif args.calibration == "ring-down":
+        time_name, angle_name = _names(args.columns, 2)
+        data = experiment.read_columns(
+            _found(args.curve), {time_name: (args.time_unit, "time"), angle_name: (args.angle_unit, "angle")}
+        )
+        fit = experiment.fit_ring_down(data[time_name], data[angle_name], inertia=args.inertia)
+        source, title = args.curve, f"Crease from the free swing {Path(args.curve).name}"
+    else:
+        from origami_sim.calibrate import fe
+
+        patch = None
+        if args.patch_modulus != "rigid":
+            patch = fe.Rubber(_number(args.patch_modulus, "pressure", "--patch-modulus"), args.poisson)
+        sheet = fe.Rubber(_number(args.modulus, "pressure", "--modulus"), args.poisson, args.share)
+        gap, thickness, width, tall = (
+            _number(getattr(args, n), "length", f"--{n.replace('_', '-')}")
+            for n in ("gap", "thickness", "width", "patch_thickness")
+        )
+        bridge = fe.Bridge(gap, thickness, sheet, patch, tall)
+        largest = _number(args.largest, "angle", "--largest")
+        return Done(fe.crease_calibration(bridge, width, command=command, largest=largest, fineness=args.fineness))
+    if args.note:
+        source += f" ({args.note})"
+    return Done(experiment.calibration(fit, title=title, command=command, source=source), fit)
+
+
+def run(args: argparse.Namespace) -> int:
+    """What the command line does with parsed arguments; returns the exit code (1: `again` found other values)."""
+    import json
+
+    from origami_sim.calibrate import experiment, result
+
+    if args.calibration == "again":
+        rows = again(args.file, args.tolerance)
+        moved = [r for r in rows if not r[3]]
+        if args.json:
+            print(json.dumps([dict(zip(("name", "stored", "found", "same"), r, strict=True)) for r in rows]))
+        else:
+            for name, stored, found, _ in moved:
+                print(f"{name}: stored {stored:.6g}, found {found:.6g}")
+            print(f"{len(rows) - len(moved)} of {len(rows)} numbers as stored, within {args.tolerance:g}")
+        return 1 if moved else 0
+    done = calibrate(args)
+    if args.plot and done.fit is None:
+        raise InputError("finite elements have no fit to draw", field="--plot", value=args.plot)
+    if args.out:
+        result.write_calibration(args.out, done.calibration)
+    if args.plot:
+        experiment.plot_fit(done.fit, args.plot, title=done.calibration.title)
+    if args.json:
+        values = {
+            q.name: {"value": q.value, "unit": q.unit, "interval": q.interval} for q in done.calibration.quantities
+        }
+        print(json.dumps({"values": values, "warnings": done.calibration.warnings}))
+    else:
+        print(experiment.summary(done.calibration))
+    return 0
+
+
+def again(file: str | Path, tolerance: float = 1e-3) -> list[tuple[str, float, float, bool]]:
+    """Repeats the stored command: (name, stored, found, same) of every number; tables knot by knot.
+
+    `same` compares relatively; a table with its largest knot.
+    """
+    from origami_sim.calibrate import result
+
+    stored = result.read_result(file)
+    found = build(shlex.split(stored.command)).calibration
+    rows = []
+    for q in stored.quantities:
+        if isinstance(q.value, (str, bool)):
+            continue
+        old = q.value if isinstance(q.value, tuple) else (q.value,)
+        new: Any = found[q.name].value
+        new = new if isinstance(new, tuple) else (new,)
+        if len(old) != len(new):
+            raise InputError("the table has another length now", file=file, field=q.name, value=len(new))
+        size = max(map(abs, old)) or 1.0
+        for k, (a, b) in enumerate(zip(old, new, strict=True)):
+            name = q.name if len(old) == 1 else f"{q.name}_{k:02d}"
+            rows.append((name, a, b, math.isclose(a, b, rel_tol=0, abs_tol=tolerance * size)))
+    return rows
+
+
+def _command(args: argparse.Namespace) -> str:
+    words = [PROGRAM, args.calibration]
+    positional = {"crease": ["curve"], "ring-down": ["curve"], "relaxation": ["curves"], "bridge": []}[args.calibration]
+    for name in positional:
+        value = getattr(args, name)
+        words += map(shlex.quote, value if isinstance(value, list) else [value])
+    skip = {*positional, "calibration", "json", "plot", "command", "action"}
+    for name, value in vars(args).items():
+        if name in skip or value is None or value is False:
+            continue
+        option = "--" + name.replace("_", "-")
+        words.append(option if value is True else f"{option}={shlex.quote(str(value))}")
+    return " ".join(words)
+
+
+def _names(text: str, count: int) -> list[str]:
+    names = [n.strip() for n in text.split(",")]
+    if len(names) != count or not all(names):
+        raise InputError(f"needs {count} entries, separated by commas", field="columns", value=text)
+    return names
+
+
+def _number(text: str, dimension: str, option: str) -> float:
+    from origami_sim.recording.units import UNITS, unit_factor
+
+    match = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*(.*)", str(text).strip())
+    if not match or not match[2]:
+        allowed = ", ".join(f"NUMBER{u}" for u in UNITS[dimension])
+        raise InputError("needs a number with its unit", field=option, value=text, allowed=allowed)
+    return float(match[1]) * unit_factor(match[2], dimension=dimension, field=option)
+
+
+def _found(path: str) -> Path:
+    from origami_sim.scene import recordings_folder
+
+    given = Path(path)
+    folder = recordings_folder()
+    if not given.exists() and not given.is_absolute() and folder is not None and (folder / given).exists():
+        return folder / given
+    return given
