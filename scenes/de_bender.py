@@ -328,7 +328,8 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         table["reference_r_over_l"] = known
     model, parameters, signals = build(s, hinges=s.motion_hinges)
     motion = simulate(model, parameters, signals, duration=2.0, rate=60, progress=progress)
-    final = tip(motion.x[-1, :, 0], s.length)
+    rest, _, _ = settle((model, parameters, signals), [])
+    final = float(np.linalg.norm((motion.x[-1, -2:, 0] - rest[-2:]).mean(axis=0)) / s.length)
     power = exponent(voltages, full["curvature_per_m"])
     return Outcome(
         motion,

@@ -133,7 +133,7 @@ def mesh_study(s: Settings, meshes: Sequence[int] = MESHES) -> dict[str, np.ndar
     order = np.full(len(r), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):  # no field, no bending
         order[2:] = np.log(step[:-1] / step[1:]) / np.log(np.array(meshes[2:]) / np.array(meshes[1:-1]))
-    return {"cells": np.array(meshes), "r_over_l": r, "order": order}
+    return {"cells": np.array(meshes), "r_over_l": r, "order": np.where(np.isfinite(order), order, np.nan)}
 
 
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
