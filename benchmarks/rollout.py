@@ -98,11 +98,11 @@ def report(quick: bool = False) -> str:
             ratio = float(np.median(us[name] / us["C, 1 world"]))
             lines.append((f"{name} : C", ratio, verdict(ratio, 1.5)))
         notes.append(
-            f"one core: processor time, two: wall time; clock of the core {ghz:.2f} GHz; last column: the minimum at 2.5 GHz"
+            f"one core: processor time, two: wall time; core at {ghz:.2f} GHz; last column: the minimum at 2.5 GHz"
         )
         c_one, c_two = wall["C, 1 world"], wall["C, 2 worlds, 2 cores"]
         notes.append(
-            f"what the machine gave: two C loops on two cores were {c_one.min() / c_two.min():.2f} times as fast as one "
+            f"what the machine gave: two C loops on two cores {c_one.min() / c_two.min():.2f} times as fast as one "
             f"in their fastest repeats, {np.median(c_one / c_two):.2f} times at the median"
         )
     else:

@@ -100,6 +100,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/compare)")
 
+    p = command(
+        "study",
+        _study,
+        "Stride maps over what the paper leaves open, and a robust set",
+        "origami-sim study crawler --samples 64",
+    )
+    p.add_argument("rest", nargs=argparse.REMAINDER, help="see origami-sim study crawler --help")
+
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
 
@@ -212,6 +220,12 @@ def _compare(args) -> int:
         print(comparison.sentence())
         print(f"run folder: {folder}")
     return _soundness(motion)
+
+
+def _study(args) -> int:
+    from origami_sim import study
+
+    return study.main(args.rest)
 
 
 def _effects(args) -> int:
@@ -361,7 +375,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
         )
         return
     for table in outcome.tables.values():
-        print(format_table(table, _units(outcome.tables)))
+        print(format_table(table, outcome.units or _units(outcome.tables)))
     for sentence in outcome.summary:
         print(sentence)
     print(f"{outcome.trajectory.step}; {outcome.trajectory.wall:.1f} s of computing; run folder: {folder}")

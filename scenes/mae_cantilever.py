@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from origami_sim.beams import as_beam, diagonal_share
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.materials import MU0
@@ -43,32 +44,6 @@ def magnetic_load(s: Settings, field: float) -> float:
 def direction(s: Settings) -> np.ndarray:
     """Unit vector of a positive field: along z, tilted by the misalignment towards x."""
     return np.array([np.sin(s.misalignment), 0.0, np.cos(s.misalignment)])
-
-
-def diagonal_share(cell: float, width: float) -> float:
-    """Turn of a cell's diagonal under a bending moment over the turn of the cell, for the rigidity of the sheet.
-
-    With k = D e^2 / (A1 + A2), e^2 = w^2 + l^2 and the part w / e of the moment about the diagonal: (w / e)^4.
-    """
-    return (width**2 / (width**2 + cell**2)) ** 2
-
-
-def as_beam(model: Model, parameters: Parameters, axial: float):
-    """Makes a strip of two nodes per station a plane beam of axial stiffness E A [N].
-
-    Both corners of a station weigh alike, so that nothing twists. The bars along the strip get all of E A: by the rule
-    for triangles they would get less the narrower the cells are, and the weight would stretch fine meshes.
-    """
-    pairs = parameters["inertia", "mass"].reshape(-1, 2)
-    parameters.set("inertia", "mass", np.repeat(pairs.mean(axis=1), 2))
-    length = parameters["bars", "rest_length"][:, 0]
-    along = np.flatnonzero(np.isclose(np.abs(np.diff(model.position[model.bars], axis=1)[:, 0, 0]), length))
-    stiffness = axial / 2 / length[along]
-    if ("bar_viscosity", "viscosity") in parameters:
-        factor = np.sqrt(stiffness / parameters["bars", "stiffness"][along, 0])
-        viscosity = parameters["bar_viscosity", "viscosity"][along, 0]
-        parameters.set("bar_viscosity", "viscosity", viscosity * factor, along)
-    parameters.set("bars", "stiffness", stiffness, along)
 
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:

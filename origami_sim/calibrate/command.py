@@ -4,6 +4,7 @@
     origami-sim calibrate relaxation A.csv B.csv --gauge-length 80mm --out vhb.toml
     origami-sim calibrate ring-down swing.csv --angle-unit rad --time-unit s --inertia 1e-4 --out hinge.toml
     origami-sim calibrate bridge --gap 2.54mm --thickness 1.27mm --width 25.4mm --modulus 1.5MPa --out crease_box.toml
+    origami-sim calibrate stack --notch 10mm --width 19mm --out crease_notch.toml
     origami-sim calibrate again crease.toml
 
 A file that is not found is sought among the recordings (`scene.recordings_folder`).
@@ -89,6 +90,17 @@ def register(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--largest", default="100deg", help="end of the table on both sides (default 100deg)")
     p.add_argument("--fineness", type=int, default=2, help="mesh, 1 to 4 (default 2)")
 
+    p = command(
+        "stack", "Fold of a notched dielectric-elastomer stack by finite elements (materials of the seed paper)"
+    )
+    p.add_argument("--notch", required=True, help="length of the notch, with its unit: 10mm")
+    p.add_argument("--width", required=True, help="along the notch, with its unit: 19mm")
+    p.add_argument("--voltage", default="4kV", help="the largest (default 4kV)")
+    p.add_argument("--notch-layers", type=int, default=1, help="tape over the notch (default 1 layer)")
+    p.add_argument("--arm-layers", type=int, default=5, help="tape on the arms (default 5 layers)")
+    p.add_argument("--active", type=float, default=0.7895, help="electroded share of the width (default 15/19)")
+    p.add_argument("--fineness", type=int, default=2, help="mesh, 1 to 4 (default 2)")
+
     p = command("again", "Repeat the stored command of a calibration and compare the values")
     p.add_argument("file", help="a calibration written by this program")
     p.add_argument("--tolerance", type=float, default=1e-3, help="relative, of each number (default 1e-3)")
@@ -160,6 +172,13 @@ def calibrate(args: argparse.Namespace) -> Done:
         )
         fit = experiment.fit_ring_down(data[time_name], data[angle_name], inertia=args.inertia)
         source, title = args.curve, f"Crease from the free swing {Path(args.curve).name}"
+    elif args.calibration == "stack":
+        from origami_sim.calibrate import fe_stack
+
+        notch, width = (_number(getattr(args, n), "length", f"--{n}") for n in ("notch", "width"))
+        stack = fe_stack.Stack(notch, notch_layers=args.notch_layers, arm_layers=args.arm_layers, active=args.active)
+        volts = _number(args.voltage, "voltage", "--voltage")
+        return Done(fe_stack.stack_calibration(stack, width, volts, command=command, fineness=args.fineness))
     else:
         from origami_sim.calibrate import fe
 
@@ -239,7 +258,7 @@ def again(file: str | Path, tolerance: float = 1e-3) -> list[tuple[str, float, f
 
 def _command(args: argparse.Namespace) -> str:
     words = [PROGRAM, args.calibration]
-    positional = {"crease": ["curve"], "ring-down": ["curve"], "relaxation": ["curves"], "bridge": []}[args.calibration]
+    positional = {"crease": ["curve"], "ring-down": ["curve"], "relaxation": ["curves"]}.get(args.calibration, [])
     for name in positional:
         value = getattr(args, name)
         words += map(shlex.quote, value if isinstance(value, list) else [value])

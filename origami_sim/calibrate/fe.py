@@ -271,18 +271,24 @@ def crease_calibration(bridge: Bridge, width: float, *, command: str, largest: f
     return Calibration(f"Crease of an elastomer bridge, patches {patch}", command, tuple(quantities), tuple(warnings))
 
 
+def _skfem(fineness: int) -> Any:
+    """The module scikit-fem, after a check of the mesh's number."""
+    try:
+        import skfem
+    except ImportError:
+        raise InputError(
+            "finite elements need scikit-fem", field="calibrate fe", allowed="pip install 'origami-sim[fe]'"
+        ) from None
+    if fineness not in (1, 2, 3, 4):
+        raise InputError("no such mesh", field="fineness", value=fineness, allowed="1, 2, 3, 4")
+    return skfem
+
+
 class _Section:
     """Mesh, shape functions and equilibrium of the half section x >= 0; the sheet's top side is y = 0."""
 
     def __init__(self, bridge: Bridge, fineness: int):
-        try:
-            import skfem
-        except ImportError:
-            raise InputError(
-                "finite elements need scikit-fem", field="calibrate fe", allowed="pip install 'origami-sim[fe]'"
-            ) from None
-        if fineness not in (1, 2, 3, 4):
-            raise InputError("no such mesh", field="fineness", value=fineness, allowed="1, 2, 3, 4")
+        skfem = _skfem(fineness)
         self.bridge = bridge
         b, edge, end = bridge, bridge.gap / 2, bridge.gap / 2 + bridge.reach
         finest = b.thickness / 8
@@ -300,7 +306,15 @@ class _Section:
         if solid:
             mesh = mesh.remove_elements(np.flatnonzero((centre[0] < edge) & (centre[1] > 0)))
             centre = mesh.p[:, mesh.t].mean(axis=1)
+        self.rigid = b.patch is None and b.reach > 0
+        self._shape(mesh, [b.sheet if y < 0 else b.patch for y in centre[1]])
+        self._constrain(edge, end)
+
+    def _shape(self, mesh: Any, rubber: Sequence[Any]):
+        """Shape functions and materials, by element."""
+        skfem = _skfem(1)
         self.mesh = mesh
+        self.electric = np.zeros((len(rubber), 1))
         shapes = [skfem.CellBasis(mesh, skfem.ElementQuadS2(), intorder=order) for order in (5, 3)]
         self.nodes = shapes[0].doflocs.T  # (n, 2) [m]
         self.size = 2 * len(self.nodes)
@@ -318,18 +332,15 @@ class _Section:
                     op[:, :, 2 * a + c, a::2] = np.moveaxis(g[:, c], 0, -1)
             self.operators.append(op)
             self.weights.append(basis.dx)
-        rubber: list[Any] = [b.sheet if y < 0 else b.patch for y in centre[1]]
         self.c10 = np.array([r.shear / 2 * (1 - r.share) for r in rubber])[:, None]
         self.c01 = np.array([r.shear / 2 * r.share for r in rubber])[:, None]
         self.bulk = np.array([r.bulk for r in rubber])[:, None]
-        self._constrain(edge, end)
 
     def _constrain(self, edge: float, end: float):
         x, y = self.nodes.T
-        near = 1e-9 * (end + self.bridge.thickness)
+        near = 1e-9 * end
         middle = np.flatnonzero(np.abs(x) < near)
         self.fixed = np.append(2 * middle, 2 * middle[np.argmin(y[middle])] + 1)  # mirror plane; one point held in y
-        self.rigid = self.bridge.patch is None and self.bridge.reach > 0
         held = (np.abs(y) < near) & (x > edge - near) if self.rigid else np.abs(x - end) < near
         self.held = np.flatnonzero(held)
         self.free = np.setdiff1d(
@@ -419,6 +430,12 @@ class _Section:
             e, points = weight.shape
             flat = op.reshape(e, points * 4, 16)
             stress = (2 * w_f[..., None] * grad + w_j[..., None] * cof) * weight[..., None]
+            active = part == 0 and self.electric.any()
+            line = grad * np.array([1.0, 0, 1, 0])  # the first column of F, along the layers
+            spread = (line**2).sum(axis=-1)
+            if active:  # energy -eps E0^2 / 2 |F e1|^2 / J of a field E0 across the layers, at fixed voltage
+                pull = -self.electric * weight / 2
+                stress += pull[..., None] * (2 * line / jac[..., None] - (spread / jac**2)[..., None] * cof)
             force += np.einsum("ekm,ek->em", flat, stress.reshape(e, points * 4))
             if part == 1 and pressure is not None:
                 w_j = pressure
@@ -426,6 +443,13 @@ class _Section:
             mixed = 2 * w_fj[..., None, None] * grad[..., :, None] * cof[..., None, :]
             d = d + mixed + np.swapaxes(mixed, -1, -2) + 2 * w_f[..., None, None] * np.eye(4)
             d += w_j[..., None, None] * _COFACTOR
+            if active:
+                cross = line[..., :, None] * cof[..., None, :]
+                e2 = 2 * np.diag([1.0, 0, 1, 0]) / jac[..., None, None]
+                e2 = e2 - 2 * (cross + np.swapaxes(cross, -1, -2)) / (jac**2)[..., None, None]
+                e2 = e2 + (2 * spread / jac**3)[..., None, None] * cof[..., :, None] * cof[..., None, :]
+                e2 = e2 - (spread / jac**2)[..., None, None] * _COFACTOR
+                d += -self.electric[..., None, None] / 2 * e2
             stiff += np.swapaxes(flat, 1, 2) @ ((d * weight[..., None, None]) @ op).reshape(e, points * 4, 16)
         out = np.bincount(self.dofs.ravel(), force.ravel(), self.size)
         return out, sparse.csr_matrix((stiff.ravel(), (self.rows, self.columns)), shape=(self.size, self.size))

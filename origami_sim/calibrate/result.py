@@ -30,6 +30,7 @@ _SI = {next(iter(units)) for units in UNITS.values()} | {
     "m^2",
     "1/s",
     "1/s^2",
+    "1/m",
     "Hz",
     "rad/s",
     "F/m",

@@ -1,5 +1,7 @@
 """Fits with known answers, coverage of their intervals, what they refuse, and the real recordings."""
 
+import argparse
+import json
 import math
 import shlex
 
@@ -281,7 +283,7 @@ def test_shipped_calibrations_are_what_their_commands_give(recordings):
     from importlib import resources
 
     folder = resources.files("origami_sim.calibrations")
-    for name in ("crease_unit075", "crease_bridge", "vhb_relaxation", "vhb_relaxation_crease"):
+    for name in ("crease_unit075", "crease_bridge", "crease_notch", "vhb_relaxation", "vhb_relaxation_crease"):
         rows = command.again(str(folder / f"{name}.toml"), 5e-3)
         assert rows and [r for r in rows if not r[3]] == [], name
 
@@ -368,3 +370,26 @@ def test_bad_files_are_one_sentence(tmp_path):
         assert all(w in str(error.value) for w in words), str(error.value)
     with pytest.raises(InputError, match="unit of a column is not stated"):
         read_hold(file, time_unit="s", displacement_unit="mm", force_unit=None, gauge_length=0.08)
+
+
+def run(words):
+    parser = argparse.ArgumentParser()
+    command.register(parser)
+    return command.run(parser.parse_args(words))
+
+
+def test_command_line_writes_the_file_and_the_plot(tmp_path, capsys):
+    curve, out, png = tmp_path / "swing.csv", tmp_path / "hinge.toml", tmp_path / "hinge.png"
+    t, angle = swing(np.random.default_rng(9))
+    curve.write_text("\n".join(["time_s,angle_rad", *(f"{a},{b}" for a, b in zip(t, angle, strict=True))]))
+    words = ["ring-down", str(curve), "--time-unit=s", "--angle-unit=rad", "--inertia=2e-5", f"--out={out}"]
+    assert run([*words, f"--plot={png}"]) == 0
+    assert "viscosity = " in capsys.readouterr().out and png.stat().st_size > 1e4
+    assert run(["again", str(out)]) == 0
+    assert "3 of 3 numbers as stored" in capsys.readouterr().out
+    out.write_text(out.read_text().replace("--inertia=2e-05", "--inertia=3e-05"))
+    assert run(["again", str(out)]) == 1
+    assert run([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["values"]["stiffness"]["unit"] == "N m/rad"
+    with pytest.raises(InputError, match="unit of a column is not stated"):
+        run(words[:3])
