@@ -108,6 +108,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("rest", nargs=argparse.REMAINDER, help="see origami-sim study crawler --help")
 
+    from origami_sim.calibrate.command import register
+
+    summary = "Obtain parameters from measured curves or finite elements"
+    p = commands.add_parser(
+        "calibrate",
+        help=summary,
+        description=summary + ".",
+        epilog="example: origami-sim calibrate --help lists the ways",
+    )
+    p.set_defaults(action=_calibrate)
+    register(p)
+
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
 
@@ -220,6 +232,12 @@ def _compare(args) -> int:
         print(comparison.sentence())
         print(f"run folder: {folder}")
     return _soundness(motion)
+
+
+def _calibrate(args) -> int:
+    from origami_sim.calibrate import command
+
+    return command.run(args)
 
 
 def _study(args) -> int:

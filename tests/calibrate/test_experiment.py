@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from effects.test_laws import hinge_moment
 
-from origami_sim.calibrate import command, read_result, write_calibration
+from origami_sim.calibrate import command
 from origami_sim.calibrate.experiment import (
     Hold,
     Parameter,
@@ -25,6 +25,7 @@ from origami_sim.calibrate.experiment import (
     summary,
     table_basis,
 )
+from origami_sim.calibrate.result import read_result, write_calibration
 from origami_sim.errors import InputError
 from origami_sim.scene import recordings_folder
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from origami_sim.calibrate import read_result, write_calibration
+from origami_sim.calibrate.result import read_result, write_calibration
 from origami_sim.errors import InputError
 from origami_sim.scene import read_calibration
 
