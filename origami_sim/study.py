@@ -9,6 +9,7 @@ parameters; and full trials of the best (half the step, a finer mesh, 5 % more a
 """
 
 import argparse
+import functools
 import hashlib
 import json
 import os
@@ -17,7 +18,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 
 import numpy as np
@@ -163,11 +164,20 @@ class Store:
         _write(self.file, json.dumps({"version": _version(), "results": rows}, indent=0))
 
 
+@functools.cache
 def _version() -> str:
+    """Version of the package and a digest of its laws and scenes: results of other laws must not be mixed in."""
+    package = Path(__file__).parent
+    scenes = Path(str(resources.files("origami_sim.scenes")))
+    digest = hashlib.sha256()
+    files = [*package.glob("effects/*.py"), *package.glob("solve/*.py"), package / "build.py", *scenes.glob("*.py")]
+    for file in sorted(files):
+        digest.update(file.read_bytes())
     try:
-        return metadata.version("origami-sim")
+        version = metadata.version("origami-sim")
     except metadata.PackageNotFoundError:
-        return "unknown"
+        version = "unknown"
+    return f"{version}+{digest.hexdigest()[:12]}"
 
 
 def _write(file: Path, text: str):
