@@ -360,7 +360,9 @@ class _Section:
         for a in range(2):
             own = 2 * self.held + a
             if self.rigid:
-                rows.append(own), columns.append(np.full(k, f + a)), values.append(np.ones(k))
+                rows.append(own)
+                columns.append(np.full(k, f + a))
+                values.append(np.ones(k))
             else:
                 rows += [own, own]
                 columns += [np.full(k, f), f + 1 + np.arange(k)]
