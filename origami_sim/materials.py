@@ -8,6 +8,9 @@ from origami_sim.errors import InputError
 MU0 = 1.25663706212e-6
 """Permeability of free space [T m/A]."""
 
+EPS0 = 8.8541878128e-12
+"""Permittivity of free space [F/m]."""
+
 
 @dataclass(frozen=True)
 class Material:

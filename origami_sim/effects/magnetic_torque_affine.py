@@ -6,8 +6,7 @@ import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
 from origami_sim.kinematics import corner_rows
-
-MU0 = 1.25663706212e-6
+from origami_sim.materials import MU0
 
 
 @wp.func

@@ -5,8 +5,7 @@ import math
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
-
-EPS0 = 8.8541878128e-12
+from origami_sim.materials import EPS0
 
 
 @wp.func
