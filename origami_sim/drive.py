@@ -18,6 +18,9 @@ CHANNELS = (
 )
 """Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow."""
 
+SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
+"""How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -28,7 +31,7 @@ class Signal:
     Attributes:
         offset, amplitude: in the channel's SI unit.
         frequency: [Hz]. phase: [rad].
-        times, values: samples [s] and their values, or None. scale: factor on the series.
+        times, values: samples [s] and their values (n,), or (n, worlds), or None. scale: factor on the series.
     """
 
     offset: float | np.ndarray = 0.0
@@ -48,7 +51,7 @@ class Signal:
         if self.times is None or self.values is None:
             return
         times, values = np.asarray(self.times, float), np.asarray(self.values, float)
-        if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
+        if times.ndim != 1 or values.ndim not in (1, 2) or len(times) != len(values) or len(times) < 2:
             raise InputError(
                 "a sampled signal needs at least two times and as many values",
                 field="values",
@@ -75,8 +78,34 @@ class Signal:
         """The signal at times t [s]; arrays of worlds and of times broadcast."""
         value = self.offset + self.amplitude * np.sin(2 * math.pi * np.asarray(self.frequency) * t + self.phase)
         if self.times is not None and self.values is not None:
-            value = value + np.asarray(self.scale) * np.interp(t, self.times, self.values)
+            value = value + np.asarray(self.scale) * self._sampled(t)
         return np.asarray(value, float)
+
+    def _sampled(self, t) -> np.ndarray:
+        """The series at times t; [..., worlds] where the worlds differ."""
+        assert self.times is not None and self.values is not None
+        if self.values.ndim == 1:
+            return np.interp(t, self.times, self.values)
+        t = np.asarray(t, float)
+        if t.ndim and t.shape[-1] == 1:
+            t = t[..., 0]
+        return np.stack([np.interp(t, self.times, column) for column in self.values.T], axis=-1)
+
+    def sampled(self, duration: float) -> np.ndarray:
+        """Times (n,) from 0 to `duration` [s], fine enough for the wave and with the series' own."""
+        fastest = float(np.max(np.abs(self.frequency) * (np.asarray(self.amplitude) != 0)))
+        rate = max(SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD * fastest)
+        duration = max(duration, 1.0 / rate)
+        times = np.linspace(0.0, duration, max(2, math.ceil(duration * rate) + 1))
+        own = times[:0] if self.times is None else self.times[(self.times >= 0) & (self.times <= duration)]
+        return np.unique(np.concatenate([times, own]))
+
+    @property
+    def worlds(self) -> int:
+        """Number of worlds that the signal tells apart."""
+        arrays = (self.offset, self.amplitude, self.frequency, self.phase, self.scale)
+        sampled = self.values.shape[1] if self.values is not None and self.values.ndim == 2 else 1
+        return max(sampled, *(np.size(a) for a in arrays))
 
 
 Value = float | np.ndarray | Signal
@@ -148,6 +177,30 @@ class Drive:
         """Uniform part of the flux density at time t [T]: shape (3,) or (3, worlds)."""
         return np.stack(np.broadcast_arrays(*(self.signals[c](t) for c in CHANNELS[:3])))
 
+    def series(self, channels: Sequence[str], duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Common times (n,) up to `duration` [s] and these channels there [channel, n, world]."""
+        times = np.unique(np.concatenate([self.signals[c].sampled(duration) for c in channels]))
+        values = [np.asarray(self.signals[c](times[:, None])).reshape(len(times), -1) for c in channels]
+        return times, np.stack(np.broadcast_arrays(*values))
+
+    @property
+    def worlds(self) -> int:
+        """Number of worlds that the drive tells apart (1 if none differs)."""
+        return max(s.worlds for s in self.signals.values())
+
+    def replace(self, **signals: Value) -> "Drive":
+        """The same drive with other signals in the channels named.
+
+        Raises:
+            InputError: there is no such channel.
+        """
+        out = object.__new__(Drive)
+        for name in signals:
+            if name not in self.signals:
+                raise InputError("no such drive channel", field="channel", value=name, allowed=", ".join(self.signals))
+        out.signals = {n: as_signal(signals.get(n, s)) for n, s in self.signals.items()}
+        return out
+
     @property
     def end(self) -> float:
         """Time at which the first sampled channel ends [s]; infinite if none is sampled."""
@@ -180,11 +233,14 @@ class Drive:
         return out
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Knot times of all sampled channels together, and the values of every channel there [channel, knot]."""
-        sampled = [s.times for s in self.signals.values() if s.times is not None]
-        times = np.unique(np.concatenate(sampled)) if sampled else np.zeros(0)
-        values = np.zeros((len(self.signals), len(times)))
-        for k, s in enumerate(self.signals.values()):
-            if s.times is not None and s.values is not None:
-                values[k] = np.interp(times, s.times, s.values)
+        """Knot times of all sampled channels together, and the values of every channel there [channel, knot, world].
+
+        The last axis has length 1 if no world differs.
+        """
+        sampled = {k: s for k, s in enumerate(self.signals.values()) if s.times is not None}
+        times = np.unique(np.concatenate([s.times for s in sampled.values()])) if sampled else np.zeros(0)
+        worlds = max((s.values.shape[1] for s in sampled.values() if np.ndim(s.values) == 2), default=1)
+        values = np.zeros((len(self.signals), len(times), worlds))
+        for k, s in sampled.items():
+            values[k] = s._sampled(times).reshape(len(times), -1)
         return times, values

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from origami_sim.effects import CONTACTS, get
+from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
 
 
@@ -50,6 +50,8 @@ class Model:
         """Number of entities of a family of effects."""
         if family in CONTACTS:
             return len(self.contacts)
+        if family in DISTORTIONS:
+            return 1
         return len(
             {
                 "bar": self.bars,
@@ -59,6 +61,11 @@ class Model:
                 "node": self.position,
             }[family]
         )
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """The effects that act as forces: all but the distortions of drive and measurement."""
+        return tuple(n for n in self.effects if get(n).family not in DISTORTIONS)
 
     def name(self, family: str, i: int) -> str:
         """Label of an entity."""
@@ -226,7 +233,7 @@ class State:
         if start.ndim == 2:
             start = start[:, None, :]
         x = np.array(np.broadcast_to(start, (len(model.position), worlds, 3)))
-        effects = [get(e) for e in model.effects]
+        effects = [get(e) for e in model.laws]
         rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
         hinges = np.concatenate([model.creases, model.bends])
         angles = dihedral_angles(x, hinges)

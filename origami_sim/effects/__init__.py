@@ -4,10 +4,13 @@ import importlib
 import pkgutil
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.effects._effect import CONTACTS, DRIVES, FAMILIES, HINGES, Effect, Memory, Parameter, scalar
+from origami_sim.effects._effect import CONTACTS, DISTORTIONS, DRIVES, FAMILIES, HINGES, Effect, Memory, Parameter, scalar
 from origami_sim.errors import InputError
 
-__all__ = ["CATALOGUE", "CONTACTS", "DRIVES", "FAMILIES", "HINGES", "Effect", "Memory", "Parameter", "get", "scalar"]
+__all__ = [
+    "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "Effect", "Memory", "Parameter", "get",
+    "scalar",
+]  # fmt: skip
 
 
 def _discover() -> dict[str, Effect]:

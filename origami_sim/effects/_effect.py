@@ -34,11 +34,15 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "coefficient": ("direction", "speed", "axis", "normal_load", "dt"),
     # tangential force on the contact point; slip: its tangential displacement in this step
     "tangent": ("velocity", "slip", "normal", "normal_load", "coefficient", "dt"),
+    # not forces: they change the drive that reaches the device, or what a tracker makes of its motion
+    "drive": (),
+    "measurement": (),
 }
 """Families of entities, and the quantities that each offers to its laws (SI units)."""
 
 HINGES = ("crease", "bend")
 CONTACTS = ("contact", "coefficient", "tangent")
+DISTORTIONS = ("drive", "measurement")
 
 DRIVES = ("field", "gradient", "voltage", "temperature", "load", "time")
 """Drive quantities: flux density B at the entity [T], its gradient dB_i/dx_j [T/m], voltage of the entity's electrode
@@ -58,6 +62,8 @@ class Parameter:
         meaning: a short description.
         knots: for a tabulated parameter, the number of values per entity; the law gets the buffer and the index of
             the first (arguments `buffer` and `<name>`).
+        typical: a value at which the effect is noticeable on a device of some grams and centimetres; the diagnosis
+            starts there, and sets those parameters to it that it does not fit.
     """
 
     name: str
@@ -67,6 +73,7 @@ class Parameter:
     bounds: tuple[float, float]
     meaning: str
     knots: int = 1
+    typical: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,12 @@ class Effect:
         family: key of `FAMILIES`.
         force: the law. With memory it returns the force and then the new memory values.
         energy: potential energy of one entity [J], or None if the effect has none.
+        apply: instead of a force, for a distortion of the drive, `apply(drive, duration, **parameters) -> Drive`, or of
+            the measurement, `apply(read, times, **parameters) -> values`, where `read(times [n, W])` gives the
+            undistorted channel [n, d, W]. Parameters are arrays [W].
+        channels: kinds of channels that a distortion of the measurement can act on (empty: all).
+        fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
+            switches the effect off at its default. Empty: the effect is never suspected.
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
             the energy, and the time-integrated work otherwise.
         stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
@@ -96,7 +109,7 @@ class Effect:
 
     name: str
     family: str
-    force: wp.Function
+    force: wp.Function | None
     parameters: tuple[Parameter, ...]
     formula: str
     source: str
@@ -104,6 +117,9 @@ class Effect:
     confused_with: str = ""
     separated_by: str = ""
     energy: wp.Function | None = None
+    apply: Callable | None = None
+    channels: tuple[str, ...] = ()
+    fitted: tuple[str, ...] = ()
     conservative: bool = False
     memory: tuple[Memory, ...] = ()
     stiffness: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
@@ -114,6 +130,11 @@ class Effect:
     def __post_init__(self):
         if self.family not in FAMILIES:
             raise ValueError(f"effect '{self.name}': unknown family '{self.family}'; allowed: {', '.join(FAMILIES)}")
+        if (self.apply if self.family in DISTORTIONS else self.force) is None:
+            raise ValueError(f"effect '{self.name}': the family '{self.family}' needs a law (apply or force)")
+        for name in self.fitted:
+            if not any(p.name == name and p.typical is not None for p in self.parameters):
+                raise ValueError(f"effect '{self.name}': fitted parameter '{name}' needs a typical value")
         own = {p.name for p in self.parameters} | {m.name for m in self.memory}
         known = own | set(FAMILIES[self.family]) | set(DRIVES) | {"buffer"}
         for attribute, law in (("arguments", self.force), ("energy_arguments", self.energy)):
@@ -125,6 +146,10 @@ class Effect:
                         f"drive nor a quantity of the family '{self.family}'; allowed: {', '.join(sorted(known))}"
                     )
             object.__setattr__(self, attribute, names)
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name."""
+        return next(p for p in self.parameters if p.name == name)
 
     @property
     def drives(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from origami_sim import kinematics
-from origami_sim.effects import CONTACTS, HINGES, Effect, get
+from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, Effect, get
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
@@ -45,7 +45,7 @@ _ARGUMENTS = """
     contacts: wp.array(dtype=wp.vec3i), weights: wp.array(dtype=vec3), offsets: wp.array(dtype=scalar),
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
-    series_times: wp.array(dtype=scalar), series_values: wp.array2d(dtype=scalar),
+    series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
     memory_rows: wp.array(dtype=wp.int32),
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
@@ -495,7 +495,7 @@ class _Composer:
 @functools.cache
 def compose(names: tuple[str, ...]) -> Program:
     """The program of these effects. Raises InputError for an unknown effect."""
-    effects = tuple(get(n) for n in names)
+    effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
     composer = _Composer(effects)
     source = composer.source()
     module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"

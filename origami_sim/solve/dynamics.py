@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
@@ -74,7 +75,7 @@ class Trajectory:
     def energy_balance(self) -> np.ndarray:
         """Energy less the work that was fed in, [F, W] [J]; constant up to the integrator's error."""
         total = self.energies["kinetic"].copy()
-        for name in self.model.effects:
+        for name in self.model.laws:
             effect = get(name)
             if effect.exchanges_work:
                 total -= self.work[name]
@@ -132,11 +133,13 @@ def simulate(
             allowed=f">= {frame_time:g} s at this rate",
         )
     if state is None:
-        worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()))
+        worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
     first = max(state.step, 0)
-    drive.require((first * step if state.step > 0 else 0.0) + frames * frame_time)
-    batch = Batch(model, parameters, drive, state, device=device, threads=threads)
+    drive_end = (first * step if state.step > 0 else 0.0) + frames * frame_time
+    drive.require(drive_end)
+    applied = distorted(model, parameters, drive, drive_end)
+    batch = Batch(model, parameters, applied, state, device=device, threads=threads)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=1.0) / step
 
@@ -169,7 +172,7 @@ def simulate(
             "kinetic": np.stack([e.kinetic for _, e in record]),
             **{n: np.stack([e.energies[n] for _, e in record]) for n in record[0][1].energies},
         },
-        work={n: np.stack([s.work[i] for s, _ in record]) for i, n in enumerate(model.effects)},
+        work={n: np.stack([s.work[i] for s, _ in record]) for i, n in enumerate(model.laws)},
         gaps=np.stack([e.gaps for _, e in record]),
         contact_forces=np.stack([sum((e.forces[c] for c in contact), zero) for _, e in record]),
         failures=failures,

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
@@ -225,7 +226,7 @@ def continuation(
             allowed=f"not {start}, within +-{FURTHEST:g}",
         )
     _positive(tolerance=tolerance, max_points=max_points, step=step or 1.0, move=move or 1.0)
-    worlds = [_fixed(d, time, world) for d in (base or Drive(), drive)]
+    worlds = [_fixed(distorted(model, parameters, d, time), time, world) for d in (base or Drive(), drive)]
     system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
     tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
     path = tracer.follow(x, angles, start, end, max_points, stop)
@@ -241,7 +242,7 @@ def _positive(**values):
 
 def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_System", np.ndarray, np.ndarray]:
     """The system of one world, and its positions [N, 3] and angles [H] to start from."""
-    worlds = max(parameters.worlds, max(v.shape[1] for v in drive.slots().values()), state.worlds if state else 1)
+    worlds = max(parameters.worlds, drive.worlds, state.worlds if state else 1)
     if not 0 <= world < worlds:
         raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
     drive.require(time)
@@ -251,7 +252,10 @@ def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_
     if not np.any(model.free):
         raise InputError("statics needs a node that is free to move", field="free", value=0)
     system = _System(
-        model, parameters.world(world if parameters.worlds > 1 else 0), fixed or _fixed(drive, time, world), one
+        model,
+        parameters.world(world if parameters.worlds > 1 else 0),
+        fixed or _fixed(distorted(model, parameters, drive, time), time, world),
+        one,
     )
     return system, one.x[:, 0], one.angles[:, 0]
 
@@ -351,7 +355,7 @@ class _System:
 
     def _couplings(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows and columns of the pairs of nodes of which one feels the other, each node with itself."""
-        m, families = self.model, {get(e).family for e in self.model.effects}
+        m, families = self.model, {get(e).family for e in self.model.laws}
         groups = [np.arange(len(m.position))[:, None]]
         for family, elements in (("bar", m.bars), ("crease", m.creases), ("bend", m.bends), ("triangle", m.triangles)):
             if family in families:

@@ -82,7 +82,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     sums = {"stiffness": np.zeros((n, worlds)), "damping": np.zeros((n, worlds))}
     largest = np.zeros((n, worlds))
     cause = np.full((n, worlds), "", dtype=object)
-    for name in model.effects:
+    for name in model.laws:
         effect = get(name)
         for kind in ("stiffness", "damping"):
             slope = getattr(effect, kind)

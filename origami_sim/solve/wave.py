@@ -11,7 +11,7 @@ def wave(
     k: int,
     w: int,
     series_times: wp.array(dtype=wp.float64),
-    series_values: wp.array2d(dtype=wp.float64),
+    series_values: wp.array3d(dtype=wp.float64),
     t: wp.float64,
 ):
     """Drive channel k at time t: offset + amplitude sin(omega t + phase) + scale * sampled series."""
@@ -28,5 +28,7 @@ def wave(
             i = wp.clamp(wp.lower_bound(series_times, t), 1, knots - 1)
             t0 = series_times[i - 1]
             s = wp.clamp((t - t0) / (series_times[i] - t0), wp.float64(0.0), wp.float64(1.0))
-            value += scale * (series_values[k, i - 1] + s * (series_values[k, i] - series_values[k, i - 1]))
+            own = wp.min(w, series_values.shape[2] - 1)
+            before = series_values[k, i - 1, own]
+            value += scale * (before + s * (series_values[k, i, own] - before))
     return value
