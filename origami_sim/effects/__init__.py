@@ -4,7 +4,17 @@ import importlib
 import pkgutil
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.effects._effect import CONTACTS, DISTORTIONS, DRIVES, FAMILIES, HINGES, Effect, Memory, Parameter, scalar
+from origami_sim.effects._effect import (
+    CONTACTS,
+    DISTORTIONS,
+    DRIVES,
+    FAMILIES,
+    HINGES,
+    Effect,
+    Memory,
+    Parameter,
+    scalar,
+)
 from origami_sim.errors import InputError
 
 __all__ = [

@@ -30,8 +30,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "node": ("x", "v", "mass", "dt"),
     # normal: force along the ground's normal, repulsion positive
     "contact": ("gap", "rate", "dt"),
-    # friction coefficient: contributions are added
-    "coefficient": ("direction", "speed", "axis", "normal_load", "dt"),
+    # friction coefficient: contributions are added; at: place of the contact point
+    "coefficient": ("direction", "speed", "axis", "normal_load", "at", "dt"),
     # tangential force on the contact point; slip: its tangential displacement in this step
     "tangent": ("velocity", "slip", "normal", "normal_load", "coefficient", "dt"),
     # not forces: they change the drive that reaches the device, or what a tracker makes of its motion

@@ -23,9 +23,10 @@ EFFECT = Effect(
     energy=energy,
     conservative=True,
     parameters=(
-        Parameter("pull_off", "Fa", "N", 0.0, (0.0, 100.0), "largest tension; 3/2 pi W R for a sphere"),
-        Parameter("reach", "r", "m", 5e-5, (1e-7, 1e-2), "gap at which the pull has faded"),
+        Parameter("pull_off", "Fa", "N", 0.0, (0.0, 100.0), "largest tension; 3/2 pi W R for a sphere", typical=0.01),
+        Parameter("reach", "r", "m", 5e-5, (1e-7, 1e-2), "gap at which the pull has faded", typical=5e-5),
     ),
+    fitted=("pull_off",),
     stiffness=lambda p: p["pull_off"] / p["reach"],
     formula="fn = -Fa clamp(1 - gap / r, 0, 1)",
     source="pull-off after Johnson, Kendall & Roberts 1971, with a linear decay over the reach",

@@ -31,9 +31,10 @@ EFFECT = Effect(
     family="triangle",
     force=force,
     parameters=(
-        Parameter("air_density", "rho", "kg/m^3", 1.2, (0.0, 10.0), "density of the air"),
-        Parameter("drag_coefficient", "Cd", "-", 0.0, (0.0, 5.0), "about 1.2 for a plate across the flow"),
+        Parameter("air_density", "rho", "kg/m^3", 1.2, (0.0, 10.0), "density of the air", typical=1.2),
+        Parameter("drag_coefficient", "Cd", "-", 0.0, (0.0, 5.0), "about 1.2 for a plate across the flow", typical=1.2),
     ),
+    fitted=("drag_coefficient",),
     formula="f = -(1/2) rho Cd A |vn| vn n, a third at each corner",
     source="drag equation for a flat plate",
     matters="0.07 % of the crawler's weight; first-order for light paper",

@@ -14,7 +14,10 @@ EFFECT = Effect(
     name="coulomb",
     family="coefficient",
     force=coefficient,
-    parameters=(Parameter("friction_coefficient", "mu", "-", 0.0, (0.0, 5.0), "Coulomb friction coefficient"),),
+    parameters=(
+        Parameter("friction_coefficient", "mu", "-", 0.0, (0.0, 5.0), "Coulomb friction coefficient", typical=0.5),
+    ),
+    fitted=("friction_coefficient",),
     formula="|ft| <= mu fn",
     source="Coulomb 1785",
     matters="every foot; rubber 0.3-1.2",

@@ -45,12 +45,13 @@ EFFECT = Effect(
     memory=(Memory("q1"), Memory("q2"), Memory("q3")),
     parameters=tuple(
         p
-        for i in (1, 2, 3)
+        for i, first in ((1, 3e-4), (2, 0.0), (3, 0.0))
         for p in (
-            Parameter(f"stiffness_{i}", f"K{i}", "N m/rad", 0.0, (0.0, math.inf), f"spring of branch {i}"),
-            Parameter(f"time_{i}", f"tau{i}", "s", 1.0, (1e-6, math.inf), f"relaxation time of branch {i}"),
+            Parameter(f"stiffness_{i}", f"K{i}", "N m/rad", 0.0, (0.0, math.inf), f"spring {i}", typical=first),
+            Parameter(f"time_{i}", f"tau{i}", "s", 1.0, (1e-6, math.inf), f"relaxation time {i}", typical=1.0),
         )
     ),
+    fitted=("stiffness_1", "time_1"),
     stiffness=lambda p: p["stiffness_1"] + p["stiffness_2"] + p["stiffness_3"],
     formula="M = -sum q_i,  dq_i/dt = K_i dtheta/dt - q_i / tau_i",
     source="standard linear solid / Prony series; exact exponential update (Simo & Hughes 1998, ch. 10)",

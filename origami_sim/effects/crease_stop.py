@@ -48,9 +48,14 @@ EFFECT = Effect(
     energy=energy,
     conservative=True,
     parameters=(
-        Parameter("stop_stiffness", "ks", "N m/rad", 0.0, (0.0, math.inf), "scale of the barrier's stiffness"),
-        Parameter("stop_angle", "theta_s", "rad", 2.8, (0.1, 3.13), "fold angle, of either sign, where it begins"),
+        Parameter(
+            "stop_stiffness", "ks", "N m/rad", 0.0, (0.0, math.inf), "scale of the barrier's stiffness", typical=1e-3
+        ),
+        Parameter(
+            "stop_angle", "theta_s", "rad", 2.8, (0.1, 3.13), "fold angle, of either sign, where it begins", typical=1.5
+        ),
     ),
+    fitted=("stop_stiffness", "stop_angle"),
     stiffness=lambda p: p["stop_stiffness"] * STEEPEST,
     formula="M = -ks s (tan u - u) sign(theta),  u = (|theta| - theta_s) / s,  s = 2 (pi - theta_s) / pi",
     source="barrier after Liu & Paulino 2017, smooth at its onset; straight on beyond slope 30 ks (u = 1.39)",

@@ -16,7 +16,12 @@ EFFECT = Effect(
     name="crease_viscosity",
     family="crease",
     force=moment,
-    parameters=(Parameter("viscosity", "c", "N m s/rad", 0.0, (0.0, math.inf), "beta K, with tan delta = beta omega"),),
+    parameters=(
+        Parameter(
+            "viscosity", "c", "N m s/rad", 0.0, (0.0, math.inf), "beta K, with tan delta = beta omega", typical=1e-5
+        ),
+    ),
+    fitted=("viscosity",),
     damping=lambda p: p["viscosity"],
     formula="M = -c dtheta/dt,  c = beta K",
     source="Kelvin-Voigt solid",

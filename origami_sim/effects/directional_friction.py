@@ -14,7 +14,10 @@ EFFECT = Effect(
     name="directional_friction",
     family="coefficient",
     force=coefficient,
-    parameters=(Parameter("backward_excess", "dmu", "-", 0.0, (0.0, 5.0), "mu backward minus mu forward"),),
+    parameters=(
+        Parameter("backward_excess", "dmu", "-", 0.0, (0.0, 5.0), "mu backward minus mu forward", typical=0.3),
+    ),
+    fitted=("backward_excess",),
     formula="mu = mu_f + dmu max(-s . axis, 0), s the direction of (impending) sliding",
     source="directional feet; linear in the direction cosine",
     matters="ratchet of a crawler: net drift fixed to the body, even in B, survives slow driving",

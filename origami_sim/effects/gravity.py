@@ -22,10 +22,13 @@ EFFECT = Effect(
     energy=energy,
     conservative=True,
     parameters=(
-        Parameter("gravity_x", "gx", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along x"),
-        Parameter("gravity_y", "gy", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along y"),
-        Parameter("gravity_z", "gz", "m/s^2", -9.80665, (-100.0, 100.0), "acceleration of gravity along z"),
+        Parameter("gravity_x", "gx", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along x", typical=0.0),
+        Parameter("gravity_y", "gy", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along y", typical=0.0),
+        Parameter(
+            "gravity_z", "gz", "m/s^2", -9.80665, (-100.0, 100.0), "acceleration of gravity along z", typical=-9.80665
+        ),
     ),
+    fitted=("gravity_z",),
     formula="f = m g",
     source="-",
     matters="1 % of the torque on a box flap at 0.2 T, 20 % at 10 mT; 1.5 times the stiffness of the cantilever",

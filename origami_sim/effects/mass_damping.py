@@ -16,7 +16,10 @@ EFFECT = Effect(
     name="mass_damping",
     family="node",
     force=force,
-    parameters=(Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, math.inf), "rate at which free motion decays"),),
+    parameters=(
+        Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, math.inf), "rate at which free motion decays", typical=0.5),
+    ),
+    fitted=("decay_rate",),
     damping=lambda p: p["decay_rate"] * p["mass"],
     formula="f = -alpha m v",
     source="Rayleigh damping, mass part",

@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 
-from origami_sim.effects import CATALOGUE
+from origami_sim.effects import CATALOGUE, DISTORTIONS
 from origami_sim.model import Model, Parameters, State
 
-ALL = tuple(CATALOGUE)
+ALL = tuple(n for n, e in CATALOGUE.items() if e.family not in DISTORTIONS)
+"""Every effect that acts as a force."""
+
 INTERNAL = ("bar", "crease", "bend")
 """Families whose forces act between nodes: no net force, no net torque."""
 
@@ -24,7 +26,7 @@ def make_model(
     offsets=None,
     axes=None,
     free=None,
-    effects=ALL,
+    effects=tuple(CATALOGUE),
     electrodes=None,
     names=None,
 ) -> Model:
@@ -99,7 +101,7 @@ def hinge(angle=0.0, *, held=(), **options) -> Model:
     return make_model(x, free=free, **{**HINGE, **options})
 
 
-def strip(n=4, *, effects=ALL, height=0.0, electrodes=None) -> Model:
+def strip(n=4, *, effects=tuple(CATALOGUE), height=0.0, electrodes=None) -> Model:
     """n square panels in a row, each cut by a bending line, creases between them, contact points under all."""
     x = np.array([[i, j, height] for i in range(n + 1) for j in (0.0, 1.0)], float)
     triangles, bars, creases, bends = [], {(0, 1)}, [], []

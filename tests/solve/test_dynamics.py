@@ -226,7 +226,7 @@ BRANCHES = ((0.5, 0.05), (0.8, 0.4), (0.3, 3.0))
 
 
 def relaxing():
-    model = hinge(0.2, held=(0, 1, 2, 3), bars=())
+    model = hinge(0.2, held=(0, 1, 2, 3), bars=(), effects=("crease_relaxation",))
     p = quiet(
         model,
         {

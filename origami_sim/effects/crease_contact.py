@@ -1,0 +1,53 @@
+"""Patches on one side of a crease that touch when it has folded far enough."""
+
+import math
+
+import warp as wp
+
+from origami_sim.effects._effect import Effect, Parameter, scalar
+
+
+@wp.func
+def overlap(angle: scalar, contact_angle: scalar):
+    over = angle - contact_angle
+    if contact_angle < scalar(0.0):
+        over = wp.min(over, scalar(0.0))
+    else:
+        over = wp.max(over, scalar(0.0))
+    return over
+
+
+@wp.func
+def moment(angle: scalar, contact_stiffness: scalar, contact_angle: scalar):
+    return -contact_stiffness * overlap(angle, contact_angle)
+
+
+@wp.func
+def energy(angle: scalar, contact_stiffness: scalar, contact_angle: scalar):
+    over = overlap(angle, contact_angle)
+    return scalar(0.5) * contact_stiffness * over * over
+
+
+EFFECT = Effect(
+    name="crease_contact",
+    family="crease",
+    force=moment,
+    energy=energy,
+    conservative=True,
+    parameters=(
+        Parameter(
+            "contact_stiffness", "kc", "N m/rad", 0.0, (0.0, math.inf), "stiffness of what touches", typical=5e-3
+        ),
+        Parameter(
+            "contact_angle", "theta_c", "rad", 1.0, (-math.pi, math.pi), "fold where they touch; its sign is the side",
+            typical=1.0,
+        ),
+    ),
+    fitted=("contact_stiffness", "contact_angle"),
+    stiffness=lambda p: p["contact_stiffness"],
+    formula="M = -kc (theta - theta_c) beyond theta_c, on its side only",
+    source="penalty contact of patch edges: tan(theta_c / 2) = gap / (2 height) for patches flush with the crease",
+    matters="a kink in the fold against the drive; rattling; folds that stop early on one side",
+    confused_with="stiffening (no kink), asymmetry (kink at rest)",
+    separated_by="vary the gap between the patches; listen; look along the crease",
+)  # fmt: skip
