@@ -183,6 +183,17 @@ class Parameters:
         out._values = {k: v[:, [w if v.shape[1] > 1 else 0]].copy() for k, v in self._values.items()}
         return out
 
+    @classmethod
+    def join(cls, parts: "Sequence[Parameters]", repeat: int = 1) -> "Parameters":
+        """One batch of single-world parameters of the same model, each `repeat` times in a row."""
+        out = object.__new__(cls)
+        out._values = {}
+        for key, first in parts[0]._values.items():
+            columns = [p._values[key] for p in parts]
+            same = all(np.array_equal(c, first) for c in columns[1:])
+            out._values[key] = first.copy() if same else np.repeat(np.concatenate(columns, axis=1), repeat, axis=1)
+        return out
+
     def copy(self) -> "Parameters":
         out = object.__new__(Parameters)
         out._values = {k: v.copy() for k, v in self._values.items()}

@@ -28,7 +28,10 @@ _FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, fact
 
 @dataclass(frozen=True)
 class Setting:
-    """One number (or word) of a calibration: SI value, unit, where it comes from and how far it may vary."""
+    """One number (or word) of a calibration: SI value, unit, where it comes from and how far it may vary.
+
+    `uncertainty` is the 95 % interval in which the value was known to lie; None if it is taken as given.
+    """
 
     name: str
     value: float | str | bool
@@ -37,6 +40,7 @@ class Setting:
     meaning: str
     range: tuple[float, float] | None = None
     choices: tuple[str, ...] = ()
+    uncertainty: tuple[float, float] | None = None
 
 
 class Settings(Mapping[str, Setting]):
@@ -209,7 +213,28 @@ def _setting(name: str, table: object, path: Path) -> Setting:
         limits = (float(limits[0]), float(limits[1]))
     if not isinstance(choices, list) or not all(isinstance(c, str) for c in choices):
         raise InputError("choices are words", file=path, field=f"{name}.choices", value=choices)
-    setting = Setting(name, value, table["unit"], table["source"], table["meaning"], limits, tuple(choices))
+    spread = table.get("uncertainty")
+    if spread is not None:
+        numbers = isinstance(spread, list) and all(isinstance(v, (int, float)) for v in spread)
+        if not numbers or len(spread) != 2 or not spread[0] <= spread[1]:
+            raise InputError(
+                "an uncertainty is two numbers",
+                file=path,
+                field=f"{name}.uncertainty",
+                value=spread,
+                allowed="[low, high], a 95 % interval",
+            )
+        spread = (float(spread[0]), float(spread[1]))
+    setting = Setting(
+        name,
+        value,
+        table["unit"],
+        table["source"],
+        table["meaning"],
+        limits,
+        tuple(choices),
+        spread,
+    )
     return _checked(setting, path)
 
 

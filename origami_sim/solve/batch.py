@@ -218,6 +218,11 @@ class Batch:
             gaps=self._download(gaps, k),
         )
 
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [N, W, 3] [m] and hinge angles [C + Q, W] [rad], without copying anything else."""
+        m = self.model
+        return self._download(self._x, len(m.position)), self._download(self._angles, len(m.creases) + len(m.bends))
+
     def place(self, x: np.ndarray, angles: np.ndarray):
         """Overwrites positions [N, W, 3] and the angles from which they are continued [C + Q, W]."""
         self._x.assign(self._upload(x, wp.vec3d))

@@ -1,0 +1,41 @@
+"""The observer for batches: channels of many worlds at once."""
+
+import numpy as np
+
+from origami_sim.errors import InputError
+from origami_sim.model import Model, dihedral_angles
+from origami_sim.observe import _index
+from origami_sim.recording import Channel
+
+
+def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """One channel [F, d, W] at positions x [F, N, W, 3]; angles [F, C, W] are the continuous hinge angles if known.
+
+    Raises:
+        InputError: a channel attached to something that the model does not have.
+    """
+    if channel.kind == "crease_angle":
+        c = _index(model, channel, "crease", len(model.creases))
+        if angles is not None:
+            return angles[:, c : c + 1]
+        return np.moveaxis(dihedral_angles(np.moveaxis(x, 0, 1), model.creases[c : c + 1]), 0, 1)
+    if channel.kind == "panel_angle":
+        panel = _index(model, channel, "panel", int(model.triangle_panel.max()) + 1)
+        triangles = model.triangles[model.triangle_panel == panel]
+        nodes = set(np.unique(triangles).tolist())
+        axis = next((c[1:3] for c in model.creases if {int(c[1]), int(c[2])} <= nodes), None)
+        if axis is None:
+            raise InputError("a panel angle needs a crease on the panel", field="panel", value=panel)
+        along = x[:, triangles].mean(axis=(1, 2)) - x[:, axis].mean(axis=1)
+        return np.arctan2(along[..., 0], along[..., 2])[:, None]
+    if channel.kind in ("marker", "tip_displacement"):
+        node = _index(model, channel, "node", len(model.position))
+        if channel.kind == "marker":
+            return np.moveaxis(x[:, node], 2, 1)
+        return np.linalg.norm(x[:, node] - model.position[node], axis=-1)[:, None]
+    raise InputError(
+        "this kind of channel cannot be diagnosed yet",
+        field=f"channels.{channel.name}.kind",
+        value=channel.kind,
+        allowed="crease_angle, panel_angle, marker, tip_displacement",
+    )

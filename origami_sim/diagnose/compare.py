@@ -1,0 +1,140 @@
+"""Comparison of fitted hypotheses: held-out scores, evidence, probabilities.
+
+All hypotheses are compared with the same weights and one effective sample size. The held-out score of a fold is that of
+its blocks when the numbers are fitted to all other blocks; only the starts of the held-out blocks are adapted, by the
+same rule for every hypothesis.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from origami_sim.diagnose.refit import Fit, Weights, whitened
+
+FOLDS = 5
+"""Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
+
+TEMPERATURE = 2.0
+"""By which log evidence is divided before it becomes a probability; larger is more careful."""
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """How well a hypothesis predicts what it was not fitted to.
+
+    Attributes:
+        held_out: (B,) log score of each block, up to a constant shared by all hypotheses.
+        rms: (D,) root mean square of the held-out residual [SI].
+        evidence: log evidence: minus half the cost, minus half the log of the effective sample size per number.
+    """
+
+    held_out: np.ndarray
+    rms: np.ndarray
+    evidence: float
+
+
+def weights_from(forward, fits: Sequence[Fit], *, floor: bool = True) -> Weights:
+    """Weights from the residuals of the best fit: its size, not below the measurement noise, and its memory."""
+    best = min((f for f in fits if not f.failed), key=lambda f: f.cost)
+    residuals = np.concatenate([r for r in best.residuals])
+    rms = np.sqrt(np.nanmean(residuals**2, axis=0))
+    noise = forward.blocks[0].noise
+    deviation = np.maximum(rms, noise) if floor else rms
+    return Weights(deviation, 1.0 / memory([r / deviation for r in best.residuals]))
+
+
+def memory(residuals: Sequence[np.ndarray]) -> float:
+    """Correlation time of residuals in samples: 1 + twice the sum of the autocorrelation up to its first zero."""
+    longest = max(len(r) for r in residuals)
+    lags = min(longest - 1, 400)
+    sums, counts = np.zeros(lags + 1), np.zeros(lags + 1)
+    for r in residuals:
+        filled = np.nan_to_num(r - np.nanmean(r, axis=0))
+        n = len(filled)
+        size = 1 << int(np.ceil(np.log2(2 * n)))
+        f = np.fft.rfft(filled, size, axis=0)
+        acf = np.fft.irfft(f * np.conj(f), size, axis=0)[: min(n, lags + 1)].sum(axis=1)
+        sums[: len(acf)] += acf
+        counts[: len(acf)] += filled.shape[1] * (n - np.arange(len(acf)))
+    rho = sums / np.maximum(counts, 1)
+    if rho[0] <= 0:
+        return 1.0
+    rho = rho / rho[0]
+    crossing = np.flatnonzero(rho < 0.05)
+    stop = crossing[0] if len(crossing) else len(rho)
+    return float(max(1.0, 1.0 + 2.0 * rho[1:stop].sum()))
+
+
+def effective_samples(forward, fit: Fit, weights: Weights) -> float:
+    """Number of independent samples in the fitted blocks."""
+    return float(sum(np.isfinite(forward.blocks[b].values).sum() for b in fit.blocks) * weights.part)
+
+
+def folds(forward, blocks: Sequence[int]) -> list[list[int]]:
+    """Positions (within `blocks`) of each fold: whole recordings, or contiguous stretches of a single one."""
+    recordings = [forward.blocks[b].recording for b in blocks]
+    distinct = sorted(set(recordings))
+    if len(distinct) > 1:
+        return [[n for n, r in enumerate(recordings) if r == d] for d in distinct]
+    count = min(FOLDS, len(blocks))
+    return [list(map(int, part)) for part in np.array_split(np.arange(len(blocks)), count)] if count > 1 else []
+
+
+def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
+    """Held-out score by one Gauss-Newton step of every leave-one-fold-out fit from the full fit.
+
+    The linearisation of the full fit is exact for small changes of the numbers; leaving out a fold changes them by
+    about a standard deviation. A single block has no folds: the score is then that of the fit with the penalty of
+    its numbers.
+
+    Args:
+        weights: those of the fit. relax: factor on all whitened squares, for weights that were learnt after the fit.
+    """
+    line = fit.linear
+    assert line is not None
+    scale = np.array([f.scale for f in fit.free])
+    prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in fit.free])
+    away = np.array([f.start for f in fit.free]) - fit.theta
+    low = (np.array([f.lower for f in fit.free]) - fit.theta) / scale
+    high = (np.array([f.upper for f in fit.free]) - fit.theta) / scale
+    k = float(np.sqrt(relax))
+    residual = [k * whitened(r, weights) for r in fit.residuals]
+    tangent = [k * line.clear(n, t) for n, t in enumerate(line.tangent)]
+    cleared = [line.clear(n, r) for n, r in enumerate(residual)]
+    held_out = np.array([-0.5 * float(c @ c) for c in cleared])
+    left = [c.copy() for c in cleared]
+    for part in folds(forward, fit.blocks) if len(fit.free) else []:
+        rows = [tangent[n] for n in range(len(tangent)) if n not in part]
+        right = [cleared[n] for n in range(len(tangent)) if n not in part]
+        a = np.concatenate([*rows, np.diag(prior)])
+        a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
+        y = np.concatenate([*right, prior * away / scale, np.zeros(len(scale))])
+        q, r = np.linalg.qr(a)
+        step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+        for n in part:
+            left[n] = cleared[n] - tangent[n] @ step
+            held_out[n] = -0.5 * float(left[n] @ left[n])
+    dims = len(weights.deviation)
+    squares = np.concatenate([v.reshape(-1, dims) ** 2 for v in left]) / (weights.part * relax)
+    seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
+    rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation
+    extra = len(fit.hypothesis.free)
+    n = max(effective_samples(forward, fit, weights), 2.0)
+    cost = float(sum(r @ r for r in residual)) + fit.penalty
+    return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n))
+
+
+def probabilities(scores: Sequence[float], temperature: float = TEMPERATURE) -> np.ndarray:
+    """Softmax of log evidences, tempered."""
+    a = np.asarray(scores, float) / temperature
+    a = np.where(np.isfinite(a), a, -np.inf)
+    e = np.exp(a - a.max())
+    return e / e.sum()
+
+
+def difference(a: Score, b: Score) -> tuple[float, float]:
+    """Held-out log score of a over b, and the standard error of that difference over blocks."""
+    d = a.held_out - b.held_out
+    return float(d.sum()), float(np.sqrt(len(d)) * d.std(ddof=1)) if len(d) > 1 else np.inf

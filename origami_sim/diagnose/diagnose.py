@@ -1,0 +1,623 @@
+"""`diagnose`: from a model and recordings to a verdict, stage by stage."""
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from origami_sim.diagnose import verdict as words
+from origami_sim.diagnose.baselines import baselines
+from origami_sim.diagnose.compare import (
+    Score,
+    difference,
+    effective_samples,
+    memory,
+    probabilities,
+    score,
+    weights_from,
+)
+from origami_sim.diagnose.diagnosis import Candidate, Correlation, Diagnosis, Number, Suspected, Trace
+from origami_sim.diagnose.experiment import propose
+from origami_sim.diagnose.forward import Forward, angle_mask, stacked
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
+from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.refit import Fit, Weights, fit
+from origami_sim.diagnose.screen import Screening, Signature, screen
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.recording import Recording
+from origami_sim.solve.timestep import stable_step
+
+
+@dataclass(frozen=True)
+class Options:
+    """How thoroughly to look; the defaults keep the promise of a minute for four panels and ten seconds.
+
+    Attributes:
+        segment: length of a segment [s]; None: chosen from how fast starts are forgotten or amplified.
+        start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
+        rate: frames per second that are compared; the recording is thinned to it.
+        steps: solver steps that one pass over the data may take; longer recordings are sampled evenly.
+        finalists: suspects that are refitted. most: effects that may be combined.
+        significance: of the look-elsewhere test. clear: ratio of the best probability that is a verdict, not a tie.
+        seed: of the null draws.
+    """
+
+    segment: float | None = None
+    start: str | None = None
+    rate: float = 200.0
+    steps: int = 400_000
+    finalists: int = 6
+    most: int = 3
+    significance: float = 0.01
+    clear: float = 0.9
+    draws: int = 999
+    seed: int = 0
+    threads: int | None = None
+
+
+GROWTH = 30.0
+"""Growth of a difference in the start beyond which a segment is cut: below the time in which chaos takes over."""
+
+FEWEST = 8
+"""Segments that a single recording is cut into at least, where its start is fitted, for held-out scores."""
+
+Report = Callable[[str, float], None]
+
+
+def diagnose(
+    subject: Subject,
+    recordings: Sequence[Recording],
+    options: Options | None = None,
+    *,
+    catalogue: Sequence[str] | None = None,
+    progress: Report | None = None,
+) -> Diagnosis:
+    """Locates the mismatch between a model and recordings of one object, and says what it is.
+
+    Args:
+        subject: the model and what is uncertain in it. recordings: of one object, with their drives.
+        options: see `Options`. catalogue: suspect only these effects (default: all that can act).
+        progress: called with the stage and the fraction done.
+
+    Raises:
+        InputError: no recording, recordings of different channels, too few frames, a drive that the model does not know.
+    """
+    o = options or Options()
+    tell = progress or (lambda stage, part: None)
+    seconds: dict[str, float] = {}
+    began = clock.perf_counter()
+
+    def lap(stage: str):
+        seconds[stage] = clock.perf_counter() - began - sum(seconds.values())
+
+    tell("prepare", 0.0)
+    recordings = prepared(recordings, o.rate)
+    forward = arranged(subject, recordings, o)
+    tell("nominal", 0.0)
+    given, base, weights, free_start = nominal_fits(forward)
+    lap("nominal")
+    tell("screen", 0.0)
+    every = suspects(forward.model, recordings, _union(forward))
+    if catalogue is not None:
+        every = [s for s in every if s.effect in catalogue]
+    screening = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
+    p_value = look_elsewhere(screening, o.draws, o.seed)
+    lap("screen")
+    tell("locate", 0.0)
+    places = locate(forward, base)
+    lap("locate")
+    fits = [base]
+    finalists = chosen(screening, o.finalists)
+    for n, s in enumerate(finalists):
+        tell("refit", n / max(len(finalists), 1))
+        fits.append(refit(forward, base, s, weights))
+    fits += pairs(forward, base, screening, fits, weights, o)
+    final = weights_from(forward, fits)
+    relax = relaxation(weights, final)
+    scores = {id(f): scored(forward, f, weights, relax) for f in fits if not f.failed}
+    lap("refit")
+    tell("combine", 0.0)
+    grown, more = combine(forward, base, fits, scores, every, weights, relax, o, tell)
+    fits += more
+    lap("combine")
+    tell("verdict", 0.0)
+    judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, relax, o)
+    best = judged.best
+    experiments = propose(forward, judged, weights, progress=lambda part: tell("next experiment", part))
+    lap("next experiment")
+    tell("baselines", 0.0)
+    beside = baselines(forward, base, weights, scores[id(base)])
+    lap("baselines")
+    candidates = table(forward, given, fits, scores, judged, screening)
+    after = scores[id(best)]
+    out = Diagnosis(
+        verdict=judged.verdict,
+        sentence=judged.sentence,
+        probability=judged.probability,
+        chosen=judged.chosen,
+        candidates=candidates,
+        screening=[_suspected(s, screening) for s in (*screening.signatures, *screening.untestable)],
+        isolability_labels=[s.suspect.label for s in screening.signatures[:12]],
+        isolability=screening.overlap()[:12, :12].tolist(),
+        places=places,
+        p_value=p_value,
+        onset=judged.onset,
+        traces=traces(forward, given, base, best, final),
+        correlations=correlations(forward, base, best),
+        experiments=experiments,
+        baselines=beside,
+        components=list(forward.components),
+        units=_units(recordings[0]),
+        noise=forward.blocks[0].noise.tolist(),
+        error_before=_rms(given).tolist(),
+        error_refitted=scores[id(base)].rms.tolist(),
+        error_after=after.rms.tolist(),
+        notes=judged.notes + [n for r in recordings for n in r.metadata.get("notes", [])],
+        settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
+        seconds=seconds,
+        patch=patch(best),
+        subject=subject.name,
+        recordings=[r.name for r in recordings],
+    )
+    tell("done", 1.0)
+    return out
+
+
+# --- preparation
+
+
+def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
+    """The recordings, thinned to about `rate` frames per second.
+
+    Raises:
+        InputError: none, different channels, too few frames.
+    """
+    if not recordings:
+        raise InputError("there is nothing to diagnose", field="recordings", value=0, allowed="at least one recording")
+    names = list(recordings[0].channels)
+    out = []
+    for r in recordings:
+        if list(r.channels) != names:
+            raise InputError(
+                "recordings of one object need the same channels",
+                field=f"{r.name}.channels",
+                value=", ".join(r.channels),
+                allowed=", ".join(names),
+            )
+        if len(r.times) < 16:
+            raise InputError(
+                "a recording is too short for a diagnosis",
+                field=f"{r.name}.frames",
+                value=len(r.times),
+                allowed="at least 16",
+            )
+        every = max(1, int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6))
+        out.append(thinned(r, every))
+    return out
+
+
+def thinned(recording: Recording, every: int) -> Recording:
+    """Every so-manieth frame."""
+    if every <= 1:
+        return recording
+    cut = slice(None, None, every)
+    return replace(
+        recording,
+        times=recording.times[cut],
+        channels={n: replace(c, values=c.values[cut]) for n, c in recording.channels.items()},
+        drive={n: d if d.constant else replace(d, values=d.values[cut]) for n, d in recording.drive.items()},
+    )
+
+
+def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forward:
+    """Segments that are short enough to be predictable, and start modes."""
+    start = o.start or starting(subject, recordings)
+    if start == "rest":
+        return Forward(subject, recordings, segment=o.segment, start="rest", threads=o.threads)
+    whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
+    length = o.segment
+    if length is None:
+        length = whole / (FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings)))
+        length = min(length, predictable(Forward(subject, recordings, segment=min(length, whole), most=4)))
+    probe = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2])
+    most = max(FEWEST, int(o.steps * probe.dt / length)) // len(recordings)
+    return Forward(subject, recordings, segment=length, start="fit", most=max(1, most), threads=o.threads)
+
+
+def starting(subject: Subject, recordings: list[Recording]) -> str:
+    """"rest" if all recordings begin at rest in the reference state, else "fit"."""
+    probe = Forward(subject, recordings, start="rest")
+    for index, recording in enumerate(recordings):
+        values, noise = stacked(recording)
+        block = next(b for b in probe.blocks if b.recording == index)
+        head = slice(0, max(4, len(values) // 100))
+        now, _ = probe._channel_tangent(recording, block.pose, values[0])
+        with np.errstate(invalid="ignore"):
+            away = np.nanmedian(values[head], axis=0) - now
+            drift = np.nanstd(values[head], axis=0)
+        scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
+        if np.any(np.abs(away) > np.maximum(0.05 * scale, 5 * noise)) or np.any(drift > 0.2 * scale):
+            return "fit" if probe.articulation.size else "rest"
+    return "rest"
+
+
+def predictable(forward: Forward) -> float:
+    """Time over which a difference in the start grows less than GROWTH times [s]."""
+    m = forward.local
+    local = np.zeros((m + 1, len(forward.blocks), m))
+    for k in range(m):
+        local[1 + k, :, k] = 1e-6 if k < m // 2 else 1e-5
+    theta = np.array([f.start for f in forward.subject.nominals])
+    predicted = forward.predict(Hypothesis(), [theta] * (m + 1), local)
+    shortest = np.inf
+    for block, values in zip(forward.blocks, predicted, strict=True):
+        moved = np.linalg.norm(np.nan_to_num(values[1:] - values[0], nan=np.inf), axis=2)  # [m, n]
+        early = np.maximum.accumulate(moved, axis=1)
+        first = np.maximum(early[:, max(2, len(block.times) // 20)], 1e-9)
+        beyond = np.any(moved > GROWTH * first[:, None], axis=0)
+        shortest = min(shortest, block.times[np.argmax(beyond)] if np.any(beyond) else block.times[-1] + 1e-9)
+    return max(float(shortest), 8 * float(np.median(np.diff(forward.recordings[0].times))))
+
+
+def _union(forward: Forward):
+    """A drive in which everything is switched on that is in any recording's."""
+    return forward._drives[0]
+
+
+# --- stages
+
+
+def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
+    """The nominal model as given (only starts fitted) and refitted; the weights, and those of the noise alone."""
+    noise = forward.blocks[0].noise
+    theta = np.array([f.start for f in forward.subject.nominals])
+    rough = forward.predict(Hypothesis(), theta[None], np.zeros((1, len(forward.blocks), forward.local)))
+    gaps = [b.values - v[0] for b, v in zip(forward.blocks, rough, strict=True)]
+    if any(np.any(np.isnan(v[0])) for v in rough):
+        raise InputError(
+            "the nominal model goes unstable on this recording", field="model", allowed="a model that can be simulated"
+        )
+    rms = np.sqrt(np.nanmean(np.concatenate(gaps) ** 2, axis=0))
+    w = Weights(np.maximum(rms, noise), 0.1)
+    given = fit(forward, Hypothesis(), w, fixed=True)
+    w = weights_from(forward, [given])
+    base = given if not len(theta) else fit(forward, Hypothesis(), w, local=given.local)
+    for _ in range(2):
+        if base.failed:
+            break
+        new = weights_from(forward, [base])
+        if np.all(np.abs(np.log(new.deviation / w.deviation)) < 0.1) and abs(np.log(new.part / w.part)) < 0.3:
+            break
+        w = new
+        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, fixed=not len(theta))
+    if base.failed:
+        raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
+    return given, base, w, Weights(noise, 1.0)
+
+
+def look_elsewhere(screening: Screening, draws: int, seed: int) -> float:
+    """Chance that noise alone gives any suspect so high a score: draws of white residuals, the same projection."""
+    if not screening.signatures:
+        return 1.0
+    shapes = np.stack([s.shape for s in screening.signatures])
+    rng = np.random.default_rng(seed)
+    # the scores of white noise have the covariance of the signatures' overlaps
+    overlap = shapes @ shapes.T
+    value, vector = np.linalg.eigh(overlap)
+    draws_ = rng.normal(size=(draws, len(value))) * np.sqrt(np.maximum(value, 0.0)) @ vector.T
+    highest = np.abs(draws_).max(axis=1)
+    found = max(abs(s.score) for s in screening.signatures)
+    return float((1 + np.count_nonzero(highest >= found)) / (draws + 1))
+
+
+ALIKE = 0.98
+"""Overlap beyond which two sites of one effect count as one explanation while finalists are chosen."""
+
+
+def chosen(screening: Screening, most: int) -> list[Signature]:
+    """The best suspects, at most so many; of twins (the same effect with the same signature) only the better."""
+    out: list[Signature] = []
+    for s in screening.signatures:
+        if len(out) >= most or abs(s.score) < 2.0:
+            break
+        twins = any(s.suspect.effect == t.suspect.effect and abs(s.shape @ t.shape) > ALIKE for t in out)
+        if not twins:
+            out.append(s)
+    return out
+
+
+def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, most: int = 6) -> Fit:
+    """The nominal model with one more suspect, from the best fit so far and the screening's estimate.
+
+    A second start from half the strength guards against a bad estimate; if the fit is still worse than the model that
+    it contains, it is repeated from there with the effect off, which cannot be worse.
+    """
+    s = found.suspect
+    hypothesis = base.hypothesis.plus(s)
+    best: Fit | None = None
+    first = s.free[0]
+    for part in (1.0, 0.3):
+        values = [float(np.clip(first.start + part * found.strength, first.lower, first.upper))]
+        values += [f.start for f in s.free[1:]]
+        f = fit(forward, hypothesis, weights, theta=np.concatenate([base.theta, values]), local=base.local, most=most)
+        if best is None or f.cost < best.cost:
+            best = f
+        if best.cost <= base.cost:
+            break
+    assert best is not None
+    if not best.cost <= base.cost * (1 + 1e-9):
+        values = [first.start, *(f.start for f in s.free[1:])]
+        f = fit(forward, hypothesis, weights, theta=np.concatenate([base.theta, values]), local=base.local, most=most)
+        best = f if f.cost < best.cost else best
+    return best
+
+
+def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
+    """The best pair of suspects by the screening, if it promises much more than the best single one."""
+    top = screening.signatures[:12]
+    if len(top) < 2 or o.most < 2:
+        return []
+    r = screening.residual
+    single = max(s.score**2 for s in top)
+    best, gain = None, 0.0
+    for i in range(len(top)):
+        for j in range(i):
+            a = np.stack([top[i].shape, top[j].shape], axis=1)
+            if abs(a[:, 0] @ a[:, 1]) > 0.95 or not (top[i].score and top[j].score):
+                continue
+            x, *_ = np.linalg.lstsq(a, r, rcond=None)
+            if np.sign(x[0]) != np.sign(top[i].score) or np.sign(x[1]) != np.sign(top[j].score):
+                continue
+            explained = float(np.sum((a @ x) ** 2))
+            if explained > gain:
+                best, gain = (top[i], top[j], x), explained
+    if best is None or gain - single < 9.0 + 0.1 * single:
+        return []
+    a, b, x = best
+    first = replace(a, strength=float(x[0] * a.error))
+    second = replace(b, strength=float(x[1] * b.error))
+    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(
+        forward, base, first, weights
+    )
+    if one.failed:
+        return []
+    out = [] if any(one is f for f in fits) else [one]
+    both = refit(forward, one, second, weights)
+    return [*out, both]
+
+
+def combine(forward, base, fits, scores, every, weights, relax, o: Options, tell) -> tuple[Fit | None, list[Fit]]:
+    """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
+    more: list[Fit] = []
+    best = leader(fits, scores)
+    while best is not None and best is not base and len(best.hypothesis.suspects) < o.most:
+        left = [s for s in every if s.effect not in best.hypothesis.effects]
+        tell("combine", len(best.hypothesis.suspects) / o.most)
+        again = screen(forward, left, best, weights)
+        if not again.signatures:
+            break
+        p = look_elsewhere(_relaxed(again, relax), o.draws, o.seed)
+        top = again.signatures[0]
+        if p > o.significance or top.score**2 < 0.05 * again.total:
+            break
+        f = refit(forward, best, top, weights)
+        if f.failed:
+            break
+        scores[id(f)] = scored(forward, f, weights, relax)
+        more.append(f)
+        gain, error = difference(scores[id(f)], scores[id(best)])
+        if not (gain > 2.0 * error and scores[id(f)].evidence > scores[id(best)].evidence + 3.0):
+            break
+        best = f
+        for s in best.hypothesis.suspects[:-1]:  # is an earlier one still needed?
+            rest = tuple(t for t in best.hypothesis.suspects if t is not s)
+            if any(g.hypothesis.suspects == rest for g in (*fits, *more)):
+                continue
+            g = fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
+            if not g.failed:
+                scores[id(g)] = scored(forward, g, weights, relax)
+                more.append(g)
+                if scores[id(g)].evidence >= scores[id(best)].evidence:
+                    best = g
+    return best, more
+
+
+def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
+    """The numbers of a fit that a smaller hypothesis still has."""
+    keep = {id(n) for s in rest for n in s.free}
+    count = len(f.free) - len(f.hypothesis.free)
+    return np.array([t for n, t in zip(f.free, f.theta, strict=True) if id(n) in keep or n in f.free[:count]])
+
+
+def leader(fits: Sequence[Fit], scores: dict[int, Score]) -> Fit | None:
+    """The fit of the highest evidence."""
+    good = [f for f in fits if id(f) in scores]
+    return max(good, key=lambda f: scores[id(f)].evidence) if good else None
+
+
+def relaxation(old: Weights, new: Weights) -> float:
+    """Factor on whitened squares when the weights are replaced."""
+    return float(np.mean((old.deviation / new.deviation) ** 2) * new.part / old.part)
+
+
+def scored(forward: Forward, f: Fit, weights: Weights, relax: float) -> Score:
+    return score(forward, f, weights, relax=relax)
+
+
+def _relaxed(s: Screening, relax: float) -> Screening:
+    k = float(np.sqrt(relax))
+    return replace(s, signatures=[replace(g, score=g.score * k) for g in s.signatures])
+
+
+# --- results
+
+
+def table(forward, given: Fit, fits: list[Fit], scores, judged, screening: Screening) -> list[Candidate]:
+    """All explanations that were fitted, best first, with the reason why each lost."""
+    base = fits[0]
+    rows = [f for f in fits if id(f) in scores]
+    p = probabilities([scores[id(f)].evidence for f in rows])
+    out = []
+    for f, probability in zip(rows, p, strict=True):
+        gain, error = difference(scores[id(f)], scores[id(base)]) if f is not base else (0.0, 0.0)
+        kind = words.kind(f)
+        label = f.hypothesis.label if f.hypothesis.suspects else "nominal refitted"
+        out.append(
+            Candidate(
+                label,
+                kind,
+                [s.effect for s in f.hypothesis.suspects],
+                [s.site for s in f.hypothesis.suspects],
+                numbers(f),
+                float(probability),
+                gain,
+                error,
+                scores[id(f)].rms.tolist(),
+                fit_percent(forward, f).tolist(),
+                why=words.why(f, base, judged, scores),
+                distrust=words.distrust(f, forward),
+            )
+        )
+    for f in fits:
+        if f.failed:
+            empty = [float("nan")] * len(forward.components)
+            h = f.hypothesis
+            out.append(
+                Candidate(
+                    h.label,
+                    "mechanism",
+                    [s.effect for s in h.suspects],
+                    [s.site for s in h.suspects],
+                    [],
+                    0.0,
+                    float("nan"),
+                    float("nan"),
+                    empty,
+                    empty,
+                    failed=f.failed,
+                )
+            )
+    return sorted(out, key=lambda c: -c.probability)
+
+
+def numbers(f: Fit) -> list[Number]:
+    """Fitted numbers with 95 % intervals."""
+    deviation = f.deviations()
+    return [
+        Number(n.label, n.unit, float(t), float(t - 1.96 * d), float(t + 1.96 * d), n.start, n.spread, bool(b))
+        for n, t, d, b in zip(f.free, f.theta, deviation, f.at_bound, strict=True)
+    ]
+
+
+def _suspected(s: Signature, screening: Screening) -> Suspected:
+    u = s.suspect
+    explained = s.score**2 / screening.total if screening.total > 0 else 0.0
+    return Suspected(
+        u.label, u.effect, u.site, u.kind, s.score, s.strength, s.error, u.free[0].unit, explained, s.status
+    )
+
+
+def _rms(f: Fit) -> np.ndarray:
+    return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
+
+
+def fit_percent(forward: Forward, f: Fit) -> np.ndarray:
+    """(D,) 100 (1 - NRMSE) [%] over all fitted blocks."""
+    values = np.concatenate([forward.blocks[b].values for b in f.blocks])
+    spread = np.nanstd(values, axis=0)
+    return 100.0 * (1.0 - _rms(f) / np.where(spread > 0, spread, np.nan))
+
+
+def _units(recording: Recording) -> list[str]:
+    return [
+        c.unit for c in recording.channels.values() for _ in range(1 if c.values.ndim == 1 else c.values.shape[1])
+    ]
+
+
+def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights) -> list[Trace]:
+    """Recorded and predicted components of each recording, segment after segment."""
+    out = []
+    units = _units(forward.recordings[0])
+    for r, recording in enumerate(forward.recordings):
+        mine = [n for n, b in enumerate(base.blocks) if forward.blocks[b].recording == r]
+        blocks = [forward.blocks[base.blocks[n]] for n in mine]
+        times = np.concatenate([recording.times[b.first] + b.times for b in blocks])
+        breaks = np.cumsum([0, *(len(b.times) for b in blocks)])[:-1]
+        recorded = np.concatenate([b.values for b in blocks])
+        predictions = [
+            np.concatenate([b.values - f.residuals[n] for n, b in zip(mine, blocks, strict=True)])
+            for f in (given, base, best)
+        ]
+        for d, name in enumerate(forward.components):
+            out.append(
+                Trace(
+                    recording.name,
+                    name,
+                    units[d],
+                    float(blocks[0].noise[d]),
+                    times.tolist(),
+                    recorded[:, d].tolist(),
+                    *(p[:, d].tolist() for p in predictions),
+                    band=float(2 * weights.deviation[d]),
+                    breaks=breaks.tolist(),
+                )
+            )
+    return out
+
+
+def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
+    """Auto- and cross-correlations of the residuals, averaged over segments."""
+    out = []
+    step = float(np.median(np.diff(forward.recordings[0].times)))
+    lags = min(min(len(b.times) for b in forward.blocks) // 2, 200)
+    drive, name = _varying_drive(forward)
+    for d, component in enumerate(forward.components):
+        row = Correlation(component, (np.arange(lags) * step).tolist(), [], [], name)
+        for f, auto, cross in ((base, row.before, row.cross_before), (best, row.after, row.cross_after)):
+            auto += _correlation(f, d, None, lags).tolist()
+            cross += _correlation(f, d, _against(forward, f, d, drive), lags).tolist()
+        out.append(row)
+    return out
+
+
+def _varying_drive(forward: Forward):
+    for name, s in forward._drives[0].signals.items():
+        if s.times is not None or np.any(s.amplitude):
+            return name, f"drive {name}"
+    return None, "rate"
+
+
+def _against(forward: Forward, f: Fit, d: int, drive: str | None) -> list[np.ndarray]:
+    out = []
+    for b in f.blocks:
+        block = forward.blocks[b]
+        if drive is None:
+            out.append(np.gradient(np.nan_to_num(block.values[:, d]), block.times))
+        else:
+            start = forward.recordings[block.recording].times[block.first] - forward.recordings[block.recording].times[0]
+            out.append(np.squeeze(forward._drives[block.recording][drive](start + block.times)))
+    return out
+
+
+def _correlation(f: Fit, d: int, other: list[np.ndarray] | None, lags: int) -> np.ndarray:
+    total, norm = np.zeros(lags), 0.0
+    for n, r in enumerate(f.residuals):
+        a = np.nan_to_num(r[:, d] - np.nanmean(r[:, d]))
+        b = a if other is None else other[n] - other[n].mean()
+        total += [float(a[k:] @ b[: len(b) - k]) for k in range(lags)]
+        norm += float(np.sqrt((a @ a) * (b @ b)))
+    return total / norm if norm > 0 else total
+
+
+def patch(best: Fit) -> dict[str, float]:
+    """Numbers of the best explanation, by "effect.parameter@entities" or the setting's name."""
+    out = {}
+    for n, t in zip(best.free, best.theta, strict=True):
+        where = "" if n.entities is None else "@" + ",".join(map(str, n.entities))
+        out[n.label + where] = float(t)
+    return out
+
+
+__all__ = ["Options", "diagnose", "effective_samples", "get", "memory", "prepared", "thinned"]

@@ -1,0 +1,232 @@
+"""What a diagnosis says: plain data that the report shows and that JSON holds whole."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+VERDICTS = ("ADEQUATE", "PARAMETER", "MEASUREMENT", "MECHANISM", "TIE", "SEVERAL", "UNKNOWN", "UNTESTABLE")
+
+EXIT = {name: 10 + n for n, name in enumerate(VERDICTS)}
+"""Exit codes of `origami-sim diagnose`; 0 would hide the verdict, 1 to 3 and 130 mean what they mean elsewhere."""
+
+
+@dataclass
+class Number:
+    """A fitted number with its 95 % interval [SI]; `prior` and `spread` are what was known before (nan: nothing)."""
+
+    label: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    prior: float
+    spread: float
+    at_bound: bool
+
+
+@dataclass
+class Candidate:
+    """One row of the table of explanations.
+
+    Attributes:
+        label: effects and sites, "nominal as given" or "nominal refitted". kind: nominal, parameter, mechanism, measurement.
+        effects, sites: of its suspects. numbers: what was fitted.
+        probability: tempered, over the table. gain: held-out log score over the refitted nominal. error: its standard error.
+        rms: held-out rms residual by component [SI]. fit: fit % = 100 (1 - NRMSE) by component, on all data.
+        why: why it lost or won. distrust: when not to trust the row, or "". failed: why it could not be fitted, or "".
+    """
+
+    label: str
+    kind: str
+    effects: list[str]
+    sites: list[str]
+    numbers: list[Number]
+    probability: float
+    gain: float
+    error: float
+    rms: list[float]
+    fit: list[float]
+    why: str = ""
+    distrust: str = ""
+    failed: str = ""
+
+
+@dataclass
+class Suspected:
+    """One suspect in the screening: score z, its strength with standard deviation [unit], part of the residual explained."""
+
+    label: str
+    effect: str
+    site: str
+    kind: str
+    z: float
+    strength: float
+    error: float
+    unit: str
+    explained: float
+    status: str = ""
+
+
+@dataclass
+class Curve:
+    """Residual moment of one coordinate binned against something: x, mean, its standard error, number in the bin."""
+
+    against: str
+    unit: str
+    x: list[float]
+    mean: list[float]
+    error: list[float]
+    count: list[int]
+
+
+@dataclass
+class Place:
+    """What equation error says about one coordinate (a crease's fold angle, a coordinate of the root).
+
+    Attributes:
+        site: name. score: how much structure its residual moment has, in standard deviations. share: posterior of being the
+            site. power: mean unexplained power [W], negative: lost. onset: first time at which it departs [s], nan: never.
+        times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
+    """
+
+    site: str
+    score: float
+    share: float
+    power: float
+    onset: float
+    times: list[float]
+    moment: list[float]
+    error: list[float]
+    curves: list[Curve] = field(default_factory=list)
+
+
+@dataclass
+class Trace:
+    """One component of one recording: times [s], recorded, and predictions before, refitted and after; band is +-2 sd."""
+
+    recording: str
+    component: str
+    unit: str
+    noise: float
+    times: list[float]
+    recorded: list[float]
+    before: list[float]
+    refitted: list[float]
+    after: list[float]
+    band: float
+    breaks: list[int]
+    """Indices at which a segment with a start of its own begins."""
+
+
+@dataclass
+class Correlation:
+    """Autocorrelation of a component's residual, and cross-correlation with the drive or the rate, before and after."""
+
+    component: str
+    lags: list[float]
+    before: list[float]
+    after: list[float]
+    against: str = ""
+    cross_before: list[float] = field(default_factory=list)
+    cross_after: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Experiment:
+    """A proposed next experiment: what to do, which explanations it separates, and the expected separation d'."""
+
+    what: str
+    separates: list[str]
+    expected: float
+    repeats: int
+
+
+@dataclass
+class Baseline:
+    """A method that names no physics, on the same folds: held-out rms by component [SI]."""
+
+    name: str
+    rms: list[float]
+    note: str = ""
+
+
+@dataclass
+class Diagnosis:
+    """All that was found.
+
+    Attributes:
+        verdict: one of VERDICTS. sentence: what opens the report. probability: of the chosen explanation (or set).
+        chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
+        candidates: ordered, best first. screening: all suspects, best first.
+        isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
+        p_value: of the best suspect's score among all that were tried, under the refitted nominal.
+        onset: when the refitted nominal first departs lastingly [s]; nan: never.
+        traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
+        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
+        notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
+        patch: numbers to write into the calibration: label -> value.
+    """
+
+    verdict: str
+    sentence: str
+    probability: float
+    chosen: list[str]
+    candidates: list[Candidate]
+    screening: list[Suspected]
+    isolability_labels: list[str]
+    isolability: list[list[float]]
+    places: list[Place]
+    p_value: float
+    onset: float
+    traces: list[Trace]
+    correlations: list[Correlation]
+    experiments: list[Experiment]
+    baselines: list[Baseline]
+    components: list[str]
+    units: list[str]
+    noise: list[float]
+    error_before: list[float]
+    error_refitted: list[float]
+    error_after: list[float]
+    notes: list[str]
+    settings: dict
+    seconds: dict[str, float]
+    patch: dict[str, float]
+    subject: str = ""
+    recordings: list[str] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT[self.verdict]
+
+    def to_dict(self) -> dict:
+        """Plain lists and numbers; what is not finite becomes None."""
+        return _plain(asdict(self))
+
+    def save_json(self, path: str | Path) -> Path:
+        """Writes everything as JSON."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False))
+        part.replace(path)
+        return path
+
+
+def _plain(value):
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    return value

@@ -1,0 +1,419 @@
+"""What a hypothesis predicts for the recordings: batches of rollouts that all start where the recordings do."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from origami_sim.diagnose.articulation import Articulation, Pose
+from origami_sim.diagnose.channels import read
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, apply
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive, Signal, series
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.recording import Recording
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.timestep import stable_step
+
+SPARE = 3
+"""Frames simulated beyond a segment, for measurements that lag."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A stretch of a recording that is simulated from a start of its own.
+
+    Attributes:
+        recording: index of the recording. first: index of its first frame. times: (n,) since that frame [s].
+        values: (n, D) all components of all channels [SI]; nan where missing.
+        noise: (D,) their standard deviations.
+        pose, rates: what the recording says about the start: coordinates and their rates [m].
+    """
+
+    recording: int
+    first: int
+    times: np.ndarray
+    values: np.ndarray
+    noise: np.ndarray
+    pose: Pose
+    rates: np.ndarray
+
+
+class Forward:
+    """Predictions for segments of recordings of one object.
+
+    Args:
+        subject: how to build the model. recordings: of one object.
+        segment: length of a segment [s]; None: each recording is one segment.
+        start: "fit" if every segment has a start of its own that is fitted (coordinates and rates), "rest" if the
+            recording starts from rest in the model's reference state.
+        most: at most so many segments of each recording, evenly spread; None: all.
+
+    Attributes:
+        blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
+        components: names of the D components.
+    """
+
+    def __init__(
+        self,
+        subject: Subject,
+        recordings: Sequence[Recording],
+        *,
+        segment: float | None = None,
+        start: str = "fit",
+        most: int | None = None,
+        threads: int | None = None,
+    ):
+        self.subject, self.recordings, self.start, self.threads = subject, list(recordings), start, threads
+        self.values = {f.name: f.start for f in subject.nominals}
+        self.model, self.parameters, self.drive = subject.build(self.values)
+        self.articulation = Articulation(self.model)
+        self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._built: dict[tuple, tuple[Model, Parameters]] = {}
+        self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
+        self.components = component_names(self.recordings[0])
+        self.blocks: list[Block] = []
+        for index, recording in enumerate(self.recordings):
+            self.blocks += self._segments(index, recording, segment, most)
+        self._order = [np.flatnonzero([b.recording == r for b in self.blocks]) for r in range(len(self.recordings))]
+        self.local = 2 * self.articulation.size if start == "fit" else 0
+
+    # --- segments
+
+    def _segments(self, index: int, recording: Recording, segment: float | None, most: int | None) -> list[Block]:
+        values, noise = stacked(recording)
+        step = float(np.median(np.diff(recording.times)))
+        frames = len(recording.times) if segment is None else max(8, round(segment / step) + 1)
+        firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1))
+        if most is not None and len(firsts) > most:
+            firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
+        blocks = []
+        for first in firsts:
+            part = slice(first, first + frames)
+            pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
+            if self.start == "fit":
+                pose, rates = self._initial(recording, values, noise, int(first))
+            times = recording.times[part] - recording.times[first]
+            blocks.append(Block(index, int(first), times, values[part], noise, pose, rates))
+        return blocks
+
+    def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray]:
+        """Pose and rates of the coordinates at a frame, from a local polynomial of the channels."""
+        level, slope = local_line(recording.times, values, noise, first)
+        arm, pose = self.articulation, self.articulation.reference()
+        for _ in range(30):
+            now, tangent = self._channel_tangent(recording, pose, level)
+            weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
+            gap = np.where(np.isfinite(level), level - now, 0.0)
+            by = np.linalg.lstsq(tangent * weight[:, None], gap * weight, rcond=1e-8)[0]
+            size = np.abs(by).max(initial=0.0)
+            pose = arm.moved(pose, (by * min(1.0, 1.0 / (size + 1e-12)))[:, None])
+            if size < 1e-10:
+                break
+        _, tangent = self._channel_tangent(recording, pose, level)
+        weight = np.where(np.isfinite(slope), 1.0 / noise, 0.0)
+        rates = np.linalg.lstsq(tangent * weight[:, None], np.nan_to_num(slope) * weight, rcond=1e-8)[0]
+        return pose, rates
+
+    def _channel_tangent(self, recording: Recording, pose: Pose, near: np.ndarray):
+        """Channels (D,) of a pose, turned as in `near`, and their derivatives by the coordinates [D, m]."""
+        arm, step = self.articulation, 1e-6
+        m = arm.size
+        by = np.concatenate([np.zeros((m, 1)), step * np.eye(m), -step * np.eye(m)], axis=1)
+        x = arm.positions(arm.moved(pose.select([0] * (2 * m + 1)), by))
+        values = channel_values(self.model, recording, x[None], None)[0]
+        plus, minus = values[:, 1 : m + 1], values[:, m + 1 :]
+        turning = angle_mask(recording)
+        jump = np.where(turning[:, None], 2 * np.pi * np.round((plus - minus) / (2 * np.pi)), 0.0)
+        now = values[:, 0]
+        now = now + np.where(turning, 2 * np.pi * np.round((np.nan_to_num(near) - now) / (2 * np.pi)), 0.0)
+        return now, (plus - minus - jump) / (2 * step)
+
+    # --- predictions
+
+    def built(self, values: Mapping[str, float]) -> tuple[Model, Parameters]:
+        """Model and parameters for values of the nominals, remembered."""
+        key = tuple(values.items())
+        if key not in self._built:
+            if len(self._built) > 500:
+                self._built.clear()
+            self._built[key] = self.subject.build(values)[:2]
+        return self._built[key]
+
+    def predict(
+        self,
+        hypothesis: Hypothesis | Sequence[Hypothesis],
+        theta: Sequence[np.ndarray] | np.ndarray,
+        local: np.ndarray | None = None,
+        blocks: Sequence[int] | None = None,
+    ) -> list[np.ndarray]:
+        """Predicted channels of each block: a list of [K, n, D].
+
+        Args:
+            hypothesis: one for all K, or one for each (they then share one program with the effects of all).
+            theta: K times the nominals, then the hypothesis' numbers [SI].
+            local: [K, B, L] start coordinates (as a shift from the block's own) and rates, for all blocks.
+            blocks: which to predict (default all).
+
+        A world that goes unstable gives nan.
+        """
+        wanted = range(len(self.blocks)) if blocks is None else blocks
+        each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
+        out: dict[int, np.ndarray] = {}
+        for r in range(len(self.recordings)):
+            mine = [b for b in wanted if self.blocks[b].recording == r]
+            for group in _by_length(self.blocks, mine):
+                for b, values in zip(group, self._roll(r, group, worlds, local), strict=True):
+                    out[b] = values
+        return [out[b] for b in wanted]
+
+    def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
+        """The model with these effects, and the parameters of one world."""
+        count = len(self.subject.nominals)
+        names = [f.name for f in self.subject.nominals]
+        model, parameters = self.built(dict(zip(names, map(float, values[:count]), strict=True)))
+        if not effects:
+            return model, parameters
+        richer = model.with_effects(*effects)
+        return richer, apply(parameters, hypothesis, values[count:], richer)
+
+    def _roll(self, r: int, group: list[int], worlds: list[tuple[Model, Parameters]], local) -> list[np.ndarray]:
+        """[K, n, D] for blocks of equal length of one recording; the batch runs over worlds, then over blocks."""
+        recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
+        k, count = len(worlds), len(blocks)
+        model = worlds[0][0]
+        parameters = Parameters.join([p for _, p in worlds], repeat=count)
+        times = blocks[0].times
+        step = float(np.median(np.diff(recording.times)))
+        frames = int(np.ceil(times[-1] / step - 1e-6)) + 1 + SPARE
+        span = frames * step
+        drive = shifted(self._drives[r], recording.times[[b.first for b in blocks]] - recording.times[0], span, k)
+        drive = distorted(model, parameters, drive, span)
+        state = self._state(model, worlds, blocks, None if local is None else local[:, group])
+        chosen = stable_step(model, parameters)
+        substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
+        batch = Batch(model, parameters, drive, state, threads=self.threads)
+        lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
+        limit = 0.5 * lengths.min(initial=1.0) * substeps / step
+        raw = []
+        for n in range(frames):
+            batch.advance(substeps if n else 0, step / substeps, limit)
+            x, angles = batch.motion()
+            raw.append(channel_values(model, recording, x[None], angles[None])[0])
+        channels = np.stack(raw)  # [frames, D, W]
+        channels[:, :, batch.state().status[0] >= 0] = np.nan
+        continuous(channels, angle_mask(recording), np.tile(np.stack([b.values[0] for b in blocks]), (k, 1)).T)
+        grid = np.arange(frames) * step
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        if distort:
+            values = self._measured(model, parameters, recording, distort, grid, channels, times)
+        elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+            values = channels[: len(times)]
+        else:
+            values = spline(grid, channels)(times)
+        values = values.reshape(len(times), -1, k, count)
+        return [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)]
+
+    def _state(self, model: Model, worlds, blocks: list[Block], local) -> State:
+        """The starts of all worlds [theta, block]."""
+        count = len(blocks)
+        if self.start != "fit":
+            x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
+            return State.at_rest(model, x.shape[1], position=x)
+        m = self.articulation.size
+        base = Pose(
+            np.concatenate([b.pose.rotation for b in blocks]),
+            np.concatenate([b.pose.centre for b in blocks]),
+            np.concatenate([b.pose.angles for b in blocks], axis=1),
+        )
+        rates = np.stack([b.rates for b in blocks], axis=1)
+        xs, vs = [], []
+        for n, (own, _) in enumerate(worlds):
+            key = own.position.tobytes()
+            if key not in self._arms:
+                self._arms[key] = Articulation(own)
+            arm = self._arms[key]
+            pose = arm.moved(base, local[n, :, :m].T) if local is not None else base
+            u = rates + local[n, :, m:].T if local is not None else rates
+            x = arm.positions(pose)
+            xs.append(x)
+            vs.append(np.einsum("mnwa,mw->nwa", arm.jacobian(pose, x), u))
+        state = State.at_rest(model, count * len(worlds), position=np.concatenate(xs, axis=1))
+        state.v[:] = np.concatenate(vs, axis=1)
+        return state
+
+    def _measured(self, model, parameters, recording, distort, grid, channels, times) -> np.ndarray:
+        """Channels [n, D, W] as distorted measurements show them."""
+        worlds = channels.shape[2]
+        at = np.repeat(times[:, None], worlds, axis=1)
+        parts, row = [], 0
+        for channel in recording.channels.values():
+            width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
+            reader = _reader(grid, channels[:, row : row + width])
+            for name in distort:
+                effect = get(name)
+                if effect.channels and channel.kind not in effect.channels:
+                    continue
+                given = {n: np.broadcast_to(v[0], (worlds,)) for n, v in parameters.of(name).items()}
+                reader = _wrapped(effect, reader, given)
+            parts.append(reader(at))
+            row += width
+        return np.concatenate(parts, axis=1)
+
+
+def _wrapped(effect, inner, given):
+    return lambda t: effect.apply(inner, t, **given)
+
+
+def _reader(grid: np.ndarray, values: np.ndarray):
+    """values [F, d, W] as a function of times [n, W] (many worlds may share a column)."""
+    curve = spline(grid, values)
+
+    def at(times: np.ndarray) -> np.ndarray:
+        columns, inverse = np.unique(times, axis=1, return_inverse=True)
+        out = np.empty((len(times), values.shape[1], values.shape[2]))
+        for c in range(columns.shape[1]):
+            mine = np.flatnonzero(inverse.ravel() == c)
+            part = curve if columns.shape[1] == 1 else spline(grid, values[:, :, mine])
+            out[:, :, mine] = part(columns[:, c])
+        return out
+
+    return at
+
+
+def spline(grid: np.ndarray, values: np.ndarray):
+    """Cubic spline through [F, ...]; where a value is not finite, the whole curve is nan."""
+    bad = ~np.all(np.isfinite(values), axis=0)
+    curve = CubicSpline(grid, np.where(bad, 0.0, values), axis=0)
+    return lambda t: np.where(bad, np.nan, curve(t))
+
+
+def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
+    """Blocks that share their frame times."""
+    groups: list[list[int]] = []
+    for i in indices:
+        for g in groups:
+            a, b = blocks[g[0]].times, blocks[i].times
+            if len(a) == len(b) and np.allclose(a, b, atol=1e-7 * max(1.0, a[-1])):
+                g.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
+
+
+def component_names(recording: Recording) -> list[str]:
+    """Names of all components of all channels, in order."""
+    out = []
+    for c in recording.channels.values():
+        width = 1 if c.values.ndim == 1 else c.values.shape[1]
+        out += [c.name] if width == 1 else [f"{c.name}.{'xyz'[i]}" for i in range(width)]
+    return out
+
+
+def stacked(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """All components of all channels (n, D), and their noise (D,)."""
+    columns = [c.values.reshape(len(recording.times), -1) for c in recording.channels.values()]
+    noise = [np.full(v.shape[1], c.noise) for c, v in zip(recording.channels.values(), columns, strict=True)]
+    return np.concatenate(columns, axis=1), np.concatenate(noise)
+
+
+def angle_mask(recording: Recording) -> np.ndarray:
+    """(D,) whether a component is an angle."""
+    return np.concatenate(
+        [
+            np.full(1 if c.values.ndim == 1 else c.values.shape[1], c.is_angle, bool)
+            for c in recording.channels.values()
+        ]
+    )
+
+
+def channel_values(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """All components [F, D, W] at positions [F, N, W, 3] (and continuous angles [F, C, W])."""
+    return np.concatenate([read(model, c, x, angles) for c in recording.channels.values()], axis=1)
+
+
+def continuous(channels: np.ndarray, turning: np.ndarray, first: np.ndarray) -> None:
+    """Makes angles [F, D, W] continuous in time, in place, starting in the turn of `first` [D, W]."""
+    a = np.unwrap(np.nan_to_num(channels[:, turning]), axis=0)
+    target = np.nan_to_num(first[turning])
+    a += 2 * np.pi * np.round((target - a[0]) / (2 * np.pi))
+    channels[:, turning] = np.where(np.isfinite(channels[:, turning]), a, np.nan)
+
+
+def local_line(times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Value and rate (D,) at a frame, from a cubic over a window that grows while the cubic fits to the noise."""
+    level, slope = np.full(values.shape[1], np.nan), np.full(values.shape[1], np.nan)
+    for d in range(values.shape[1]):
+        half = 4
+        while True:
+            lo, hi = max(0, first - half), min(len(times), first + half + 1)
+            if hi - lo < 2 * half and lo == 0:
+                hi = min(len(times), lo + 2 * half)
+            good = np.flatnonzero(np.isfinite(values[lo:hi, d])) + lo
+            if len(good) >= 6:
+                t = times[good] - times[first]
+                design = np.vander(t / (np.abs(t).max() or 1.0), 4, increasing=True)
+                fit, *_ = np.linalg.lstsq(design, values[good, d], rcond=None)
+                scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
+                if np.isfinite(level[d]) and scatter > 1.5 * noise[d]:
+                    break
+                level[d], slope[d] = fit[0], fit[1] / (np.abs(t).max() or 1.0)
+                if scatter > 1.5 * noise[d]:
+                    break
+            half *= 2
+            if half > 64 or half > len(times):
+                break
+    return level, slope
+
+
+def drive_of(recording: Recording, default: Drive) -> Drive:
+    """The drive that was recorded, over the model's own.
+
+    Raises:
+        InputError: a drive channel of the recording that no model knows.
+    """
+    changed: dict[str, Signal] = {}
+    times = recording.times - recording.times[0]
+    for name, channel in recording.drive.items():
+        columns = np.atleast_2d(np.asarray(channel.values, float).T)
+        if channel.constant:
+            columns = np.asarray(channel.values, float).reshape(-1, 1)
+        names = [f"{name}_{a}" for a in "xyz"] if name == "field" else [name]
+        if name == "field" and len(columns) == 1:
+            names = ["field_z"]
+        if name == "voltage":
+            names = [f"voltage_{i}" for i in range(len(columns))]
+        for one, column in zip(names, columns, strict=True):
+            if one not in default.signals:
+                raise InputError(
+                    "the model has no such drive channel",
+                    field=f"drive.{name}",
+                    value=one,
+                    allowed=", ".join(default.signals),
+                )
+            changed[one] = Signal(offset=float(column[0])) if channel.constant else series(times, column)
+    return default.replace(**changed)
+
+
+def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> Drive:
+    """The drive seen from several starts [s], one world for each; the set of worlds is repeated."""
+    if not np.any(starts):
+        return drive
+    changed = {}
+    for name, s in drive.signals.items():
+        if s.times is None and not np.any(s.amplitude):
+            continue
+        local = Signal(offset=s.offset, amplitude=s.amplitude, frequency=s.frequency, phase=s.phase).sampled(duration)
+        if s.times is not None and len(s.times) > 1:
+            fine = float(np.min(np.diff(s.times)))
+            if fine > 1e-3:  # samples of a recording: no finer grid than a quarter of theirs is needed
+                local = np.linspace(0.0, duration, int(np.ceil(4 * duration / fine)) + 1)
+        values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
+        changed[name] = series(local, np.tile(values, (1, repeat)))
+    return drive.replace(**changed)

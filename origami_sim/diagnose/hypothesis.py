@@ -1,0 +1,253 @@
+"""What may be wrong: numbers that a fit may change, and effects that may have been left out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from origami_sim.drive import Drive
+from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
+from origami_sim.model import Model, Parameters
+from origami_sim.recording import Recording
+from origami_sim.scene import Settings
+
+NOMINAL = ""
+"""Owner of the numbers of the model that was given, as opposed to those of an effect that is suspected."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """One number that a fit may change.
+
+    Attributes:
+        owner: NOMINAL for a setting of the model, else the effect. name: the setting or parameter.
+        start: where fits begin. scale: a change that is noticeable. lower, upper: physical bounds.
+        spread: standard deviation of what was known before; infinite if nothing was.
+        entities: entities of the effect's family that share the number; None for all.
+    """
+
+    owner: str
+    name: str
+    unit: str
+    start: float
+    scale: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    spread: float = np.inf
+    entities: tuple[int, ...] | None = None
+
+    @property
+    def label(self) -> str:
+        return f"{self.owner}.{self.name}" if self.owner else self.name
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect at a site, with the numbers to fit.
+
+    Attributes:
+        effect: name in the catalogue. site: where, in words. kind: crease, panel, body, ground, drive or measurement.
+        free: numbers to fit, the strength first.
+        entities: entities of the family; None for all.
+    """
+
+    effect: str
+    site: str
+    kind: str
+    free: tuple[Free, ...]
+    entities: tuple[int, ...] | None = None
+
+    @property
+    def label(self) -> str:
+        return f"{self.effect} at {self.site}"
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """The nominal model with these effects added (none: the nominal model, refitted)."""
+
+    suspects: tuple[Suspect, ...] = ()
+
+    @property
+    def label(self) -> str:
+        return " + ".join(s.label for s in self.suspects) or "nominal"
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(s.effect for s in self.suspects))
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        return tuple(f for s in self.suspects for f in s.free)
+
+    def plus(self, suspect: Suspect) -> "Hypothesis":
+        return Hypothesis((*self.suspects, suspect))
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The object under suspicion: how to build its model for any values of its uncertain numbers.
+
+    Attributes:
+        build: from values by name [SI] to model, parameters (one world) and drive.
+        nominals: the uncertain numbers with what was known of them.
+        name: for reports.
+    """
+
+    build: Callable[[Mapping[str, float]], tuple[Model, Parameters, Drive]]
+    nominals: tuple[Free, ...]
+    name: str = "model"
+
+    @classmethod
+    def from_scene(
+        cls, module, settings: Settings, *, spreads: Mapping[str, float] | None = None, name: str = ""
+    ) -> "Subject":
+        """The subject of a scene: settings with an uncertainty, or a spread given here, are uncertain."""
+        nominals = []
+        for s in settings.values():
+            spread = (spreads or {}).get(s.name)
+            if spread is None and s.uncertainty is not None:
+                spread = (s.uncertainty[1] - s.uncertainty[0]) / 3.92
+            if not spread or isinstance(s.value, (str, bool)):
+                continue
+            low, high = s.range or (-np.inf, np.inf)
+            nominals.append(Free(NOMINAL, s.name, s.unit, s.value, max(0.3 * spread, 1e-12), low, high, spread))
+
+        def build(values: Mapping[str, float]):
+            changed = {n: float(v) for n, v in values.items() if v != settings[n].value}
+            return module.build(settings.replace(**changed) if changed else settings)[:3]
+
+        return cls(build, tuple(nominals), name or module.__name__.rpartition(".")[2])
+
+    @classmethod
+    def from_model(
+        cls, model: Model, parameters: Parameters, drive: Drive | None = None, nominals: Sequence[Free] = ()
+    ) -> "Subject":
+        """A subject of fixed geometry; a nominal's name is "effect.parameter", scaled for all of its entities.
+
+        Its value is a factor on the given parameters (start 1).
+        """
+
+        def build(values: Mapping[str, float]):
+            out = parameters.copy()
+            for name, factor in values.items():
+                owner, _, parameter = name.partition(".")
+                if factor != 1.0:
+                    out.set(owner, parameter, parameters[owner, parameter] * factor)
+            return model, out, drive or Drive()
+
+        return cls(build, tuple(nominals))
+
+
+def factor(name: str, spread: float) -> Free:
+    """A nominal parameter "effect.parameter" of `Subject.from_model`, known to within a relative `spread`."""
+    return Free(NOMINAL, name, "-", 1.0, 0.3 * spread, 0.0, np.inf, spread)
+
+
+def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float], model: Model) -> Parameters:
+    """Parameters for the model with the hypothesis' effects, with the fitted numbers in place.
+
+    Parameters that are not fitted are copied from an effect of the model that has one of the same name for the same
+    family (a suspect's magnet is the panel's magnet); else they get their typical value, else their default.
+    """
+    out = parameters.for_model(model)
+    given = [n for n in model.effects if any(owner == n for owner, _ in parameters)]
+    for s in hypothesis.suspects:
+        effect = get(s.effect)
+        fitted = {f.name for f in s.free}
+        for p in effect.parameters:
+            if p.name in fitted:
+                continue
+            donor = next(
+                (
+                    n
+                    for n in given
+                    if get(n).family == effect.family
+                    and any(q.name == p.name and q.knots == p.knots for q in get(n).parameters)
+                ),
+                None,
+            )
+            if donor is not None:
+                out.set(s.effect, p.name, parameters[donor, p.name])
+            elif p.typical is not None:
+                out.set(s.effect, p.name, p.typical)
+    index = 0
+    for s in hypothesis.suspects:
+        for f in s.free:
+            value = float(np.clip(values[index], *get(s.effect).parameter(f.name).bounds))
+            out.set(s.effect, f.name, value, None if s.entities is None else np.array(s.entities))
+            index += 1
+    return out
+
+
+def suspects(model: Model, recordings: Sequence[Recording], drive: Drive) -> list[Suspect]:
+    """Everything in the catalogue that could act on this object and is not part of its model.
+
+    An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
+    channel of its kind was recorded; one of the ground, if the device has contact points. Creases and panels are
+    suspected one by one and all together.
+    """
+    kinds = {c.kind for r in recordings for c in r.channels.values()}
+    driven = _driven(recordings, drive)
+    found = []
+    for name, effect in CATALOGUE.items():
+        if not effect.fitted or name in model.effects:
+            continue
+        if effect.family == "measurement" and effect.channels and not kinds & set(effect.channels):
+            continue
+        if effect.family == "drive" and not any(n.split("_")[0] in driven for n in (name, *effect.channels)):
+            continue
+        if effect.family in CONTACTS and not len(model.contacts):
+            continue
+        if not set(effect.drives) - {"time"} <= driven:
+            continue
+        for site, kind, entities in _sites(model, effect.family):
+            free = tuple(_free(name, p, entities) for p in effect.fitted)
+            found.append(Suspect(name, site, kind, free, entities))
+    return found
+
+
+def _driven(recordings: Sequence[Recording], drive: Drive) -> set[str]:
+    names = {n for n, s in drive.signals.items() if not s.is_zero}
+    names |= {n for r in recordings for n, c in r.drive.items() if np.any(c.values)}
+    return {n.split("_")[0] for n in names} | ({"drive"} if names else set())
+
+
+def _sites(model: Model, family: str):
+    """(site in words, kind, entities) of a family."""
+    if family in DISTORTIONS:
+        return [("the " + family, family, None)]
+    if family in CONTACTS:
+        return [("the ground", "ground", None)]
+    if family == "crease":
+        each = [(model.name("crease", c), "crease", (c,)) for c in range(len(model.creases))]
+        return each if len(each) == 1 else [*each, ("all creases", "crease", None)]
+    if family == "triangle":
+        panels = model.triangle_panel
+        each = [
+            (model.name("panel", p), "panel", tuple(map(int, np.flatnonzero(panels == p)))) for p in np.unique(panels)
+        ]
+        free = [e for e in each if np.any(model.free[np.unique(model.triangles[list(e[2])])])]
+        return free if len(free) == 1 else [*free, ("all panels", "panel", None)]
+    return [("the body", "body", None)]
+
+
+def _free(effect: str, name: str, entities) -> Free:
+    p = get(effect).parameter(name)
+    assert p.typical is not None
+    strength = name == get(effect).fitted[0]
+    return Free(
+        effect,
+        name,
+        p.unit,
+        start=p.default if strength else p.typical,
+        scale=abs(p.typical) or 1.0,
+        lower=p.bounds[0],
+        upper=p.bounds[1],
+        entities=entities,
+    )
+
+
+def scaled(suspect: Suspect, scale: float) -> Suspect:
+    """The suspect with another scale for its strength."""
+    return replace(suspect, free=(replace(suspect.free[0], scale=scale), *suspect.free[1:]))
