@@ -1,22 +1,38 @@
-"""The observer: what the channels of a recording would have read during a simulated run."""
+"""The observer: what the channels of a recording would have read during a simulated run, or along its equilibria."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive
+from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model
-from origami_sim.recording import Channel, Recording
+from origami_sim.model import Model, Parameters, State
+from origami_sim.recording import Channel, Recording, applied_drive
+from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.statics import Equilibrium, equilibrium
 
 
 def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> dict[str, np.ndarray]:
     """Simulated channels at the recording's times, by channel name: (n,) or (n, d) [SI].
 
-    Angles are continuous and start in the recording's turn. Frames are joined by cubic splines.
+    Angles are continuous and start in the recording's turn. Frames are joined by cubic splines. Effects of the family
+    "measurement" that the model has on act on the channels that they name, in their order.
 
     Raises:
         InputError: a channel attached to something that the model does not have, a run shorter than the recording.
     """
+    if recording.by_step:
+        raise InputError(
+            "a quasi-static curve is observed along equilibria, not in a run",
+            field="recording",
+            value=recording.name,
+            allowed="observe_equilibria",
+        )
     times = recording.times - recording.times[0]
     frames = trajectory.times - trajectory.times[0]
     if times[-1] > frames[-1] * (1 + 1e-9) + 1e-12:
@@ -26,33 +42,208 @@ def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> 
             value=float(frames[-1]),
             allowed=f">= {times[-1]:g} s",
         )
+    aligned = len(frames) >= len(times) and np.allclose(frames[: len(times)], times, atol=1e-9)
     out = {}
     for name, channel in recording.channels.items():
         values = channel_frames(trajectory, channel, world=world)
         if channel.is_angle:
-            first = channel.values[np.isfinite(channel.values)][0]
-            values = values + 2 * np.pi * np.round((first - values[0]) / (2 * np.pi))
-        aligned = len(frames) >= len(times) and np.allclose(frames[: len(times)], times, atol=1e-9)
-        out[name] = values[: len(times)] if aligned else CubicSpline(frames, values)(times)
+            values = values + _turns(channel, values[0])
+        if _measured(trajectory.model, channel):
+            out[name] = _distorted(trajectory, channel, frames, values, times, world)
+        else:
+            out[name] = values[: len(times)] if aligned else CubicSpline(frames, values)(times)
     return out
+
+
+def observe_equilibria(
+    model: Model, parameters: Parameters, equilibria: Sequence[Equilibrium], recording: Recording
+) -> dict[str, np.ndarray]:
+    """Simulated channels of a quasi-static curve, one equilibrium per load step: (n,) or (n, d) [SI], by channel name.
+
+    Displacements are those since the first step. Parameters are of one world.
+
+    Raises:
+        InputError: another number of equilibria than steps, one that was not found, a channel that the model lacks.
+    """
+    if len(equilibria) != recording.frame_count:
+        raise InputError(
+            "a quasi-static curve needs one equilibrium per load step",
+            field="equilibria",
+            value=len(equilibria),
+            allowed=str(recording.frame_count),
+        )
+    for step, found in enumerate(equilibria):
+        if not found.converged:
+            raise InputError(f"there is no equilibrium at step {step}: {found.message}", field="equilibria", value=step)
+    poses = Poses(
+        model=model,
+        parameters=parameters,
+        x=np.stack([e.x for e in equilibria]),
+        angles=np.stack([e.angles for e in equilibria]),
+        times=np.zeros(len(equilibria)),
+        state=State.join([e.state for e in equilibria]),
+        drive=_held(
+            [distorted(model, parameters, applied_drive(recording, step=k), 0.0) for k in range(len(equilibria))]
+        ),
+    )
+    out = {}
+    for name, channel in recording.channels.items():
+        values = read_channel(poses, channel)
+        out[name] = values + _turns(channel, values[0]) if channel.is_angle else values
+    return out
+
+
+def follow(
+    model: Model, parameters: Parameters, recording: Recording, *, state: State | None = None, **options
+) -> list[Equilibrium]:
+    """The equilibria of a quasi-static curve, each found from the one before, with the drive of its load step.
+
+    The branch that is followed is the one that a slow loading follows: where it ends, the next one is found.
+
+    Args:
+        model, parameters: one world of each.
+        recording: drive levels by load step.
+        state: where the first step starts (default: the reference state).
+        options: of `origami_sim.solve.statics.equilibrium`, e.g. tolerance.
+    """
+    found: list[Equilibrium] = []
+    for step in range(recording.frame_count):
+        drive = applied_drive(recording, step=step)
+        found.append(equilibrium(model, parameters, drive, state=state, **options))
+        state = found[-1].state
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """What a channel can be read from: frames of one world.
+
+    Attributes:
+        model, parameters: of one world.
+        x: [F, N, 3] positions [m]. angles: [F, C + Q] continuous hinge angles [rad].
+        times: [F] [s]. state, drive: every frame as a world, with velocities and memory, and what is held in it; needed
+            for forces only.
+    """
+
+    model: Model
+    parameters: Parameters
+    x: np.ndarray
+    angles: np.ndarray
+    times: np.ndarray
+    state: State | None = None
+    drive: Drive | None = None
 
 
 def channel_frames(trajectory: Trajectory, channel: Channel, *, world: int = 0) -> np.ndarray:
     """One simulated channel at the frames of the run: (F,) or (F, d) [SI]."""
-    model, x = trajectory.model, trajectory.x[:, :, world]
+    state, drive = _frames(trajectory, world) if channel.kind == "force" else (None, None)
+    parameters = trajectory.parameters
+    poses = Poses(
+        model=trajectory.model,
+        parameters=parameters.world(world if parameters.worlds > 1 else 0),
+        x=trajectory.x[:, :, world],
+        angles=trajectory.angles[:, :, world],
+        times=trajectory.times,
+        state=state,
+        drive=drive,
+    )
+    return read_channel(poses, channel)
+
+
+def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
+    """One channel at all frames: (F,) or (F, d) [SI].
+
+    - crease_angle: the fold angle, valley positive. panel_angle: see `panel_angle`.
+    - marker: a point of the body, see `body_point`. marker_2d: its projection on the channel's camera plane.
+    - tip_displacement: what the point has moved since the first frame: a vector (three components), its part along the
+      attachment's direction, or its length.
+    - force: of the support or the ground on the object, see `support_force`: a vector, or its part along the direction.
+
+    Raises:
+        InputError: a channel attached to something that the model does not have, or that says too little.
+    """
+    model, x = poses.model, poses.x
     if channel.kind == "crease_angle":
-        return trajectory.creases[:, _index(model, channel, "crease", len(model.creases)), world]
+        return poses.angles[:, _index(model, channel, "crease", len(model.creases))]
     if channel.kind == "panel_angle":
         return panel_angle(model, x, _index(model, channel, "panel", int(model.triangle_panel.max()) + 1))
-    if channel.kind in ("marker", "tip_displacement"):
-        point = x[:, _index(model, channel, "node", len(model.position))]
-        return point if channel.kind == "marker" else np.linalg.norm(point - point[0], axis=1)
-    raise InputError(
-        "this kind of channel cannot be observed yet",
-        field=f"channels.{channel.name}.kind",
-        value=channel.kind,
-        allowed="crease_angle, panel_angle, marker, tip_displacement",
-    )
+    if channel.kind == "force":
+        return _part(channel, support_force(poses, channel))
+    point = body_point(model, x, channel)
+    if channel.kind == "marker":
+        return point
+    if channel.kind == "marker_2d":
+        if channel.camera is None:
+            raise InputError("a marker in a picture needs a camera", field=f"channels.{channel.name}.camera")
+        return channel.camera.project(point)
+    moved = point - point[0]
+    if channel.values.ndim == 1 and "direction" not in channel.attachment:
+        return np.linalg.norm(moved, axis=1)
+    return _part(channel, moved)
+
+
+def body_point(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
+    """The point of the body that carries a marker: (F, 3) [m], for positions x [F, N, 3].
+
+    Attached to a `node`, or to a `panel` with `point` = its offset from the panel's centroid in the reference state, in
+    the reference axes: it moves with the triangle of the panel on which it lies, or nearest to which it lies. `height`
+    lifts it above the mid-plane along the normal, that of the triangle or the mean around the node.
+    """
+    height = float(channel.attachment.get("height", 0.0))
+    if "panel" in channel.attachment:
+        panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
+        offset = np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float)
+        nodes, weights, lift = _on_panel(model, panel, offset)
+        corners = x[:, nodes]
+        return np.einsum("k,fkc->fc", weights, corners) + (lift + height) * _normals(corners)
+    node = _index(model, channel, "node", len(model.position))
+    if height == 0.0:
+        return x[:, node]
+    around = model.triangles[(model.triangles == node).any(axis=1)]
+    if len(around) == 0:
+        raise InputError("a height needs a triangle at the node", field=f"channels.{channel.name}.height", value=height)
+    corners = x[:, around]
+    doubled = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]).sum(axis=1)
+    return x[:, node] + height * doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
+
+
+def support_force(poses: Poses, channel: Channel) -> np.ndarray:
+    """Force on the object of its support at a `node` or some `nodes`, or of the `ground`: (F, 3) [N].
+
+    At a held axis nothing accelerates, so the support exerts minus the sum of all effects there (weights included, like
+    a load cell that is not set to zero). Axes that are free count nothing. The ground's force is the sum of all contact
+    effects. The drive is taken at each frame; memory at its value of the state.
+
+    Raises:
+        InputError: nodes of which no axis is held, a ground without contact effects; in a run, an effect with memory
+            that acts there, because a trajectory keeps no memory.
+    """
+    model = poses.model
+    field = f"channels.{channel.name}"
+    ground = bool(channel.attachment.get("ground", False))
+    many = channel.attachment.get("nodes")
+    names = [channel.attachment.get("node")] if many is None else many
+    nodes = [] if ground else [_find(model, channel, "node", one, len(model.position)) for one in names]
+    contacts = [n for n in model.laws if get(n).family in CONTACTS]
+    if ground and not contacts:
+        raise InputError("the model has no contact with the ground", field=field + ".ground", value=True)
+    held = 1.0 - model.free[nodes]
+    if not ground and not held.any():
+        raise InputError("no axis of these nodes is held", field=field, value=nodes, allowed="supported nodes")
+    if poses.state is None or poses.drive is None:
+        raise InputError("a force needs states and a drive", field=field)
+    batch = Batch(model, poses.parameters, poses.drive, poses.state)
+
+    def acting(time: float) -> np.ndarray:
+        """Forces [nodes, F, 3] of contacts or of all effects, the drive being held in every frame."""
+        if ground:
+            forces = batch.evaluate(time).forces
+            return sum((forces[n] for n in contacts), np.zeros_like(forces[contacts[0]]))
+        return -held[:, None] * batch.total_force(time)[nodes]
+
+    if any("time" in get(n).drives for n in model.laws):  # such a law sees the time of its own frame
+        return np.stack([acting(float(time))[:, frame].sum(axis=0) for frame, time in enumerate(poses.times)])
+    return acting(0.0).sum(axis=0)
 
 
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:
@@ -70,9 +261,157 @@ def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:
     return np.unwrap(np.arctan2(along[:, 0], along[:, 2]))
 
 
+def check_scene(recording: Recording, model: Model) -> list[str]:
+    """Whether a recording can be of this model: notes, one sentence each, on sizes that do not match.
+
+    Raises:
+        InputError: a channel attached to something that the model does not have, the first one.
+    """
+    size = float(np.linalg.norm(np.ptp(model.position, axis=0)))
+    rest = model.position[None]
+    zero = State.at_rest(model)
+    notes = []
+    for name, channel in recording.channels.items():
+        if channel.kind == "force":
+            many = channel.attachment.get("nodes", [channel.attachment.get("node")])
+            if not channel.attachment.get("ground"):
+                nodes = [_find(model, channel, "node", one, len(model.position)) for one in many]
+                if not (model.free[nodes] == 0).any():
+                    raise InputError(
+                        "no axis of these nodes is held",
+                        field=f"channels.{name}",
+                        value=nodes,
+                        allowed="supported nodes",
+                    )
+            continue
+        read_channel(Poses(model, Parameters(model), rest, zero.angles.T, np.zeros(1)), channel)
+        columns = channel.values.reshape(recording.frame_count, -1)
+        if channel.is_angle:
+            continue
+        spread = float(np.linalg.norm(np.nanmax(columns, axis=0) - np.nanmin(columns, axis=0)))
+        if spread > 20.0 * size:
+            notes.append(
+                f"Channel '{name}' moves by {spread:.4g} m, {spread / size:.3g} times the size of the model: "
+                "millimetres or pixels read as metres?"
+            )
+        elif 0.0 < spread < 1e-5 * size:
+            notes.append(
+                f"Channel '{name}' moves by {spread:.4g} m only, {spread / size:.2g} of the size of the model: "
+                "metres read as millimetres?"
+            )
+    return notes
+
+
+def _part(channel: Channel, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (F, 3), or their part along the direction of a channel of one column (F,)."""
+    count = 1 if channel.values.ndim == 1 else channel.values.shape[1]
+    if count == 3:
+        return vectors
+    direction = channel.attachment.get("direction")
+    if count != 1 or direction is None:
+        raise InputError(
+            f"a {channel.kind} of {count} column{'s' if count > 1 else ''} cannot be observed without a direction",
+            field=f"channels.{channel.name}.direction",
+            allowed="one column with a direction, or three columns",
+        )
+    return vectors @ np.asarray(direction, float)
+
+
+def _turns(channel: Channel, first: float) -> float:
+    """Whole turns that bring an angle [rad] into the turn in which the recording starts."""
+    seen = channel.values[np.isfinite(channel.values)]
+    return 2 * np.pi * float(np.round((seen[0] - first) / (2 * np.pi)))
+
+
+def _measured(model: Model, channel: Channel) -> list[str]:
+    """The measurement effects of the model that act on a channel."""
+    effects = (get(name) for name in model.effects)
+    return [e.name for e in effects if e.family == "measurement" and (not e.channels or channel.kind in e.channels)]
+
+
+def _distorted(trajectory, channel, frames, values, times, world) -> np.ndarray:
+    """The channel (n,) or (n, d) after the measurement effects; the run is held at its ends."""
+    spline = CubicSpline(frames, values.reshape(len(frames), -1))
+
+    def read(at: np.ndarray) -> np.ndarray:
+        return np.moveaxis(spline(np.clip(at, frames[0], frames[-1])), -1, 1)  # [n, W, d] -> [n, d, W]
+
+    for name in _measured(trajectory.model, channel):
+        read = _through(get(name), trajectory.parameters, world, read)
+    return read(times[:, None])[:, :, 0].reshape(len(times), *values.shape[1:])
+
+
+def _through(effect, parameters: Parameters, world: int, read):
+    given = {n: v[0, [world if v.shape[1] > 1 else 0]] for n, v in parameters.of(effect.name).items()}
+    return lambda at: effect.apply(read, at, **given)
+
+
+def _frames(trajectory: Trajectory, world: int) -> tuple[State, Drive]:
+    """State and drive of every frame of one world, each as a world."""
+    model = trajectory.model
+    memory = [n for n in model.laws if get(n).memory]
+    if memory:
+        raise InputError(
+            "a run keeps no memory of the effects, so that a force cannot be observed in it",
+            field="effects",
+            value=", ".join(memory),
+            allowed="effects without memory, or equilibria",
+        )
+    state = State.at_rest(model, len(trajectory.times))
+    state.x, state.v = (np.ascontiguousarray(a[:, :, world].swapaxes(0, 1)) for a in (trajectory.x, trajectory.v))
+    state.angles = np.ascontiguousarray(trajectory.angles[:, :, world].T)
+    drive = distorted(model, trajectory.parameters, trajectory.drive, float(trajectory.times[-1]))
+    values = {}
+    for name, signal in drive.signals.items():
+        of_worlds = np.asarray(signal(trajectory.times[:, None])).reshape(len(trajectory.times), -1)
+        values[name] = of_worlds[:, world if of_worlds.shape[1] > 1 else 0]
+    return state, _of_values(values)
+
+
+def _held(drives: Sequence[Drive]) -> Drive:
+    """One drive of as many worlds, each holding the value at time 0 of its own."""
+    return _of_values({n: np.array([float(d[n](0.0)) for d in drives]) for n in drives[0].signals})
+
+
+def _of_values(values: dict[str, np.ndarray]) -> Drive:
+    """The drive that holds these values (F,) by channel, one world each."""
+    groups = sum(name.startswith("voltage_") for name in values)
+    return Drive(voltage=[0.0] * groups).replace(**values)
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """Unit normals (F, 3) of triangles (F, 3, 3)."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def _on_panel(model: Model, panel: int, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Nodes (3,) of the triangle under a point of a panel, its weights (3,) on them, and its height above it [m]."""
+    triangles = model.triangles[model.triangle_panel == panel]
+    corners = model.position[triangles]
+    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    doubled = np.cross(*edges)
+    areas = np.linalg.norm(doubled, axis=1)
+    centroid = np.average(corners.mean(axis=1), axis=0, weights=areas)
+    point = centroid + offset
+    best, chosen = -np.inf, None
+    for nodes, corner, area in zip(triangles, corners, doubled, strict=True):
+        square = float(area @ area)
+        sides = [np.cross(corner[(k + 1) % 3] - point, corner[(k + 2) % 3] - point) for k in range(3)]
+        weights = np.array([float(side @ area) / square for side in sides])
+        if weights.min() > best:  # inside all are positive; else the triangle that the point lies least outside of
+            lift = float((point - corner[0]) @ area) / np.sqrt(square)
+            best, chosen = weights.min(), (nodes, weights / weights.sum(), lift)
+    assert chosen is not None  # every panel has a triangle
+    return chosen
+
+
 def _index(model: Model, channel: Channel, family: str, count: int) -> int:
     """Index that an attachment names, by number or by the model's label."""
-    given = channel.attachment.get(family)
+    return _find(model, channel, family, channel.attachment.get(family), count)
+
+
+def _find(model: Model, channel: Channel, family: str, given: object, count: int) -> int:
     names = model.names.get(family, ())
     if isinstance(given, str) and given in names:
         return names.index(given)

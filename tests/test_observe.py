@@ -1,11 +1,15 @@
 """The observer: channels of a simulated run, against the positions that they come from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from origami_sim.errors import InputError
-from origami_sim.observe import channel_frames, observe
-from origami_sim.recording import Channel, Recording
+from origami_sim.model import Model, Parameters
+from origami_sim.observe import channel_frames, check_scene, follow, observe, observe_equilibria
+from origami_sim.recording import Camera, Channel, Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import pendulum_chain
 
@@ -83,3 +87,166 @@ def test_channels_that_the_model_lacks(motion, given, words):
 def test_a_run_shorter_than_the_recording(motion):
     with pytest.raises(InputError, match=r"run is shorter than the recording.*0\.5.*2 s"):
         observe(motion, recording([0.0, 2.0], channel("crease_angle", [0.0, 0.0], crease=0)))
+
+
+def turned(angle: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points of arm 1 [F, 3] that lie at `points` [3] while it hangs, when its absolute angle is `angle` [F]."""
+    pivot = np.array([0.0, 0.0, -pendulum_chain.MOUNT])
+    phi = angle - np.pi
+    x, y, z = points - pivot
+    return pivot + np.stack(
+        [x * np.cos(phi) + z * np.sin(phi), np.full(len(phi), y), z * np.cos(phi) - x * np.sin(phi)], 1
+    )
+
+
+def arm_centroid(motion) -> np.ndarray:
+    model = motion.model
+    corners = model.position[model.triangles[model.triangle_panel == 1]]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.average(corners.mean(axis=1), axis=0, weights=areas)
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.004, 0.003, -0.02), (-0.01, 0.0, 0.3)])
+def test_a_marker_on_a_panel_moves_rigidly_with_it(motion, point):
+    """Inside the panel, off its surface and outside of it, against the closed form of a turning arm."""
+    angle = channel_frames(motion, channel("panel_angle", [0.0], panel="arm1"))
+    given = channel("marker", np.zeros((2, 3)), unit="m", panel="arm1", point=list(point))
+    expected = turned(angle, arm_centroid(motion) + point)
+    np.testing.assert_allclose(channel_frames(motion, given), expected, atol=2e-5 * max(1.0, abs(point[2]) / 0.02))
+
+
+def test_a_marker_above_the_surface(motion):
+    """The height lies along the normal, of the panel or around a node, and turns with it."""
+    angle = channel_frames(motion, channel("panel_angle", [0.0], panel="arm1"))
+    on = channel_frames(motion, channel("marker", np.zeros((2, 3)), unit="m", panel="arm1"))
+    above = channel_frames(motion, channel("marker", np.zeros((2, 3)), unit="m", panel="arm1", height=0.01))
+    np.testing.assert_allclose(np.linalg.norm(above - on, axis=1), 0.01, rtol=1e-9)
+    along = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], 1)
+    np.testing.assert_allclose(np.einsum("fc,fc->f", above - on, along), 0.0, atol=1e-5)
+    node = int(np.argmin(motion.model.position[:, 2]))
+    flat = channel_frames(motion, channel("marker", np.zeros((2, 3)), unit="m", node=node))
+    lifted = channel_frames(motion, channel("marker", np.zeros((2, 3)), unit="m", node=node, height=0.01))
+    np.testing.assert_allclose(np.linalg.norm(lifted - flat, axis=1), 0.01, rtol=1e-9)
+
+
+def test_a_marker_in_a_picture(motion):
+    """A camera that is tilted by 30 degrees about y, against rotating by hand."""
+    tilt = np.deg2rad(30.0)
+    camera = Camera.turned(np.array([0.1, 0.2, 0.3]), np.array([0.0, tilt, 0.0]))
+    given = replace(channel("marker_2d", np.zeros((2, 2)), unit="m", node=4), camera=camera)
+    x, _, z = (motion.x[:, 4, 0] - [0.1, 0.2, 0.3]).T
+    right, up = x * np.cos(tilt) - z * np.sin(tilt), x * np.sin(tilt) + z * np.cos(tilt)
+    np.testing.assert_allclose(channel_frames(motion, given), np.stack([right, up], 1), atol=1e-14)
+    pixels = np.array([[100.0, 400.0], [110.0, 380.0]])
+    seen = Camera(np.zeros(3), np.eye(3)[[0, 2]], scale=1e-3, zero=(100.0, 400.0), flip=True)
+    np.testing.assert_allclose(seen.metres(pixels), [[0.0, 0.0], [0.01, 0.02]])
+    with pytest.raises(InputError, match="a marker in a picture needs a camera"):
+        channel_frames(motion, channel("marker_2d", np.zeros((2, 2)), unit="m", node=4))
+
+
+def test_displacements_as_vector_part_and_length(motion):
+    moved = motion.x[:, 4, 0] - motion.x[0, 4, 0]
+    vector = channel_frames(motion, channel("tip_displacement", np.zeros((2, 3)), unit="m", node=4))
+    np.testing.assert_array_equal(vector, moved)
+    part = channel("tip_displacement", np.zeros(2), unit="m", node=4, direction=[0.0, 0.0, -1.0])
+    np.testing.assert_allclose(channel_frames(motion, part), -moved[:, 2], atol=1e-16)
+    with pytest.raises(InputError, match="of 2 columns cannot be observed without a direction"):
+        channel_frames(motion, channel("tip_displacement", np.zeros((2, 2)), unit="m", node=4))
+
+
+def test_the_support_of_a_swinging_chain_carries_weight_and_momentum(motion):
+    """Newton: the impulse of support and weight is the change of momentum, which the run has in its velocities."""
+    model, mass = motion.model, motion.parameters["inertia", "mass"][:, 0]
+    held = np.flatnonzero((model.free == 0).all(axis=1)).tolist()
+    s = read_calibration(pendulum_chain.CALIBRATION).replace(duration=0.1)
+    fine = pendulum_chain.swing(s, rate=20_000.0)
+    given = channel("force", np.zeros((2, 3)), unit="N", nodes=held)
+    force = channel_frames(fine, given)
+    weight = mass.sum() * np.array([0.0, 0.0, -s.gravity])
+    momentum = np.einsum("n,fnc->fc", mass, fine.v[:, :, 0])
+    impulse = CubicSpline(fine.times, force + weight).integrate(fine.times[0], fine.times[-1])
+    change = momentum[-1] - momentum[0]
+    np.testing.assert_allclose(impulse, change, atol=0.01 * np.abs(change).max())
+    down = channel("force", np.zeros(2), unit="N", nodes=held, direction=[0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(channel_frames(fine, down), force[:, 2])
+    with pytest.raises(InputError, match="no axis of these nodes is held"):
+        channel_frames(motion, channel("force", np.zeros((2, 3)), unit="N", node=int(model.position[:, 2].argmin())))
+    with pytest.raises(InputError, match="no contact with the ground"):
+        channel_frames(motion, channel("force", np.zeros((2, 3)), unit="N", ground=True))
+
+
+def shallow_truss(rise: float = 0.3, stiffness: float = 100.0):
+    """Two bars from supports to an apex that moves vertically, with a unit load downwards."""
+    free = np.zeros((3, 3))
+    free[2, 2] = 1.0
+    none = np.zeros((0, 3), int)
+    model = Model(
+        position=np.array([(-1.0, 0, 0), (1.0, 0, 0), (0, 0, rise)]),
+        free=free,
+        bars=np.array([(0, 2), (1, 2)]),
+        creases=np.zeros((0, 4), int),
+        bends=np.zeros((0, 4), int),
+        triangles=none,
+        triangle_panel=np.zeros(0, int),
+        contacts=none,
+        contact_weights=np.zeros((0, 3)),
+        contact_offsets=np.zeros(0),
+        contact_axes=np.zeros((0, 3)),
+        electrodes=np.zeros(0, int),
+        effects=("bars", "load"),
+    )
+    length = np.hypot(1.0, rise)
+    parameters = Parameters(model, {("bars", "stiffness"): stiffness, ("bars", "rest_length"): np.full(2, length)})
+    return model, parameters.set("load", "force_z", -1.0, entities=2)
+
+
+def test_a_quasi_static_curve_is_observed_step_by_step(tmp_path):
+    """Von Mises truss below its limit load: deflection and support forces against the closed form."""
+    rise, stiffness = 0.3, 100.0
+    model, parameters = shallow_truss(rise, stiffness)
+    rest = np.hypot(1.0, rise)
+    sink = np.array([0.0, 0.005, 0.02, 0.04, 0.06, 0.03, 0.01])  # up and down again
+    z = rise - sink
+    load = 2 * stiffness * (rest / np.hypot(1.0, z) - 1) * z
+    rows = "".join(f"{p!r},{w * 1e3!r}\n" for p, w in zip(load.tolist(), sink.tolist(), strict=True))
+    (tmp_path / "press.csv").write_text("load,sink\n" + rows)
+    (tmp_path / "press.toml").write_text(
+        '[channels.sink]\ncolumn = "sink"\nkind = "tip_displacement"\nunit = "mm"\nnoise = 0.01\nnode = 2\n'
+        'direction = [0.0, 0.0, -1.0]\n[drive.load]\ncolumn = "load"\nunit = "1"\n'
+    )
+    recording = read_recording(tmp_path / "press.csv")
+    assert recording.by_step
+    support = channel("force", np.zeros((7, 3)), unit="N", nodes=[0, 1])
+    both = replace(recording, channels={**recording.channels, "support": replace(support, name="support")})
+    found = observe_equilibria(model, parameters, follow(model, parameters, both), both)
+    np.testing.assert_allclose(found["sink"], recording.channels["sink"].values, atol=1e-9)
+    np.testing.assert_allclose(found["support"][:, 2], load, atol=1e-8)
+    np.testing.assert_allclose(found["support"][:, :2], 0.0, atol=1e-9)
+    one = replace(both, channels={"left": replace(support, name="left", attachment={"node": 0})})
+    left = observe_equilibria(model, parameters, follow(model, parameters, one), one)["left"]
+    np.testing.assert_allclose(left, np.stack([load / 2 / z, 0 * load, load / 2], 1), atol=1e-8)
+    with pytest.raises(InputError, match=r"one equilibrium per load step .*value 3\); allowed: 7"):
+        observe_equilibria(model, parameters, follow(model, parameters, recording)[:3], recording)
+
+
+def test_a_curve_of_steps_is_not_observed_in_a_run(motion):
+    given = replace(
+        recording([0.0, 1.0], channel("crease_angle", [0.0, 0.0], crease=0)), metadata={"time_base": "step"}
+    )
+    with pytest.raises(InputError, match="observed along equilibria, not in a run"):
+        observe(motion, given)
+
+
+def test_a_recording_is_held_against_the_model(motion):
+    """Attachments must exist; sizes that do not match are told."""
+    model = motion.model
+    marker = motion.x[:, 4, 0]
+    assert check_scene(recording(motion.times, channel("marker", marker, unit="m", node=4)), model) == []
+    large = check_scene(recording(motion.times, channel("marker", 1000 * marker, unit="m", node=4)), model)
+    assert len(large) == 1 and "times the size of the model: millimetres or pixels read as metres?" in large[0]
+    small = check_scene(recording(motion.times, channel("marker", 1e-6 * marker, unit="m", node=4)), model)
+    assert len(small) == 1 and "metres read as millimetres?" in small[0]
+    with pytest.raises(InputError, match=r"nothing of that name.*crease.*5.*0 to 1"):
+        check_scene(recording(motion.times, channel("crease_angle", np.zeros(len(marker)), crease=5)), model)
+    with pytest.raises(InputError, match=r"nothing of that name.*channels\.c\.panel.*lid"):
+        check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="lid")), model)

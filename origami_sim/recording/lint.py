@@ -6,11 +6,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.recording.recording import CHANNEL_KINDS, scaled_differences
-from origami_sim.recording.units import unit_factor
+from origami_sim.recording.recording import CHANNEL_KINDS, Recording, quantisation, scaled_differences
+from origami_sim.recording.units import quantity, unit_factor
 
 GAP_FACTOR = 1.5
 """A step longer than this many median steps is a time gap."""
+
+LARGE = 20.0
+"""Metres that a marker of an origami hardly travels: beyond, the unit is suspected."""
+
+FROZEN = 25
+"""Equal values in a row, in a channel that is otherwise noisy, that look like a tracker holding its last value."""
+
+SWAP_JUMP, SWAP_FIT = 8.0, 0.25
+"""Two tracks are swapped where both leave their course by so many times their usual deviation, and the other one's
+course explains them with at most this share of the error."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +49,17 @@ def lint(
     file: object = None,
     position: Callable[[int], str] | None = None,
     allow_gaps: bool = False,
+    allow_swaps: bool = False,
+    by_step: bool = False,
 ) -> list[str]:
     """Check a recording before anything is concluded from it.
 
     Errors: fewer than 3 frames; times missing, repeated or running backwards; a channel without 3 values; angles stated
-    in rad beyond 100; a constant channel whose noise is not stated; and, unless `allow_gaps`, missing values between
-    others and time steps beyond 1.5 median steps. Notes: the gaps that were allowed, missing values at the ends,
-    constant channels, angles stated in deg that look like rad, angles that jump by a turn, noise that comes in bursts.
+    in rad beyond 100; a constant channel whose noise is not stated; unless `allow_gaps`, missing values between
+    others and time steps beyond 1.5 median steps; unless `allow_swaps`, markers that exchange their names. Notes: what
+    was allowed, missing values at the ends, constant channels, angles stated in deg that look like rad and the reverse,
+    lengths that look like a wrong unit, angles that jump by a turn, quantised readings, values that stand still, noise
+    that comes in bursts.
 
     Args:
         times: (n,) times [s].
@@ -53,6 +67,8 @@ def lint(
         file: the file to name in errors.
         position: where a row stands in the file, e.g. row 0 -> "line 2"; counts rows from 1 when None.
         allow_gaps: whether gaps are notes instead of errors.
+        allow_swaps: whether swapped markers are notes instead of errors.
+        by_step: whether rows are load steps, of which three without a course in time are enough.
 
     Returns:
         Notes, one sentence each.
@@ -64,7 +80,36 @@ def lint(
     for name, one in series.items():
         notes += _lint_missing(name, one, times, file, allow_gaps)
         notes += _lint_values(name, one, times, file)
-    return notes
+        if by_step and one.noise is None:
+            notes.append(
+                f"The noise of channel '{name}' is the roughness of {len(times)} load steps, an upper bound: "
+                "state it if it is known."
+            )
+    return notes if by_step else notes + _lint_swaps(series, times, file, allow_swaps)
+
+
+def lint_report(recording: Recording) -> str:
+    """What is known of a recording before anything is concluded from it: size, noise by channel, drive, and notes."""
+    span = recording.times[-1] - recording.times[0]
+    length = (
+        f"{recording.frame_count} load steps" if recording.by_step else f"{recording.frame_count} frames, {span:.6g} s"
+    )
+    lines = [f"{recording.name}: {length}"]
+    for channel in recording.channels.values():
+        lines.append(f"  {channel.name} ({channel.kind}): noise {quantity(channel.noise, channel.unit)}")
+        known = channel.noise_report
+        if known is not None:
+            parts = [f"median level {quantity(known.level, channel.unit)}", f"rms {quantity(known.rms, channel.unit)}"]
+            if np.isfinite(known.lag_1):
+                parts.append(f"lag-1 correlation {known.lag_1:.2f} (then {quantity(known.total, channel.unit)})")
+            if known.quantum > 0.0:
+                parts.append(f"step {quantity(known.quantum, channel.unit)}")
+            if known.rest_frames:
+                parts.append(f"at rest {quantity(known.rest, channel.unit)} over {known.rest_frames} frames")
+            lines[-1] += f"; from the data: {', '.join(parts)}"
+    for drive in recording.drive.values():
+        lines.append(f"  drive {drive.name} [{drive.unit}]: {'constant' if drive.constant else 'varies'}")
+    return "\n".join([*lines, *(f"note: {note}" for note in recording.metadata.get("notes", ()))])
 
 
 def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], allow_gaps: bool) -> list[str]:
@@ -76,6 +121,14 @@ def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], al
     if backwards.size:
         row = int(backwards.min())
         fault = "is repeated" if times[row] == times[row + 1] else f"runs backwards from {times[row]:.9g} s"
+        if np.unique(times).size == times.size:
+            place_, count = place(row + 1), backwards.size
+            raise InputError(
+                f"the time {fault} at {place_}: the rows are not sorted ({count} of {len(steps)} steps run backwards)",
+                file=file,
+                field="time",
+                value=float(times[row + 1]),
+            )
         raise InputError(f"the time {fault} at {place(row + 1)}", file=file, field="time", value=float(times[row + 1]))
     typical = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_FACTOR * typical)
@@ -104,6 +157,9 @@ def _lint_missing(name: str, one: Series, times: np.ndarray, file: object, allow
             f"channel '{name}' misses {interior.size} values in {runs} run{'s' if runs > 1 else ''} between others, "
             f"first at t = {times[interior[0]]:.6g} s"
         )
+        if runs > 1:
+            lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[-2], interior, [len(times) + 2]])) > 1))
+            sentence += f", the longest of {lengths.max()}"
         if not allow_gaps:
             raise InputError(sentence, file=file, field=name, allowed="gaps only with allow_gaps = true in the sidecar")
         notes.append(sentence + ".")
@@ -136,6 +192,12 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
                 field="unit",
                 value=one.unit,
             )
+        turned = float((np.nanmax(columns, axis=0) - np.nanmin(columns, axis=0)).max()) * unit_factor(one.unit)
+        if one.kind == "crease_angle" and one.unit in ("rad", "mrad") and turned > 2.0 * np.pi:
+            notes.append(
+                f"Channel '{name}' is stated in {one.unit} but turns by {turned:.4g} rad, more than a crease can: this "
+                "looks like degrees."
+            )
         if one.unit == "deg" and not constant and largest <= 2.0 * np.pi:
             notes.append(f"Channel '{name}' is stated in deg but stays within 2 pi: this looks like radians.")
         seen = np.isfinite(columns[:, 0])
@@ -143,6 +205,15 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
         if jumps.size and not one.unwrap:
             when = times[seen][jumps[0] + 1]
             notes.append(f"Channel '{name}' jumps by more than half a turn at t = {when:.6g} s: unwrap = true?")
+    elif one.kind != "force" and one.unit != "px":
+        spread = float((np.nanmax(columns, axis=0) - np.nanmin(columns, axis=0)).max()) * unit_factor(one.unit)
+        if spread > LARGE:
+            notes.append(
+                f"Channel '{name}' is stated in {one.unit} and moves by {spread:.4g} m: this looks like millimetres "
+                "or pixels."
+            )
+    if not constant:
+        notes += _lint_levels(name, one, columns, times)
     if not constant and one.noise is None:
         bursts = _burst_ratio(times, columns)
         if bursts > 1.5:
@@ -151,6 +222,78 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
                 "level, which is the noise stated."
             )
     return notes
+
+
+def _lint_levels(name: str, one: Series, columns: np.ndarray, times: np.ndarray) -> list[str]:
+    """Notes on readings that come in steps, and on values that stand still while a tracker has lost the point."""
+    quantum = max(quantisation(column) for column in columns.T)
+    if quantum > 0.0:
+        return [f"The readings of channel '{name}' come in steps of {quantum:.4g} {one.unit}."]
+    held = (np.diff(columns, axis=0) == 0.0).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2] + 1
+    if not (lengths >= FROZEN).any():
+        return []
+    k = int(np.argmax(lengths))
+    return [
+        f"Channel '{name}' stands still for {lengths[k]} frames from t = {times[starts[k]]:.6g} s although it is noisy "
+        "elsewhere: was the point lost there?"
+    ]
+
+
+def _lint_swaps(series: Mapping[str, Series], times: np.ndarray, file: object, allow_swaps: bool) -> list[str]:
+    """Pairs of tracks of which each leaves its own course and takes up the other's, at the same frame."""
+    tracks: dict[tuple[str, int, str], list[str]] = {}
+    for name, one in series.items():
+        if one.kind in ("marker", "marker_2d"):
+            tracks.setdefault((one.kind, one.readings.shape[1], one.unit), []).append(name)
+    notes = []
+    for names in tracks.values():
+        for k, first in enumerate(names):
+            for second in names[k + 1 :]:
+                when = swaps(times, series[first].readings, series[second].readings)
+                if when.size == 0:
+                    continue
+                more = f" and {when.size - 1} times more" if when.size > 1 else ""
+                sentence = f"markers '{first}' and '{second}' seem to exchange names at t = {when[0]:.6g} s{more}"
+                if not allow_swaps:
+                    raise InputError(
+                        sentence,
+                        file=file,
+                        field=first,
+                        allowed="tracks that keep their point, or allow_swaps = true in the sidecar",
+                    )
+                notes.append(sentence[0].upper() + sentence[1:] + ".")
+    return notes
+
+
+def swaps(times: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Times (k,) at which two tracks (n, d) exchange their identity.
+
+    Each point is predicted from its two frames before, at constant velocity. A swap is a frame where both points miss
+    their own prediction by more than `SWAP_JUMP` times the usual miss, while the other's prediction misses by less than
+    `SWAP_FIT` of that. Frames in which one is missing are left out, so that an exchange behind an occlusion is seen.
+    """
+    seen = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
+    t, a, b = times[seen], first[seen], second[seen]
+    if len(t) < 6:
+        return np.zeros(0)
+    share = ((t[2:] - t[1:-1]) / (t[1:-1] - t[:-2]))[:, None]
+    predicted_a, predicted_b = (p[1:-1] + share * (p[1:-1] - p[:-2]) for p in (a, b))
+
+    def miss(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(p[2:] - q, axis=1)
+
+    own_a, own_b = miss(a, predicted_a), miss(b, predicted_b)
+    crossed = np.maximum(miss(a, predicted_b), miss(b, predicted_a))
+    # long occlusions make every prediction poor: the miss may grow with the square of the time bridged
+    usual = np.maximum(np.median(np.maximum(own_a, own_b)), 1e-12) * np.maximum(share[:, 0], 1.0) ** 2
+    jumped = (np.minimum(own_a, own_b) > SWAP_JUMP * usual) & (crossed < SWAP_FIT * np.minimum(own_a, own_b))
+    found = np.flatnonzero(jumped)
+    kept = [
+        k for i, k in enumerate(found) if i == 0 or k - found[i - 1] > 2
+    ]  # the frame after a swap is off course too
+    return t[2:][kept]
 
 
 def _burst_ratio(times: np.ndarray, columns: np.ndarray) -> float:

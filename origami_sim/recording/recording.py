@@ -1,11 +1,17 @@
 """What was measured: channels over time with noise, drive and attachment, whatever wrote the file."""
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.recording.camera import Camera
+
+if TYPE_CHECKING:
+    from origami_sim.recording.noise import NoiseReport
 
 CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
     "panel_angle": ("angle", (1,)),
@@ -19,8 +25,9 @@ CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
 
 - panel_angle: absolute rotation of a panel about the hinge axis.
 - crease_angle: fold angle between the two panels of a crease.
-- marker: point on the body, 3D. marker_2d: the same in a camera plane, in metres.
-- tip_displacement, force: one component or a vector.
+- marker: point on the body, 3D. marker_2d: the same in a camera plane, in metres, right and up.
+- tip_displacement: how far a point moved since the first frame: the distance, the part along a direction, or a vector.
+- force: of the support or the ground on the object: the part along a direction, or a vector.
 """
 
 DIFFERENCE_ORDER = 6
@@ -38,6 +45,8 @@ class Channel:
         unit: SI unit of `values`.
         noise: standard deviation of one measured value (of one component of a vector) [SI].
         attachment: what on the model is observed, e.g. {"panel": "arm1"} or {"panel": 0, "point": [x, y, z]}.
+        camera: the camera plane in which a `marker_2d` is measured.
+        noise_report: what the data show about the noise, whether or not it is stated; None for a channel made by hand.
     """
 
     name: str
@@ -46,6 +55,8 @@ class Channel:
     unit: str
     noise: float
     attachment: dict = field(default_factory=dict)
+    camera: Camera | None = None
+    noise_report: "NoiseReport | None" = None
 
     @property
     def is_angle(self) -> bool:
@@ -62,12 +73,38 @@ class DriveChannel:
         values: series (n,) or (n, d), or a constant () or (d,) [SI].
         unit: SI unit of `values`.
         constant: whether `values` holds throughout instead of per frame.
+        times: (m,) times of the values on the recording's clock [s] where the drive was sampled on its own; None where
+            it has one value per frame.
     """
 
     name: str
     values: np.ndarray
     unit: str
     constant: bool
+    times: np.ndarray | None = None
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """The drive at these times [s], (n,) or (n, d) [SI]; linear between the samples of a drive with its own times.
+
+        Raises:
+            InputError: times before or after the drive's own, or another number of them than its values.
+        """
+        if self.constant:
+            return np.broadcast_to(self.values, (len(times), *np.shape(self.values)))
+        if self.times is None:
+            if len(self.values) != len(times):
+                raise InputError("the drive has one value per frame", field=self.name, value=len(times))
+            return self.values
+        if times[0] < self.times[0] or times[-1] > self.times[-1]:
+            raise InputError(
+                f"the drive '{self.name}' does not cover the recording",
+                field=f"drive.{self.name}",
+                value=[float(self.times[0]), float(self.times[-1])],
+                allowed=f"samples from {times[0]:g} s to {times[-1]:g} s",
+            )
+        columns = self.values.reshape(len(self.times), -1)
+        out = np.stack([np.interp(times, self.times, column) for column in columns.T], axis=1)
+        return out.reshape(len(times), *self.values.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +140,11 @@ class Recording:
                 )
 
     @property
+    def by_step(self) -> bool:
+        """Whether `times` counts the load steps of a quasi-static curve instead of seconds."""
+        return self.metadata.get("time_base") == "step"
+
+    @property
     def frame_count(self) -> int:
         """Number of frames n."""
         return len(self.times)
@@ -121,7 +163,10 @@ class Recording:
             self,
             times=self.times[keep],
             channels={k: replace(c, values=c.values[keep]) for k, c in self.channels.items()},
-            drive={k: d if d.constant else replace(d, values=d.values[keep]) for k, d in self.drive.items()},
+            drive={
+                k: d if d.constant or d.times is not None else replace(d, values=d.values[keep])
+                for k, d in self.drive.items()
+            },
         )
 
 
@@ -170,16 +215,27 @@ def scaled_differences(times: np.ndarray, values: np.ndarray) -> np.ndarray:
         weights = [(-1.0) ** k * comb(order, k) / np.sqrt(comb(2 * order, order)) for k in range(order + 1)]
         scaled = np.convolve(values, weights, mode="valid")
     else:
-        frames = np.lib.stride_tricks.sliding_window_view((times - times[0]) / typical, order + 1)
-        spans = frames[:, :, None] - frames[:, None, :] + np.eye(order + 1)
-        weight = 1.0 / np.prod(spans, axis=2)
-        weight /= np.linalg.norm(weight, axis=1, keepdims=True)
-        scaled = np.sum(weight * np.lib.stride_tricks.sliding_window_view(values, order + 1), axis=1)
-        steps = np.lib.stride_tricks.sliding_window_view(step, order)
-        even = steps.max(axis=1) <= 3.0 * steps.min(axis=1)
+        weight, even = _uneven_weights((times - times[0]).tobytes(), order)
+        scaled = np.einsum("mk,mk->m", weight, np.lib.stride_tricks.sliding_window_view(values, order + 1))
         if even.any():
             scaled = scaled[even]
     return scaled[np.isfinite(scaled)]
+
+
+@lru_cache(maxsize=4)
+def _uneven_weights(times: bytes, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (m, order + 1) of scaled divided differences at uneven times, and where the steps are alike (m,).
+
+    Every channel of a recording has the same ones: they are kept by the bytes of the times.
+    """
+    seconds = np.frombuffer(times)
+    step = np.diff(seconds)
+    frames = np.lib.stride_tricks.sliding_window_view(seconds / np.median(step), order + 1)
+    spans = frames[:, :, None] - frames[:, None, :] + np.eye(order + 1)
+    weight = 1.0 / np.prod(spans, axis=2)
+    weight /= np.linalg.norm(weight, axis=1, keepdims=True)
+    steps = np.lib.stride_tricks.sliding_window_view(step, order)
+    return weight, steps.max(axis=1) <= 3.0 * steps.min(axis=1)
 
 
 def _difference_noise(times: np.ndarray, values: np.ndarray) -> float:
@@ -191,11 +247,19 @@ def _difference_noise(times: np.ndarray, values: np.ndarray) -> float:
     return max(1.4826 * float(np.median(np.abs(scaled))) if scaled.size else 0.0, float(rounding))
 
 
-def _quantum_noise(values: np.ndarray) -> float:
+def quantisation(values: np.ndarray) -> float:
+    """Step of readings (n,) that dwell on quantised levels, in their unit; 0 where none shows.
+
+    A tenth of the changes between frames must be zero; the step is the smallest change that is repeated.
+    """
     steps = np.abs(np.diff(values[np.isfinite(values)]))
     rounding = 8.0 * np.finfo(float).eps * np.abs(values[np.isfinite(values)]).max(initial=0.0)
     moved = np.sort(steps[steps > rounding])
     if moved.size < 2 or np.count_nonzero(steps <= rounding) < 0.1 * steps.size:
         return 0.0
     repeated = np.flatnonzero(np.diff(moved) <= 0.01 * moved[:-1])
-    return float(moved[repeated[0]] / np.sqrt(12.0)) if repeated.size else 0.0
+    return float(moved[repeated[0]]) if repeated.size else 0.0
+
+
+def _quantum_noise(values: np.ndarray) -> float:
+    return quantisation(values) / float(np.sqrt(12.0))

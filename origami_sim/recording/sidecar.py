@@ -1,31 +1,53 @@
 """The sidecar of a recording: what the columns of its table mean, in TOML.
 
     name = "double pendulum, run 1"     # the file's stem when left out
-    description = "..."                 # also source, licence: free text, kept in the metadata
+    description = "..."                 # also licence: free text, kept in the metadata
     allow_gaps = false                  # true: missing values and time gaps become notes instead of errors
+    allow_swaps = false                 # true: markers that seem to exchange names become notes instead of errors
+
+    [source]                            # optional; or source = "free text"
+    format = "deeplabcut"               # table, tracker, deeplabcut, sleap, motive, c3d; seen from the file if left out
+    likelihood = 0.6                    # points with a lower score are missing
+    axes = ["x", "-z", "y"]             # the model's x, y, z in terms of the file's (here its y is up)
+    origin = [0.0, 0.0, 0.0]            # the model's origin in the file's axes [m]
+    about = "..."                       # free text
 
     [select]                            # optional: keep the rows where the column has this value
     toss = 12
 
-    [time]                              # left out: rows are load steps 0, 1, 2, ...
+    [time]                              # left out: the file's own clock, or else rows are load steps 0, 1, 2, ...
     column = "time_s"
     unit = "s"                          # s, ms, us, min
     rate_hz = 1000                      # optional; checked against the column, or the time base when there is no column
 
     [channels.theta1]                   # the name that the simulation's observer uses
-    column = "theta1_rad"               # or columns = ["x", "y", "z"]
+    column = "theta1_rad"               # or columns = ["x", "y", "z"], or track = "name of the tracked point"
     kind = "panel_angle"                # panel_angle, crease_angle, marker, marker_2d, tip_displacement, force
-    unit = "rad"                        # of the column
+    unit = "rad"                        # of the column; may be left out where the file states its unit of length
     noise = 1e-4                        # standard deviation in `unit`; estimated from the data when left out
     sign = 1                            # value = sign * (reading - offset)
     offset = 0.0                        # reading at zero, in `unit`, e.g. the encoder zero
     unwrap = false                      # true: remove jumps of whole turns from an angle
-    panel = "arm1"                      # what is observed: panel, crease or node (name or number) and, on a panel,
-    point = [0.0, 0.0, 0.01]            # the body point [m]
+    panel = "arm1"                      # what is observed: panel, crease, node, nodes or ground, and
+    point = [0.0, 0.0, 0.01]            # on a panel, the body point from its centroid, in the reference axes [m]
+    height = 0.001                      # of a marker above the mid-plane, along the normal [m]
+    direction = [0.0, 0.0, 1.0]         # of a force or a displacement of one column
+    camera = "side"                     # of a marker_2d; may be left out where there is one camera
+
+    [cameras.side]                      # the plane in which a marker_2d is measured
+    origin = [0.0, 0.0, 0.0]            # point of the model [m] that is seen at
+    pixel = [960, 540]                  # this reading; the lower left corner when left out
+    right = [1.0, 0.0, 0.0]             # directions of the picture in the model's axes; or
+    up = [0.0, 0.0, 1.0]                # rotation = [rx, ry, rz] [rad], which turns x and z into them
+    scale = 0.0002                      # metres per pixel, for readings in px
+    height = 1080                       # of the picture, where rows count down from its upper edge
 
     [drive.field]                       # optional: what was applied
     columns = ["bx", "by", "bz"]        # or column, or value = [0.0, 0.0, 5.0] for a constant
     unit = "mT"
+    direction = [0.0, 0.0, 1.0]         # turns one number into a vector
+    file = "supply.csv"                 # columns of another table, with its time_column, time_unit and shift [s]
+    times = [0.0, 1.0]                  # or samples stated here [s], with values = [0.0, 5.0]
 
     [scene]
     name = "pendulum_chain"             # the scene that simulates this object
@@ -38,21 +60,44 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.table import LARGEST_NUMBER, Table, first_line, read_bytes
+from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
 
-_TOP_KEYS = ("name", "description", "source", "licence", "allow_gaps", "select", "time", "channels", "drive", "scene")
+_TOP_KEYS = (
+    "name",
+    "description",
+    "source",
+    "licence",
+    "allow_gaps",
+    "allow_swaps",
+    "select",
+    "time",
+    "channels",
+    "cameras",
+    "drive",
+    "scene",
+)
+_SOURCE_KEYS = ("format", "likelihood", "axes", "origin", "about")
 _TIME_KEYS = ("column", "unit", "rate_hz")
-_CHANNEL_KEYS = ("column", "columns", "kind", "unit", "noise", "sign", "offset", "unwrap")
-_ATTACHMENT_KEYS = ("panel", "crease", "node", "point")
-_DRIVE_KEYS = ("column", "columns", "value", "unit")
+_CHANNEL_KEYS = ("column", "columns", "track", "kind", "unit", "noise", "sign", "offset", "unwrap", "camera")
+_CARRIERS = ("panel", "crease", "node", "nodes", "ground")
+_ATTACHMENT_KEYS = (*_CARRIERS, "point", "height", "direction")
+_CAMERA_KEYS = ("origin", "pixel", "right", "up", "rotation", "scale", "height")
+_DRIVE_KEYS = (
+    *("column", "columns", "value", "unit", "direction"),
+    *("file", "time_column", "time_unit", "shift", "times", "values"),
+)
 _SCENE_KEYS = ("name", "overrides")
+_TRACKED = {"marker": "xyz", "marker_2d": "xy"}
+"""Coordinates of a tracked point that a kind of channel takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +108,12 @@ class Sidecar:
     name: str | None
     free_text: dict[str, str]
     allow_gaps: bool
+    allow_swaps: bool
+    source: dict[str, Any]
     select: dict[str, Any]
     time: dict[str, Any]
     channels: dict[str, dict[str, Any]]
+    cameras: dict[str, dict[str, Any]]
     drive: dict[str, dict[str, Any]]
     scene: dict[str, Any]
 
@@ -87,14 +135,20 @@ class Sidecar:
         if "time" in tree and rate is None and "column" not in time.values:
             raise InputError("the time needs a column or a rate_hz", file=path, field="time")
         scene = _Section(path, "scene.", top.table("scene"), _SCENE_KEYS)
+        source = _source_spec(path, tree.get("source"))
+        cameras = {name: _camera_spec(path, name, table) for name, table in top.table("cameras").items()}
+        texts = {key: text for key in ("description", "licence") if (text := top.text(key, None))}
         return cls(
             file=path,
             name=top.text("name", None),
-            free_text={key: text for key in ("description", "source", "licence") if (text := top.text(key, None))},
+            free_text=texts | ({"source": source["about"]} if source["about"] else {}),
             allow_gaps=top.flag("allow_gaps"),
+            allow_swaps=top.flag("allow_swaps"),
+            source=source,
             select={column: top.label("select", column) for column in top.table("select")},
             time={"column": time.text("column", None), "unit": time.unit("time", default="s"), "rate_hz": rate},
-            channels={name: _channel_spec(path, name, table) for name, table in channels.items()},
+            channels={name: _channel_spec(path, name, table, cameras) for name, table in channels.items()},
+            cameras=cameras,
             drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
             scene={"name": scene.text("name", None), "overrides": scene.table("overrides")} if scene.values else {},
         )
@@ -102,23 +156,28 @@ class Sidecar:
     @property
     def columns(self) -> list[str]:
         """Numeric columns that the file must have."""
-        specs = [*self.channels.values(), *self.drive.values()]
+        specs = [*self.channels.values(), *(spec for spec in self.drive.values() if spec["file"] is None)]
         named = [column for spec in specs for column in spec["columns"]]
         time = [self.time["column"]] if self.time["column"] is not None else []
         return list(dict.fromkeys(time + named))
 
-    @property
-    def time_base(self) -> str:
-        """Where the times come from: 'column', 'rate' or 'step'."""
+    def time_base(self, table: Table) -> str:
+        """Where the times come from: 'column', 'clock' of the file, 'rate' or 'step'."""
         if self.time["column"] is not None:
             return "column"
+        if table.clock is not None:
+            return "clock"
         return "rate" if self.time["rate_hz"] is not None else "step"
 
     def times(self, table: Table) -> np.ndarray:
         """(n,) times [s], or step numbers."""
-        if self.time["column"] is not None:
+        base = self.time_base(table)
+        if base == "column":
             return table.numbers[self.time["column"]] * unit_factor(self.time["unit"])
-        return np.arange(len(table.rows)) / (self.time["rate_hz"] or 1.0)
+        if base == "clock":
+            return table.numbers[table.clock or ""]
+        steps = table.numbers[table.frame] if base == "rate" and table.frame else np.arange(len(table.rows))
+        return steps / (self.time["rate_hz"] or 1.0)
 
     def check_rate(self, times: np.ndarray) -> None:
         """Raise where the stated rate and the time column differ by more than one per cent."""
@@ -133,11 +192,67 @@ class Sidecar:
             )
 
 
-def _channel_spec(path: Path, name: str, table: object) -> dict[str, Any]:
+def _source_spec(path: Path, given: object) -> dict[str, Any]:
+    """What the sidecar tells about the file; `axes` becomes a matrix (3, 3), or None."""
+    if given is None or isinstance(given, str):
+        section = _Section(path, "", {} if given is None else {"source": given}, ("source",))
+        return {"format": None, "likelihood": None, "axes": None, "origin": None, "about": section.text("source", None)}
+    section = _Section(path, "source.", given, _SOURCE_KEYS)
+    axes = section.values.get("axes")
+    turn = None
+    if axes is not None:
+        rows = {sign + axis: factor * np.eye(3)[k] for k, axis in enumerate("xyz") for sign, factor in _SIGNS}
+        if not (isinstance(axes, list) and len(axes) == 3 and all(isinstance(a, str) and a in rows for a in axes)):
+            section.refuse("must be three of x, y, z, -x, -y, -z", "source.axes", axes)
+        turn = np.array([rows[a] for a in axes])
+        if not np.isclose(np.linalg.det(turn), 1.0):
+            section.refuse("must keep a right hand a right hand", "source.axes", axes)
+    likelihood = section.number("likelihood", None)
+    if likelihood is not None and not 0.0 <= likelihood <= 1.0:
+        section.refuse("must lie between 0 and 1", "source.likelihood", likelihood)
+    form = section.choice("format", dict.fromkeys(FORMATS)) if "format" in section.values else None
+    origin = section.vector("origin", None)
+    return {
+        "format": form,
+        "likelihood": likelihood,
+        "axes": turn,
+        "origin": origin,
+        "about": section.text("about", None),
+    }
+
+
+_SIGNS = (("", 1.0), ("-", -1.0))
+
+
+def _camera_spec(path: Path, name: str, table: object) -> dict[str, Any]:
+    section = _Section(path, f"cameras.{name}.", table, _CAMERA_KEYS)
+    axes = np.array([section.vector("right", [1.0, 0.0, 0.0]), section.vector("up", [0.0, 0.0, 1.0])])
+    if "rotation" in section.values:
+        if "right" in section.values or "up" in section.values:
+            section.refuse("give either rotation or right and up", section.prefix + "rotation", None)
+        axes = rotation_matrix(np.array(section.vector("rotation", None)))[:, [0, 2]].T
+    if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-6):
+        section.refuse(
+            "right and up must be perpendicular and of length 1", f"cameras.{name}", np.round(axes, 6).tolist()
+        )
+    scale, height = section.number("scale", None), section.number("height", None)
+    for key, value in (("scale", scale), ("height", height)):
+        if value is not None and not value > 0.0:
+            section.refuse("must be positive", section.prefix + key, value)
+    return {
+        "origin": np.array(section.vector("origin", [0.0, 0.0, 0.0])),
+        "axes": axes,
+        "scale": scale,
+        "flip": height is not None,
+        "zero": tuple(section.vector("pixel", [0.0, height or 0.0], size=2)),
+    }
+
+
+def _channel_spec(path: Path, name: str, table: object, cameras: Mapping[str, object]) -> dict[str, Any]:
     section = _Section(path, f"channels.{name}.", table, _CHANNEL_KEYS + _ATTACHMENT_KEYS)
     kind = section.choice("kind", CHANNEL_KINDS)
     dimension, counts = CHANNEL_KINDS[kind]
-    columns = section.columns()
+    columns = section.columns(_TRACKED.get(kind))
     if len(columns) not in counts:
         raise InputError(
             f"a channel of kind '{kind}' cannot have {len(columns)} columns",
@@ -158,25 +273,58 @@ def _channel_spec(path: Path, name: str, table: object) -> dict[str, Any]:
     return {
         "columns": columns,
         "kind": kind,
-        "unit": section.unit(dimension),
+        "unit": section.length_unit(kind) if dimension == "length" else section.unit(dimension),
+        "camera": section.camera(kind, cameras),
         "noise": noise,
         "sign": sign,
         "offset": section.number("offset", 0.0),
         "unwrap": unwrap,
-        "attachment": section.attachment(),
+        "attachment": section.attachment(kind, len(columns)),
     }
 
 
 def _drive_spec(path: Path, name: str, table: object) -> dict[str, Any]:
     section = _Section(path, f"drive.{name}.", table, _DRIVE_KEYS)
-    value = section.values.get("value")
-    if value is None:
-        return {"columns": section.columns(), "value": None, "unit": section.unit(None)}
-    if "column" in section.values or "columns" in section.values:
+    given = section.values
+    ways = [key for key in ("value", "values") if key in given] + ["column"] * ("column" in given or "columns" in given)
+    if len(ways) > 1:
         raise InputError("a drive has columns or a value, not both", file=path, field=f"drive.{name}")
-    for component in value if isinstance(value, list) and value else [value]:
-        section.check_number("value", component)
-    return {"columns": [], "value": value, "unit": section.unit(None)}
+    if ("times" in given) != ("values" in given):
+        section.refuse("samples need both 'times' and 'values'", f"drive.{name}", None)
+    if "file" in given and "time_column" not in given:
+        section.refuse("a drive in a file of its own needs a 'time_column'", f"drive.{name}.time_column", None)
+    for key in ("time_column", "time_unit", "shift"):
+        if key in given and "file" not in given:
+            section.refuse("is only for a drive in a file of its own", section.prefix + key, given[key])
+    for key in ("value", "values"):
+        for row in _listed(given.get(key, [])):
+            for component in _listed(row) if key == "values" else [row]:
+                section.check_number(key, component)
+    times = [section.check_number("times", t) for t in _listed(given.get("times", []))]
+    if "times" in given and (
+        len(times) < 2 or len(times) != len(_listed(given["values"])) or np.any(np.diff(times) <= 0)
+    ):
+        section.refuse("must increase, with one value each", section.prefix + "times", times)
+    if len({len(_listed(row)) for row in _listed(given.get("values", []))}) > 1:
+        section.refuse("must have equally many components", section.prefix + "values", given["values"])
+    time_unit = given.get("time_unit", "s")
+    unit_factor(time_unit, dimension="time", file=path, field=section.prefix + "time_unit")
+    return {
+        "columns": [] if "value" in given or "values" in given else section.columns(),
+        "value": given.get("value"),
+        "unit": section.unit(None),
+        "direction": section.direction(),
+        "file": section.text("file", None),
+        "time_column": section.text("time_column", None),
+        "time_unit": time_unit,
+        "shift": section.number("shift", 0.0),
+        "times": times or None,
+        "values": given.get("values"),
+    }
+
+
+def _listed(value: Any) -> list:
+    return value if isinstance(value, list) and value else [value] if value != [] else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +338,7 @@ class _Section:
 
     def __post_init__(self) -> None:
         if not isinstance(self.values, dict):
-            self._refuse("must be a table", self.prefix.rstrip("."), self.values)
+            self.refuse("must be a table", self.prefix.rstrip("."), self.values)
         for key in self.values:
             if key not in self.keys:
                 raise InputError(
@@ -200,19 +348,19 @@ class _Section:
     def table(self, key: str) -> dict[str, Any]:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
-            self._refuse("must be a table", self.prefix + key, value)
+            self.refuse("must be a table", self.prefix + key, value)
         return value
 
     def text(self, key: str, default: str | None) -> str | None:
         value = self.values.get(key, default)
         if value is not None and not (isinstance(value, str) and value):
-            self._refuse("must be a text", self.prefix + key, value)
+            self.refuse("must be a text", self.prefix + key, value)
         return value
 
     def flag(self, key: str) -> bool:
         value = self.values.get(key, False)
         if not isinstance(value, bool):
-            self._refuse("must be true or false", self.prefix + key, value)
+            self.refuse("must be true or false", self.prefix + key, value)
         return value
 
     def number(self, key: str, default: float | None) -> Any:
@@ -221,7 +369,7 @@ class _Section:
 
     def check_number(self, key: str, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < LARGEST_NUMBER:
-            self._refuse("must be a finite number", self.prefix + key, value)
+            self.refuse("must be a finite number", self.prefix + key, value)
         return float(value)  # type: ignore[arg-type]
 
     def choice(self, key: str, allowed: Mapping[str, object]) -> str:
@@ -236,32 +384,92 @@ class _Section:
         unit_factor(unit or "", dimension=dimension, file=self.file, field=self.prefix + "unit")
         return unit or ""
 
-    def columns(self) -> list[str]:
+    def length_unit(self, kind: str) -> str | None:
+        """A unit of length, "px" for a marker in a picture, or None where the file has to state it."""
+        unit = self.text("unit", None)
+        if unit is not None and not (unit == "px" and kind == "marker_2d"):
+            unit_factor(unit, dimension="length", file=self.file, field=self.prefix + "unit")
+        return unit
+
+    def camera(self, kind: str, cameras: Mapping[str, object]) -> str | None:
+        """Name of the camera of a channel; the only one when it is left out."""
+        name = self.text("camera", None)
+        if name is None:
+            return next(iter(cameras)) if kind == "marker_2d" and len(cameras) == 1 else None
+        if kind != "marker_2d":
+            self.refuse("only a marker_2d has a camera", self.prefix + "camera", name)
+        if name not in cameras:
+            known = ", ".join(cameras) or "none is described"
+            raise InputError("unknown camera", file=self.file, field=self.prefix + "camera", value=name, allowed=known)
+        return name
+
+    def vector(self, key: str, default: list[float] | None, size: int = 3) -> Any:
+        value = self.values.get(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, list) or len(value) != size:
+            self.refuse(f"must be {'three' if size == 3 else 'two'} numbers", self.prefix + key, value)
+        return [self.check_number(key, component) for component in value]
+
+    def direction(self) -> list[float] | None:
+        vector = self.vector("direction", None)
+        if vector is None:
+            return None
+        length = float(np.linalg.norm(vector))
+        if not length > 0.0:
+            self.refuse("must not be zero", self.prefix + "direction", vector)
+        return [component / length for component in vector]
+
+    def columns(self, coordinates: str | None = None) -> list[str]:
+        """The columns that are named, or those of the tracked point where the kind of channel has `coordinates`."""
+        if "track" in self.values:
+            if "column" in self.values or "columns" in self.values:
+                self.refuse("give either a track or columns", self.prefix + "track", self.values["track"])
+            if coordinates is None:
+                self.refuse("only a marker or a marker_2d is a track", self.prefix + "track", self.values["track"])
+            return [f"{self.text('track', None)}.{axis}" for axis in coordinates or ""]
         if ("column" in self.values) == ("columns" in self.values):
             raise InputError(
                 "give either 'column' or 'columns'", file=self.file, field=self.prefix + "column", allowed="one of both"
             )
         names = [self.values["column"]] if "column" in self.values else self.values["columns"]
         if not isinstance(names, list) or not names or not all(isinstance(n, str) and n for n in names):
-            self._refuse("must name columns", self.prefix + "columns", names)
+            self.refuse("must name columns", self.prefix + "columns", names)
         if len(set(names)) != len(names):
-            self._refuse("must not name a column twice", self.prefix + "columns", names)
+            self.refuse("must not name a column twice", self.prefix + "columns", names)
         return names
 
-    def attachment(self) -> dict[str, Any]:
-        """What the channel observes: at most one of panel, crease, node, and the point on it."""
+    def attachment(self, kind: str, count: int) -> dict[str, Any]:
+        """What the channel observes: at most one carrier, and the point, height or direction on it."""
         found = {key: self.values[key] for key in _ATTACHMENT_KEYS if key in self.values}
-        carriers = [key for key in found if key != "point"]
+        carriers = [key for key in found if key in _CARRIERS]
         if len(carriers) > 1:
-            self._refuse("observes one thing only", self.prefix.rstrip("."), carriers)
+            self.refuse("observes one thing only", self.prefix.rstrip("."), carriers)
         for key in carriers:
-            if isinstance(found[key], bool) or not isinstance(found[key], (int, str)) or found[key] == "":
-                self._refuse("must be a name or a number", self.prefix + key, found[key])
+            many = found[key] if key == "nodes" and isinstance(found[key], list) and found[key] else [found[key]]
+            if key == "ground":
+                if found[key] is not True:
+                    self.refuse("must be true", self.prefix + key, found[key])
+            elif (key == "nodes" and many == [found[key]]) or any(
+                isinstance(one, bool) or not isinstance(one, (int, str)) or one == "" for one in many
+            ):
+                fault = "must be a list of names or numbers" if key == "nodes" else "must be a name or a number"
+                self.refuse(fault, self.prefix + key, found[key])
+            if key in ("nodes", "ground") and kind != "force":
+                self.refuse("is only for a force", self.prefix + key, found[key])
         if "point" in found:
             point = found["point"]
             if not isinstance(point, list) or len(point) != 3:
-                self._refuse("must be three coordinates in metres", self.prefix + "point", point)
+                self.refuse("must be three coordinates in metres", self.prefix + "point", point)
             found["point"] = [self.check_number("point", coordinate) for coordinate in point]
+        if "height" in found:
+            found["height"] = self.check_number("height", found["height"])
+        if "direction" in found:
+            if kind not in ("force", "tip_displacement") or count != 1:
+                self.refuse(
+                    "is only for a force or displacement of one column", self.prefix + "direction", found["direction"]
+                )
+            found["direction"] = self.direction()
         return found
 
     def label(self, key: str, column: str) -> str | float:
@@ -270,5 +478,6 @@ class _Section:
             return value
         return self.check_number(f"{key}.{column}", value)
 
-    def _refuse(self, fault: str, field: str, value: object) -> None:
+    def refuse(self, fault: str, field: str, value: object) -> NoReturn:
+        """Raises InputError for this key."""
         raise InputError(fault, file=self.file, field=field, value=value)

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,9 @@ class Table:
         labels: (n,) cells by column, for the columns to select rows by.
         rows: (n,) row of the file, counted from 0 after the header.
         lines: place in words of a row of the file.
+        unit: unit of lengths that the file itself states ("px" for pixels), or None.
+        clock: column that holds the times [s] by the file's own account, or None.
+        frame: column that numbers the frames, or None.
     """
 
     file: Path
@@ -38,6 +41,9 @@ class Table:
     labels: dict[str, np.ndarray]
     rows: np.ndarray
     lines: Callable[[int], str]
+    unit: str | None = None
+    clock: str | None = None
+    frame: str | None = None
 
     def position(self, row: int) -> str:
         """Where row `row` of this table stands in the file, e.g. 'line 2'."""
@@ -62,13 +68,38 @@ class Table:
                     value=value,
                     allowed=shown,
                 )
-        return Table(
-            file=self.file,
+        return replace(
+            self,
             numbers={name: column[keep] for name, column in self.numbers.items()},
             labels={name: column[keep] for name, column in self.labels.items()},
             rows=self.rows[keep],
-            lines=self.lines,
         )
+
+    def require(self, columns: Sequence[str]):
+        """Raises InputError where one of these columns is missing."""
+        for name in columns:
+            if name not in self.numbers:
+                known = list(self.numbers)
+                shown = ", ".join(known[:24]) + (", ..." if len(known) > 24 else "")
+                raise InputError(f"column '{name}' is missing", file=self.file, field="column", allowed=shown)
+
+    def check_numbers(self) -> "Table":
+        """The same table, if every cell is a measurement or missing.
+
+        Raises:
+            InputError: a number beyond `LARGEST_NUMBER` in magnitude.
+        """
+        for name, values in self.numbers.items():
+            damaged = np.flatnonzero(np.abs(values) > LARGEST_NUMBER)
+            if damaged.size:
+                row = int(damaged[0])
+                raise InputError(
+                    f"the number at {self.position(row)} is no measurement",
+                    file=self.file,
+                    field=name,
+                    value=float(values[row]),
+                )
+        return self
 
 
 def _plain(label: object) -> object:
@@ -98,17 +129,7 @@ def read_table(path: Path, data: bytes, columns: list[str], labels: list[str]) -
         raise InputError(
             "unknown kind of file", file=path, field="suffix", value=suffix, allowed=".csv, .txt, .parquet"
         )
-    for name, values in table.numbers.items():
-        damaged = np.flatnonzero(np.abs(values) > LARGEST_NUMBER)
-        if damaged.size:
-            row = int(damaged[0])
-            raise InputError(
-                f"the number at {table.position(row)} is no measurement",
-                file=path,
-                field=name,
-                value=float(values[row]),
-            )
-    return table
+    return table.check_numbers()
 
 
 def _check_columns(path: Path, wanted: list[str], header: list[str]) -> None:
@@ -163,7 +184,7 @@ def _read_csv(path: Path, data: bytes, columns: list[str], labels: list[str]) ->
         numbers=numbers,
         labels=texts,
         rows=np.arange(len(numbers[columns[0]])),
-        lines=lambda row: f"line {_data_lines(body, header_line)[row]}",
+        lines=lambda row: f"line {data_lines(body, header_line)[row]}",
     )
 
 
@@ -181,7 +202,7 @@ def _split_header(path: Path, data: bytes) -> tuple[list[str], int, bytes]:
     return [name.strip() for name in names], number, lines.read()
 
 
-def _data_lines(body: bytes, header_line: int) -> list[int]:
+def data_lines(body: bytes, header_line: int) -> list[int]:
     """Line number of every data row: empty lines are no rows."""
     return [header_line + k for k, line in enumerate(body.split(b"\n"), start=1) if line]
 
@@ -192,7 +213,7 @@ def _parse_cells(
     """Parse cell by cell what the fast reader refused: names the line of the first fault, or returns the numbers."""
     numbers: dict[str, list[float]] = {name: [] for name in columns}
     texts: dict[str, list[str]] = {name: [] for name in labels}
-    for number, line in zip(_data_lines(body, header_line), filter(None, body.split(b"\n")), strict=True):
+    for number, line in zip(data_lines(body, header_line), filter(None, body.split(b"\n")), strict=True):
         try:
             cells = next(csv.reader([line.decode("utf-8")]), [])
         except (UnicodeDecodeError, csv.Error) as error:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from origami_sim.recording import estimate_noise
+from origami_sim.recording import estimate_noise, noise_report
 from origami_sim.recording.units import quantity
 
 
@@ -65,3 +65,50 @@ def test_a_noiseless_signal_has_rounding_noise_only():
 )
 def test_quantities_read_well(value, unit, text):
     assert quantity(value, unit) == text
+
+
+def correlated(count: int, lag: float, seed: int = 0) -> np.ndarray:
+    """First-order noise of unit standard deviation whose neighbours correlate by `lag`."""
+    white = np.random.default_rng(seed).normal(size=count + 200)
+    out = np.zeros(count + 200)
+    for k in range(1, len(out)):
+        out[k] = lag * out[k - 1] + np.sqrt(1 - lag**2) * white[k]
+    return out[200:]
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.3, 0.6, 0.85])
+def test_the_correlation_of_a_filtering_tracker_is_found(lag):
+    times = np.arange(8000) / 500.0
+    report = noise_report(times, signal(times) + 1e-4 * correlated(8000, lag))
+    assert report.lag_1 == pytest.approx(lag, abs=0.1)
+    if lag <= 0.6:  # beyond, it scatters by a third, as the docstring says
+        assert report.total == pytest.approx(1e-4, rel=0.1)  # what the differences alone understate
+    if lag > 0.5:
+        assert report.level < 0.6e-4
+
+
+def test_bursts_are_told_by_their_root_mean_square():
+    times = np.arange(6000) / 500.0
+    generator = np.random.default_rng(4)
+    scale = np.where(generator.random(6000) < 0.05, 10e-4, 1e-4)
+    report = noise_report(times, signal(times) + scale * generator.normal(size=6000))
+    assert report.rms == pytest.approx(float(np.sqrt(np.mean(scale**2))), rel=0.2)
+    assert report.level < 0.7 * report.rms and report.burst > 1.4
+
+
+def test_segments_at_rest_show_the_noise_directly():
+    times = np.arange(6000) / 500.0
+    motion = np.where(times < 6.0, 0.0, signal(times) - signal(np.array([6.0])))
+    report = noise_report(times, motion + 1e-4 * correlated(6000, 0.5))
+    assert report.rest_frames == pytest.approx(3000, abs=200)
+    assert report.rest == pytest.approx(1e-4, rel=0.1)
+    assert report.rest_lag_1 == pytest.approx(0.5, abs=0.1)
+    moving = noise_report(times, signal(times) + 1e-4 * correlated(6000, 0.0))
+    assert moving.rest_frames < 600
+
+
+def test_the_step_of_the_readings_is_stated():
+    times = np.arange(3000) / 500.0
+    report = noise_report(times, np.round(signal(times) / 0.01) * 0.01)
+    assert report.quantum == pytest.approx(0.01, rel=0.01)
+    assert noise_report(times, signal(times)).quantum == 0.0
