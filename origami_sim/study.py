@@ -520,11 +520,16 @@ def study(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if given[:1] == ["bifold"]:
+        from origami_sim import parameter_study
+
+        return parameter_study.main(given[1:])
     parser = argparse.ArgumentParser(
         prog="origami-sim study", description="Batch study over a scene's unknowns: stride maps and a robust set.",
         epilog="example: origami-sim study crawler --out runs/study_crawler --set cell=3.8mm",
     )  # fmt: skip
-    parser.add_argument("scene", choices=("crawler",))
+    parser.add_argument("scene", choices=("crawler", "bifold"), help="bifold --help lists its own options")
     parser.add_argument(
         "--out", type=Path, default=Path("runs/study_crawler"), help="folder for results, maps and report"
     )
