@@ -6,12 +6,14 @@ python -m origami_sim.scenes.box
 import numpy as np
 
 from origami_sim.build import Sheet
+from origami_sim.calibrate.result import table
 from origami_sim.drive import Drive, Signal, ramp, sine
+from origami_sim.errors import InputError
 from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow
+from origami_sim.scene import Outcome, Progress, Settings, follow, read_calibration
 from origami_sim.solve.dynamics import simulate
 
 CALIBRATION = "box"
@@ -54,15 +56,47 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         )
         sheet.panel(k + 1, rigidity=s.flap_stiffening * sheet.rigidity(k + 1))
     sheet.fix(panels=[0])
-    stiffness = bridge_stiffness(
-        s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson, end_correction=s.end_correction
-    )
-    sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
+    if s.crease_law == "finite_elements":
+        law = bridge_law(s)
+        sheet.set("crease_table", **law)
+        sheet.set("crease_viscosity", viscosity=s.loss_time * slope_at_rest(law))
+    else:
+        stiffness = bridge_stiffness(
+            s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson, end_correction=s.end_correction
+        )
+        sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
     if s.gravity:
         sheet.gravity((0, 0, -s.gravity))
     sheet.on("crease_stop")
     model, parameters = sheet.build()
     return model, parameters, drive(s)
+
+
+def bridge_law(s: Settings) -> dict:
+    """Parameters of the crease table that finite elements give for the bridge, over this crease's width.
+
+    Raises:
+        InputError: the stored law is for another bridge.
+    """
+    law = read_calibration("crease_bridge")
+    for name in ("gap", "thickness", "modulus", "poisson", "patch_thickness"):
+        if not np.isclose(law[name].value, s[name].value, rtol=1e-6):
+            raise InputError(
+                "the finite-element law is for another bridge (origami-sim calibrate bridge makes one)",
+                file=s.file,
+                field=name,
+                value=s[name].value,
+                allowed=f"{law[name].value:g} {law[name].unit}",
+            )
+    moments = table(law, "resisting_moment") * s.patch_width / law.width
+    return {"angle_min": law.angle_min, "angle_max": law.angle_max, "resisting_moment": moments[None, None]}
+
+
+def slope_at_rest(law: dict) -> float:
+    """Stiffness of a crease table in its middle, where it is flat [N m/rad]."""
+    moments = law["resisting_moment"][0, 0]
+    middle, step = len(moments) // 2, (law["angle_max"] - law["angle_min"]) / (len(moments) - 1)
+    return float((moments[middle + 1] - moments[middle - 1]) / (2 * step))
 
 
 def drive(s: Settings) -> Drive:

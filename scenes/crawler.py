@@ -51,7 +51,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     middle = 0.5 * (width[1:] + width[:-1])
     rigidity = bare * np.maximum(middle - patch_width, 0) + bonded * patch_width
     half = 0.5 * cells / rigidity
-    stiffness = 1.0 / (half[:-1] + half[1:])
+    border = (patch_width[1:] > 0) != (patch_width[:-1] > 0)  # there the sheet bends on for c h under the patch
+    ends = np.where(border, s.end_correction * s.thickness / (bare * width[1:-1]), 0.0)
+    stiffness = 1.0 / (half[:-1] + half[1:] + ends)
     # only the bare sheet bends enough to lose energy; the same loss time on the sandwich would only cost time step
     lossy = stiffness if s.patch_loss else np.minimum(stiffness, bare * width[1:-1] / s.cell)
     sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=lossy * s.loss_time)

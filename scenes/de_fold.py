@@ -3,9 +3,11 @@
     python -m origami_sim.scenes.de_fold
 
 Arm, notch, arm and a bare tip in a row, see de_bender for the section and the chain. The notch must keep some tape:
-a stack without any is symmetric and does not bend.
+a stack without any is symmetric and does not bend. Plane sections end at the border of the notch; finite elements show
+that the stack bends some way into the arms, as if the notch were longer (`notch_law`, calibrations/crease_notch.toml).
 """
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Outcome, Progress, Settings
+from origami_sim.scene import Outcome, Progress, Settings, read_calibration
 from origami_sim.solve.dynamics import simulate
 
 from .de_bender import Segment, chain, exponent, inclinations, settle
@@ -47,8 +49,50 @@ def segments(s: Settings, hinges: float) -> list[Segment]:
     ]
 
 
+def effective_length(s: Settings) -> float:
+    """Length of strip that bends as the notch does [m]: its own, or that of the finite-element calibration.
+
+    Raises:
+        InputError: the stored law is for another notch.
+    """
+    if s.notch_law == "plane_section":
+        return s.notch_length
+    law = read_calibration("crease_notch")
+    made = dict(re.findall(r"--([a-z-]+)=(\S+)", law.command))
+    for name, value in (
+        ("notch_length", law.notch),
+        ("notch_tape_layers", float(made["notch-layers"])),
+        ("tape_layers", float(made["arm-layers"])),
+    ):
+        if not np.isclose(s[name].value, value, rtol=1e-6):
+            raise InputError(
+                "the finite-element law is for another notch (origami-sim calibrate stack makes one)",
+                file=s.file,
+                field=name,
+                value=s[name].value,
+                allowed=f"{value:g} {s[name].unit}",
+            )
+    return law.effective_length
+
+
 def build(s: Settings, *, hinges: float | None = None) -> tuple[Model, Parameters, Drive]:
-    return chain(s, segments(s, hinges or s.hinges))
+    """The chain; in the notch every hinge turns by as much more as the notch is effectively longer."""
+    parts = segments(s, hinges or s.hinges)
+    model, parameters, drive = chain(s, parts)
+    longer = effective_length(s) / s.notch_length
+    if longer != 1.0:
+        order = np.argsort(model.position[model.creases[:, 1], 0], kind="stable")
+        inside = order[parts[0].hinges :][: parts[1].hinges]
+        for key, factor in (
+            (("crease", "stiffness"), 1 / longer),
+            (("crease_viscosity", "viscosity"), 1 / longer),
+            (("crease_table", "angle_min"), longer),
+            (("crease_table", "angle_max"), longer),
+            (("thickness_thinning", "hinge_length"), longer),
+        ):
+            if key in parameters:
+                parameters.set(*key, factor * parameters[key][inside, 0], inside)
+    return model, parameters, drive
 
 
 def turns(parts: Sequence[Segment], x: np.ndarray) -> np.ndarray:
@@ -80,7 +124,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """Angles by statics, and the motion for the replay."""
     voltages = s.voltage * VOLTAGES / VOLTAGES[-1]
     table, notes = fold(s, voltages)
-    if s.voltage == VOLTAGES[-1] and s.orientation == "weightless":
+    if s.voltage == VOLTAGES[-1] and s.orientation == "weightless" and s.notch_law == "plane_section":
         table |= {f"reference_{k}": v for k, v in REFERENCE.items()}
     power = exponent(voltages, table["notch_deg"])
     model, parameters, signals = build(s, hinges=s.motion_hinges)

@@ -1,1 +1,1 @@
-"""Calibration: parameters from measured curves (`experiment`) and from finite elements (`fe`), with their intervals."""
+"""Calibration: parameters from measured curves (`experiment`), finite elements (`fe`) and papers (`stated`)."""

@@ -1,8 +1,10 @@
-"""`origami-sim calibrate`: calibrations from measured curves and finite elements, each re-creatable by its command.
+"""`origami-sim calibrate`: calibrations from measured curves, finite elements and papers, re-creatable by command.
 
     origami-sim calibrate crease crease_torque/unit075.csv --angle-unit deg --moment-unit 'N mm' --out crease.toml
     origami-sim calibrate relaxation A.csv B.csv --gauge-length 80mm --out vhb.toml
     origami-sim calibrate ring-down swing.csv --angle-unit rad --time-unit s --inertia 1e-4 --out hinge.toml
+    origami-sim calibrate deflection beam.csv --field-unit mT --length 17.2mm --thickness 0.84mm --remanence 143mT
+    origami-sim calibrate paper article.txt --take 'tape_modulus=determined to be # GPa' --out stated.toml
     origami-sim calibrate bridge --gap 2.54mm --thickness 1.27mm --width 25.4mm --modulus 1.5MPa --out crease_box.toml
     origami-sim calibrate stack --notch 10mm --width 19mm --out crease_notch.toml
     origami-sim calibrate again crease.toml
@@ -15,7 +17,7 @@ import math
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +31,7 @@ PROGRAM = "origami-sim calibrate"
 
 @dataclass(frozen=True)
 class Done:
-    """A finished calibration: its content, and the fit for the plot (None for finite elements)."""
+    """A finished calibration: its content, and the fit for the plot (None where nothing was fitted to a curve)."""
 
     calibration: "Calibration"
     fit: Any = None
@@ -78,6 +80,26 @@ def register(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--time-unit", help="unit of the time")
     p.add_argument("--angle-unit", help="unit of the angle")
     p.add_argument("--inertia", type=float, help="about the crease [kg m^2]; without it only ratios can be known")
+
+    p = command("deflection", "Modulus or remanence of a magnetised beam from its tip deflection against field")
+    p.add_argument("curve", help="CSV file")
+    p.add_argument("--columns", default="field_mt,tip_deflection_over_length", help="flux density and tip deflection")
+    p.add_argument("--field-unit", help="unit of the flux density: T, mT, G")
+    p.add_argument("--deflection-unit", help="1 for a deflection over the length, or a unit of length")
+    p.add_argument("--length", help="free length, with its unit: 17.2mm")
+    p.add_argument("--thickness", help="in the bending plane, with its unit: 0.84mm")
+    p.add_argument("--remanence", help="known, to find the modulus: 143mT")
+    p.add_argument("--modulus", help="known, to find the remanence: 909kPa; without either only a ratio can be known")
+    p.add_argument("--measure", default="across", help="across (along the field, default) or total displacement")
+    p.add_argument("--tilted", action="store_true", help="also fit the tilt of the field")
+
+    p = command("paper", "Numbers that a paper states, with their quotes")
+    p.add_argument("text", help="text file, e.g. from pdftotext -layout")
+    p.add_argument(
+        "--take", action="append", default=[], metavar="NAME=WORDS",
+        help="name of the setting and the words around the number, which # stands for: 'width=tape # cm wide'; "
+        "NAME[UNIT]=... if the unit is not printed behind it; may be given several times",
+    )  # fmt: skip
 
     p = command("bridge", "Crease law of an elastomer bridge by finite elements")
     for name, what in (("gap", "between the patches"), ("thickness", "of the sheet"), ("width", "along the crease")):
@@ -172,6 +194,16 @@ def calibrate(args: argparse.Namespace) -> Done:
         )
         fit = experiment.fit_ring_down(data[time_name], data[angle_name], inertia=args.inertia)
         source, title = args.curve, f"Crease from the free swing {Path(args.curve).name}"
+    elif args.calibration == "deflection":
+        fit = _deflection(args)
+        source, title = args.curve, f"Beam from its deflection against field {Path(args.curve).name}"
+    elif args.calibration == "paper":
+        from origami_sim.calibrate import stated
+
+        found = stated.stated(_found(args.text), args.take, command=command)
+        if args.note:
+            found = replace(found, title=f"{found.title} ({args.note})")
+        return Done(found)
     elif args.calibration == "stack":
         from origami_sim.calibrate import fe_stack
 
@@ -198,6 +230,37 @@ def calibrate(args: argparse.Namespace) -> Done:
     return Done(experiment.calibration(fit, title=title, command=command, source=source), fit)
 
 
+def _deflection(args: argparse.Namespace):
+    """The fit of a deflection-field curve."""
+    from origami_sim.calibrate import experiment
+    from origami_sim.recording.units import UNITS
+
+    field_name, tip_name = _names(args.columns, 2)
+    sizes = {
+        name: None if getattr(args, name) is None else _number(getattr(args, name), dimension, f"--{name}")
+        for name, dimension in (
+            ("length", "length"), ("thickness", "length"), ("remanence", "flux density"), ("modulus", "pressure")
+        )
+    }  # fmt: skip
+    relative = args.deflection_unit is None or args.deflection_unit in UNITS["ratio"]
+    if args.deflection_unit is None and not tip_name.endswith("_over_length"):
+        allowed = ", ".join(["1 (over the length)", *UNITS["length"]])
+        raise InputError("the unit of a column is not stated", file=args.curve, field=tip_name, allowed=allowed)
+    data = experiment.read_columns(
+        _found(args.curve),
+        {
+            field_name: (args.field_unit, "flux density"),
+            tip_name: (args.deflection_unit or "1", "ratio" if relative else "length"),
+        },
+    )
+    tip, length = data[tip_name], sizes["length"]
+    if not relative:
+        if length is None:
+            raise InputError("the beam's size is needed", field="--length", allowed="its free length, e.g. 17.2mm")
+        tip = tip / length
+    return experiment.fit_deflection(data[field_name], tip, **sizes, measure=args.measure, tilted=args.tilted)
+
+
 def run(args: argparse.Namespace) -> int:
     """What the command line does with parsed arguments; returns the exit code (1: `again` found other values)."""
     import json
@@ -216,7 +279,7 @@ def run(args: argparse.Namespace) -> int:
         return 1 if moved else 0
     done = calibrate(args)
     if args.plot and done.fit is None:
-        raise InputError("finite elements have no fit to draw", field="--plot", value=args.plot)
+        raise InputError("there is no fit to draw", field="--plot", value=args.plot)
     if args.out:
         result.write_calibration(args.out, done.calibration)
     if args.plot:
@@ -258,7 +321,8 @@ def again(file: str | Path, tolerance: float = 1e-3) -> list[tuple[str, float, f
 
 def _command(args: argparse.Namespace) -> str:
     words = [PROGRAM, args.calibration]
-    positional = {"crease": ["curve"], "ring-down": ["curve"], "relaxation": ["curves"]}.get(args.calibration, [])
+    given = {"crease": "curve", "ring-down": "curve", "deflection": "curve", "relaxation": "curves", "paper": "text"}
+    positional = [given[args.calibration]] if args.calibration in given else []
     for name in positional:
         value = getattr(args, name)
         words += map(shlex.quote, value if isinstance(value, list) else [value])
@@ -267,7 +331,8 @@ def _command(args: argparse.Namespace) -> str:
         if name in skip or value is None or value is False:
             continue
         option = "--" + name.replace("_", "-")
-        words.append(option if value is True else f"{option}={shlex.quote(str(value))}")
+        for item in value if isinstance(value, list) else [value]:
+            words.append(option if item is True else f"{option}={shlex.quote(str(item))}")
     return " ".join(words)
 
 
@@ -293,6 +358,8 @@ def _found(path: str) -> Path:
 
     given = Path(path)
     folder = recordings_folder()
-    if not given.exists() and not given.is_absolute() and folder is not None and (folder / given).exists():
-        return folder / given
+    if not given.exists() and not given.is_absolute() and folder is not None:
+        for place in (folder, folder.parent):  # a paper's text may lie beside the recordings
+            if (place / given).exists():
+                return place / given
     return given

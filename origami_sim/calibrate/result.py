@@ -31,6 +31,8 @@ _SI = {next(iter(units)) for units in UNITS.values()} | {
     "1/s",
     "1/s^2",
     "1/m",
+    "1/T",
+    "V/m",
     "Hz",
     "rad/s",
     "F/m",
@@ -176,7 +178,7 @@ def significant(value: float, interval: tuple[float, float] | None) -> str:
     if interval is None or not all(map(math.isfinite, interval)) or interval[1] <= interval[0]:
         text = f"{value:.4g}"
         return text if interval is None else f"{text} ({interval[0]:.3g} to {interval[1]:.3g})"
-    digits = max(1 - math.floor(math.log10((interval[1] - interval[0]) / 4)), 0)
+    digits = 1 - math.floor(math.log10((interval[1] - interval[0]) / 4))
     leading = math.floor(math.log10(max(abs(value), abs(interval[0]), abs(interval[1]))))
     figures = max(digits + leading, 0) + 1
     return f"{value:.{figures}g} ({interval[0]:.{figures}g} to {interval[1]:.{figures}g})"

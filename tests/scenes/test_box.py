@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim.drive import Drive, ramp
+from origami_sim.errors import InputError
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from origami_sim.solve.dynamics import simulate
@@ -85,3 +86,49 @@ def test_the_table_has_the_reference_beside_it(settings):
     assert outcome.numbers["largest_difference_deg"] < 0.5
     assert outcome.numbers["flap_deg"] == pytest.approx(81.4, abs=0.5)
     np.testing.assert_allclose(outcome.tables["flap_angle"]["reference_deg"], LUMPED)
+
+
+# --- the crease by finite elements ------------------------------------------------------------------------------------
+
+
+def lumped(settings, fields) -> np.ndarray:
+    """Inclination [deg] of a rigid flap on the tabulated moment, without weight: M(theta) = m B cos(theta)."""
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import brentq
+
+    from origami_sim.calibrate.result import table
+    from origami_sim.materials import MU0
+
+    law = read_calibration("crease_bridge")
+    moment = table(law, "resisting_moment") * settings.patch_width / law.width
+    spline = CubicSpline(np.linspace(law.angle_min, law.angle_max, len(moment)), moment)
+    volume = settings.patch_length * settings.patch_width * settings.patch_thickness
+    couple = settings.remanence / MU0 * volume
+    return np.degrees([brentq(lambda a, b=b: spline(a) - couple * b * np.cos(a), -1.6, 1.6) for b in fields])
+
+
+def test_crease_by_finite_elements_folds_a_little_further(settings):
+    """The reference's linear crease is up to 1.6 deg stiffer towards the patches, and alike away from them."""
+    fe = settings.replace(crease_law="finite_elements", gravity=0.0)
+    up, down = statics(fe), statics(fe, -FIELDS)
+    np.testing.assert_allclose(up, lumped(fe, FIELDS)[:, None] + np.zeros(4), atol=0.05)
+    np.testing.assert_allclose(down, lumped(fe, -FIELDS)[:, None] + np.zeros(4), atol=0.05)
+    linear = statics(settings.replace(gravity=0.0))
+    assert np.all((up - linear > 0.4) & (up - linear < 1.7))
+    assert np.abs(-down - linear).max() < 0.3
+
+
+def test_default_crease_is_that_of_finite_elements_at_rest(settings):
+    """End correction 0.66 of the default against the 0.674 of the shipped finite elements."""
+    from origami_sim.materials import bridge_stiffness
+
+    linear = bridge_stiffness(
+        settings.modulus, settings.patch_width, settings.thickness, settings.gap, poisson=settings.poisson,
+        end_correction=settings.end_correction,
+    )  # fmt: skip
+    assert box.slope_at_rest(box.bridge_law(settings)) == pytest.approx(linear, rel=0.01)
+
+
+def test_a_bridge_without_finite_elements_is_refused(settings):
+    with pytest.raises(InputError, match=r"another bridge.*'gap'.*0\.00254 m"):
+        box.build(settings.replace(crease_law="finite_elements", gap=3.81e-3))

@@ -103,3 +103,27 @@ def test_default_is_converged_and_robust(tmp_path):
     found = dict(zip(named, run_trials("crawler", list(named.values()), Store(tmp_path / "results.json")), strict=True))
     verdict = judge(found)
     assert verdict.accepted, (verdict.spread, verdict.halved, verdict.worst, verdict.worst_change)
+
+
+def test_end_correction_makes_the_borders_of_the_patches_softer():
+    """Compliance of bare sheet of length c h more at each of the four borders, and nowhere else; none by default."""
+    s = read_calibration("crawler")
+    assert s.end_correction == 0.0
+    law = read_calibration("crease_bridge")
+    before, after = (crawler.build(s.replace(end_correction=c))[1] for c in (0.0, law.end_correction))
+    more = 1 / after["crease", "stiffness"][:, 0] - 1 / before["crease", "stiffness"][:, 0]
+    x, owner = crawler.stations(s)
+    borders = x[1:-1][np.diff(owner) != 0]
+    width = s.rear_width + (s.front_width - s.rear_width) * borders / x[-1]
+    bare = s.modulus / (1 - s.poisson**2) * s.thickness**3 / 12
+    expected = law.end_correction * s.thickness / (bare * width)
+    assert len(borders) == 4
+    np.testing.assert_allclose(np.sort(more)[-4:], np.sort(expected), rtol=1e-6)
+    assert np.abs(np.sort(more)[:-4]).max() < 1e-9 * expected.max()
+
+
+@SLOW
+def test_stride_depends_little_on_the_end_correction():
+    """The calibrated bridge instead of plane sections: some per cent, the gait is the same."""
+    stride, _ = walk(4, end_correction=0.674)
+    assert stride[3] == pytest.approx(24.7, rel=0.1)

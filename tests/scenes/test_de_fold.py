@@ -83,3 +83,37 @@ def test_run(settings):
     assert not outcome.trajectory.failures
     table = outcome.tables["fold_angle"]
     np.testing.assert_allclose(table["notch_deg"], table["reference_notch_deg"], rtol=0.002, atol=0.005)
+
+
+# --- the notch by finite elements, the paper's pressure ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("section", ["ogden", "linear"])
+def test_notch_by_finite_elements(settings, section):
+    """The fold of the finite elements at 4 kV, the arms as before, the same exponent; the stiffness is theirs too."""
+    law = read_calibration("crease_notch")
+    fe = settings.replace(notch_law="finite_elements", section=section)
+    table, plain = angles(fe), angles(settings.replace(section=section))
+    within = 0.01 if section == "ogden" else 0.03
+    assert table["notch_deg"][-1] == pytest.approx(np.degrees(law.notch_angle), rel=within)
+    np.testing.assert_allclose(table["notch_deg"] / plain["notch_deg"], law.effective_length / law.notch, rtol=1e-6)
+    np.testing.assert_allclose(table["arms_deg"], plain["arms_deg"], rtol=1e-9)
+    assert fold.exponent(VOLTAGES, table["notch_deg"]) == pytest.approx(law.exponent, abs=0.015)
+    assert np.degrees(law.arm_curvature) * 0.045 == pytest.approx(table["arms_deg"][-1], rel=0.01)
+    from origami_sim.scenes.de_bender import section as cross_section
+
+    rigidity = cross_section(settings, settings.notch_tape_layers).rigidity
+    assert rigidity * settings.width / fold.effective_length(fe) == pytest.approx(law.stiffness, rel=0.01)
+
+
+def test_a_notch_without_finite_elements_is_refused(settings):
+    for change in ({"notch_length": 0.012}, {"notch_tape_layers": 2.0}, {"tape_layers": 4.0}):
+        with pytest.raises(InputError, match=rf"another notch.*'{next(iter(change))}'"):
+            fold.build(settings.replace(notch_law="finite_elements", **change))
+
+
+def test_half_the_pressure_of_the_paper_folds_about_half_as_far(settings):
+    """A pressure of half the Maxwell stress on both faces is half the stress: a factor of two less at small angles."""
+    half, full = (angles(settings.replace(pressure_share=p), VOLTAGES[:2])["notch_deg"] for p in (0.5, 1.0))
+    np.testing.assert_allclose(half / full, 0.5, rtol=0.02)
+    assert np.all(half < full / 2)  # the layers thin less
