@@ -303,11 +303,11 @@ class _Composer:
         t("b = row & NATURAL")
         t("p = bars[b][0] & NATURAL")
         t("q = bars[b][1] & NATURAL")
-        t("span = X[q, w] - X[p, w]")
-        t("length = wp.length(span)")
-        t("along = span * (scalar(1.0) / length)")
+        self._span(t)
         if any("rate" in e.arguments or e.exchanges_work for e in effects):
             t("rate = wp.dot(along, V[q, w] - V[p, w])")
+        if any("voltage" in e.drives for e in effects):  # bars belong to the first electrode group
+            t(f"voltage = {self.channel(f'{VOLTAGE}')}")
         if mode != "evaluate":
             t("tension = scalar(0.0)")
         for e in effects:
@@ -326,6 +326,12 @@ class _Composer:
             t("F[q, w] = F[q, w] - pull")
         t.depth -= 1
 
+    def _span(self, t: _Text):
+        """A bar's length and its gradient at the bar's second node."""
+        t("span = X[q, w] - X[p, w]")
+        t("length = wp.length(span)")
+        t("along = span * (scalar(1.0) / length)")
+
     def _hinges(self, t: _Text, mode: str, family: str):
         effects = self.family(family)
         if not effects:
@@ -339,8 +345,7 @@ class _Composer:
         t(f"r = (c + {shift}) & NATURAL")
         for i, node in enumerate("ijkl"):
             t(f"{node} = hinges[r][{i}] & NATURAL")
-        t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
-        t("angle = kinematics.unwrap(g.angle, angles[r, w])")
+        self._fold(t)
         if any("turn" in e.arguments for e in effects):
             t("turn = angle - angles[r, w]" if mode == "rollout" else "turn = scalar(0.0)")
         t("angles[r, w] = angle")
@@ -348,6 +353,11 @@ class _Composer:
             t("rate = " + " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl"))
         if any("voltage" in e.drives for e in effects):
             t(f"voltage = {self.channel(f'{VOLTAGE} + electrodes[r]')}")
+        if any("field" in e.drives for e in effects):  # in the middle of the axis
+            local = "uniform_field"
+            if "gradient" in self.drives:
+                local += " + gradient * (scalar(0.5) * (X[j, w] + X[k, w]))"
+            t(f"field = {local}")
         if mode != "evaluate":
             t("moment = scalar(0.0)")
         for e in effects:
@@ -364,6 +374,11 @@ class _Composer:
             for node in "ijkl":
                 t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
         t.depth -= 1
+
+    def _fold(self, t: _Text):
+        """A hinge's angle, continued from its last one, and its gradients."""
+        t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
+        t("angle = kinematics.unwrap(g.angle, angles[r, w])")
 
     def _triangles(self, t: _Text, mode: str):
         effects = self.family("triangle")

@@ -12,6 +12,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch, Evaluation
+from origami_sim.solve.implicit import TOLERANCE, Implicit
 from origami_sim.solve.timestep import TimeStep, stable_step
 
 
@@ -93,6 +94,9 @@ def simulate(
     rate: float = 60.0,
     dt: float | None = None,
     state: State | None = None,
+    method: str = "explicit",
+    spectral_radius: float = 1.0,
+    tolerance: float = TOLERANCE,
     device: str = "cpu",
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -102,27 +106,39 @@ def simulate(
     Velocity-Verlet (kick, drift, kick), second order and symplectic without damping; forces that depend on velocity
     see its second-order prediction. Worlds are independent and their results do not depend on the batch.
 
+    For stiff parts and slow holds, method="implicit" takes steps of any length: second order, energy kept without
+    numerical damping (see `solve.implicit`), world after world, on the CPU.
+
     Args:
         duration: simulated time [s], rounded to whole frames. rate: frames per second.
-        dt: step [s]; default SAFETY times the stability limit of the stiffest element.
+        dt: step [s]; default SAFETY times the stability limit of the stiffest element. Implicit: any length, halved
+            only where Newton finds no solution; by default adapted within each frame.
         state: where to start (default: the reference state at rest); its worlds must match.
+        method: "explicit" or "implicit".
+        spectral_radius: implicit: below 1 it damps modes faster than the step, so much per step (generalised-alpha).
+        tolerance: implicit without dt: position error of one step over the size of the structure.
         device: "cpu" or "cuda:0". threads: CPU threads (default all cores).
         progress: called with the fraction done.
 
     Raises:
-        InputError: duration or rate not positive, a step above the limit, a drive that ends early, worlds that differ.
+        InputError: duration or rate not positive, no such method, a step above the limit, a drive that ends early,
+            worlds that differ; implicit: another device, spectral radius or tolerance out of bounds.
     """
     drive = drive or Drive()
     for name, value in (("duration", duration), ("rate", rate)):
         if not (value > 0 and np.isfinite(value)):
             raise InputError("a run needs a positive number", field=name, value=value, allowed="> 0")
     chosen = stable_step(model, parameters)
-    if dt is not None and not 0 < dt <= chosen.limit:
+    if method not in ("explicit", "implicit"):
+        raise InputError("no such method", field="method", value=method, allowed="explicit, implicit")
+    implicit = method == "implicit"
+    if dt is not None and not 0 < dt <= (np.finfo(float).max if implicit else chosen.limit):
         what = "the time step is above the stability limit" if dt > 0 else "the time step must be positive"
-        allowed = f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}"
+        allowed = "> 0 s" if implicit else f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}"
         raise InputError(what, field="dt", value=dt, allowed=allowed)
     frame_time = 1.0 / rate
-    substeps = max(1, int(np.ceil(frame_time / min(dt or chosen.dt, frame_time) * (1 - 1e-12))))
+    longest = dt or (frame_time if implicit else chosen.dt)
+    substeps = max(1, int(np.ceil(frame_time / min(longest, frame_time) * (1 - 1e-12))))
     step = frame_time / substeps
     frames = round(duration * rate)
     if frames < 1:
@@ -139,7 +155,19 @@ def simulate(
     drive_end = (first * step if state.step > 0 else 0.0) + frames * frame_time
     drive.require(drive_end)
     applied = distorted(model, parameters, drive, drive_end)
-    batch = Batch(model, parameters, applied, state, device=device, threads=threads)
+    if implicit:
+        batch = Implicit(
+            model,
+            parameters,
+            applied,
+            state,
+            radius=spectral_radius,
+            tolerance=tolerance if dt is None else None,
+            device=device,
+            threads=threads,
+        )
+    else:
+        batch = Batch(model, parameters, applied, state, device=device, threads=threads)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=1.0) / step
 
@@ -154,10 +182,12 @@ def simulate(
     wall = clock.perf_counter() - began
 
     last = record[-1][0]
+    stopped = batch.stopped if isinstance(batch, Implicit) else {}
     failures = [
-        Failure(w, float(s * step), int(n), _cause(model, last, w, step, chosen))
+        Failure(w, time, int(n), cause)
         for w, (s, n) in enumerate(last.status.T)
         if s >= 0
+        for time, cause in [stopped.get(w) or (float(s * step), _cause(model, last, w, step, chosen))]
     ]
     zero = np.zeros((len(model.position), last.worlds, 3))
     return Trajectory(
@@ -180,6 +210,7 @@ def simulate(
         step=chosen,
         state=last,
         wall=wall,
+        notes=batch.notes() if isinstance(batch, Implicit) else [],
     )
 
 
