@@ -1,0 +1,64 @@
+"""What the distortions of drive and measurement have in common: a signal sampled, changed and put back."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.drive import Drive, series
+
+Read = Callable[[np.ndarray], np.ndarray]
+"""What an undistorted channel would have read [n, d, W] at times [n, W] [s]."""
+
+
+def sampled(
+    drive: Drive,
+    channels: Sequence[str],
+    duration: float,
+    change: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    *,
+    when: np.ndarray | bool = True,
+) -> Drive:
+    """The drive with `change(times [n], values [n, W]) -> [n, W]` applied to each channel that is not zero throughout.
+
+    It is returned as it is where `when` is zero in all worlds.
+    """
+    moving = [c for c in channels if not drive[c].is_zero]
+    if not (np.any(when) and moving):
+        return drive
+    times, values = drive.series(moving, duration)
+    return drive.replace(**{c: series(times, change(times, v)) for c, v in zip(moving, values, strict=True)})
+
+
+def scaled(drive: Drive, channels: Sequence[str], factor: np.ndarray) -> Drive:
+    """The drive with these channels times a factor [W]."""
+    return drive.replace(
+        **{
+            c: replace(s, offset=s.offset * factor, amplitude=s.amplitude * factor, scale=s.scale * factor)
+            for c in channels
+            if not (s := drive[c]).is_zero
+        }
+    )
+
+
+def voltages(drive: Drive) -> list[str]:
+    """Names of the drive's voltage channels."""
+    return [c for c in drive.signals if c.startswith("voltage_")]
+
+
+def at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
+    """Samples [n, W or 1] at other times [n, W], linearly; the first and last values hold beyond the ends."""
+    columns, when = np.broadcast_arrays(values, when)
+    return np.stack([np.interp(t, times, v) for t, v in zip(when.T, columns.T, strict=True)], axis=1)
+
+
+def lagging(times: np.ndarray, values: np.ndarray, lag: np.ndarray) -> np.ndarray:
+    """First-order lag of sampled values [n, W] with time constants [W] [s], exact for values linear between samples."""
+    lag = np.maximum(lag, 1e-9)
+    out = np.empty(np.broadcast_shapes(values.shape, (1, len(lag))))
+    out[0] = values[0]
+    for n, h in enumerate(np.diff(times)):
+        decay = np.exp(-h / lag)
+        slope = (values[n + 1] - values[n]) / h
+        out[n + 1] = values[n + 1] - slope * lag + (out[n] - values[n] + slope * lag) * decay
+    return out
