@@ -103,10 +103,10 @@ def _parser() -> argparse.ArgumentParser:
     p = command(
         "study",
         _study,
-        "Stride maps over what the paper leaves open, and a robust set",
-        "origami-sim study crawler --samples 64",
+        "Batch studies: stride maps of the crawler, all combinations of the bi-fold",
+        "origami-sim study crawler --samples 64; origami-sim study bifold",
     )
-    p.add_argument("rest", nargs=argparse.REMAINDER, help="see origami-sim study crawler --help")
+    p.add_argument("rest", nargs=argparse.REMAINDER, help="see origami-sim study crawler --help, ... bifold --help")
 
     from origami_sim.calibrate.command import register
 
@@ -181,6 +181,8 @@ def _run(args) -> int:
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(args.scene))
     _save(folder, args.scene, outcome, settings.as_dict(), args.set)
+    if hasattr(module, "draw"):
+        module.draw(settings, outcome, folder)
     _tell(args, outcome, folder)
     return _soundness(outcome.trajectory)
 
