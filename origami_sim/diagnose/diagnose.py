@@ -19,11 +19,11 @@ from origami_sim.diagnose.compare import (
 )
 from origami_sim.diagnose.diagnosis import Candidate, Correlation, Diagnosis, Number, Suspected, Trace
 from origami_sim.diagnose.experiment import propose
-from origami_sim.diagnose.forward import Forward, angle_mask, stacked
+from origami_sim.diagnose.forward import Forward, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.refit import Fit, Weights, fit
-from origami_sim.diagnose.screen import Screening, Signature, screen
+from origami_sim.diagnose.screen import Screening, Signature, again, screen
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.recording import Recording
@@ -39,6 +39,7 @@ class Options:
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; the recording is thinned to it.
         steps: solver steps that one pass over the data may take; longer recordings are sampled evenly.
+        screened: segments that the screening uses at most.
         finalists: suspects that are refitted. most: effects that may be combined.
         significance: of the look-elsewhere test. clear: ratio of the best probability that is a verdict, not a tie.
         seed: of the null draws.
@@ -47,7 +48,8 @@ class Options:
     segment: float | None = None
     start: str | None = None
     rate: float = 200.0
-    steps: int = 400_000
+    steps: int = 150_000
+    screened: int = 6
     finalists: int = 6
     most: int = 3
     significance: float = 0.01
@@ -102,7 +104,7 @@ def diagnose(
     every = suspects(forward.model, recordings, _union(forward))
     if catalogue is not None:
         every = [s for s in every if s.effect in catalogue]
-    screening = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
+    screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
     p_value = look_elsewhere(screening, o.draws, o.seed)
     lap("screen")
     tell("locate", 0.0)
@@ -119,7 +121,7 @@ def diagnose(
     scores = {id(f): scored(forward, f, weights, relax) for f in fits if not f.failed}
     lap("refit")
     tell("combine", 0.0)
-    grown, more = combine(forward, base, fits, scores, every, weights, relax, o, tell)
+    more = combine(forward, base, fits, scores, screening, weights, relax, o, tell)
     fits += more
     lap("combine")
     tell("verdict", 0.0)
@@ -217,12 +219,13 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
     if start == "rest":
         return Forward(subject, recordings, segment=o.segment, start="rest", threads=o.threads)
     whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
+    step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
     length = o.segment
     if length is None:
-        length = whole / (FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings)))
-        length = min(length, predictable(Forward(subject, recordings, segment=min(length, whole), most=4)))
-    probe = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2])
-    most = max(FEWEST, int(o.steps * probe.dt / length)) // len(recordings)
+        count = FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings))
+        length = min(whole / count, max(o.steps * step / FEWEST, whole / 100))
+        length = min(length, predictable(Forward(subject, recordings, segment=length, most=4)))
+    most = max(FEWEST, int(o.steps * step / length)) // len(recordings)
     return Forward(subject, recordings, segment=length, start="fit", most=max(1, most), threads=o.threads)
 
 
@@ -281,9 +284,9 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
         )
     rms = np.sqrt(np.nanmean(np.concatenate(gaps) ** 2, axis=0))
     w = Weights(np.maximum(rms, noise), 0.1)
-    given = fit(forward, Hypothesis(), w, fixed=True)
+    given = fit(forward, Hypothesis(), w, fixed=True, most=3, done=0.01)
     w = weights_from(forward, [given])
-    base = given if not len(theta) else fit(forward, Hypothesis(), w, local=given.local)
+    base = given if not len(theta) else fit(forward, Hypothesis(), w, local=given.local, most=5, done=0.01)
     for _ in range(2):
         if base.failed:
             break
@@ -291,7 +294,7 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
         if np.all(np.abs(np.log(new.deviation / w.deviation)) < 0.1) and abs(np.log(new.part / w.part)) < 0.3:
             break
         w = new
-        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, fixed=not len(theta))
+        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, fixed=not len(theta), most=4)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
     return given, base, w, Weights(noise, 1.0)
@@ -328,7 +331,7 @@ def chosen(screening: Screening, most: int) -> list[Signature]:
     return out
 
 
-def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, most: int = 6) -> Fit:
+def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, most: int = 5) -> Fit:
     """The nominal model with one more suspect, from the best fit so far and the screening's estimate.
 
     A second start from half the strength guards against a bad estimate; if the fit is still worse than the model that
@@ -388,19 +391,18 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     return [*out, both]
 
 
-def combine(forward, base, fits, scores, every, weights, relax, o: Options, tell) -> tuple[Fit | None, list[Fit]]:
+def combine(forward, base, fits, scores, screening: Screening, weights, relax, o: Options, tell) -> list[Fit]:
     """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
     more: list[Fit] = []
     best = leader(fits, scores)
     while best is not None and best is not base and len(best.hypothesis.suspects) < o.most:
-        left = [s for s in every if s.effect not in best.hypothesis.effects]
         tell("combine", len(best.hypothesis.suspects) / o.most)
-        again = screen(forward, left, best, weights)
-        if not again.signatures:
+        left = again(screening, best, without=best.hypothesis.effects)
+        if not left.signatures:
             break
-        p = look_elsewhere(_relaxed(again, relax), o.draws, o.seed)
-        top = again.signatures[0]
-        if p > o.significance or top.score**2 < 0.05 * again.total:
+        p = look_elsewhere(_relaxed(left, relax), o.draws, o.seed)
+        top = left.signatures[0]
+        if p > o.significance or top.score**2 < 0.05 * left.total:
             break
         f = refit(forward, best, top, weights)
         if f.failed:
@@ -421,7 +423,7 @@ def combine(forward, base, fits, scores, every, weights, relax, o: Options, tell
                 more.append(g)
                 if scores[id(g)].evidence >= scores[id(best)].evidence:
                     best = g
-    return best, more
+    return more
 
 
 def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:

@@ -172,6 +172,10 @@ class Forward:
                     out[b] = values
         return [out[b] for b in wanted]
 
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """The solver's step for one world [s]."""
+        return stable_step(*self._world(hypothesis, theta, hypothesis.effects)).dt
+
     def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
         """The model with these effects, and the parameters of one world."""
         count = len(self.subject.nominals)

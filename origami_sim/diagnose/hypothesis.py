@@ -144,6 +144,10 @@ def factor(name: str, spread: float) -> Free:
     return Free(NOMINAL, name, "-", 1.0, 0.3 * spread, 0.0, np.inf, spread)
 
 
+ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
+"""Parameters of a node that stand for its reference position."""
+
+
 def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float], model: Model) -> Parameters:
     """Parameters for the model with the hypothesis' effects, with the fitted numbers in place.
 
@@ -157,6 +161,9 @@ def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float
         fitted = {f.name for f in s.free}
         for p in effect.parameters:
             if p.name in fitted:
+                continue
+            if p.name in ANCHORS:  # tied where it was when it was undeformed
+                out.set(s.effect, p.name, model.position[:, ANCHORS.index(p.name)])
                 continue
             donor = next(
                 (
@@ -240,8 +247,8 @@ def _free(effect: str, name: str, entities) -> Free:
         effect,
         name,
         p.unit,
-        start=p.default if strength else p.typical,
-        scale=abs(p.typical) or 1.0,
+        start=0.0 if strength else p.typical,
+        scale=abs(p.typical) or abs(get(effect).parameter(get(effect).fitted[0]).typical or 1.0),
         lower=p.bounds[0],
         upper=p.bounds[1],
         entities=entities,

@@ -11,7 +11,7 @@ from origami_sim.diagnose.hypothesis import Free, Hypothesis
 STEPS = (1.0, 0.4, 0.1, 0.01)
 """Fractions of a Gauss-Newton step that are tried in one batch."""
 
-DONE = 1e-3
+DONE = 3e-3
 """A fit ends when a step improves it by less than this part of the misfit."""
 
 

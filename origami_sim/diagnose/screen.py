@@ -11,11 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.diagnose.hypothesis import Hypothesis, Suspect, scaled
+from origami_sim.diagnose.hypothesis import Suspect, scaled
 from origami_sim.diagnose.refit import Fit, Weights, whitened
+from origami_sim.errors import InputError
 
 CHUNK = 8
 """Effects that share a program while screening: more compile longer, fewer compile more often."""
+
+SLOWEST = 2.5
+"""How many times smaller than the nominal model's the solver's step may become while screening."""
 
 SILENT = 0.3
 """Norm of a signature [standard deviations] below which a suspect at its largest admissible strength is not excited."""
@@ -27,14 +31,18 @@ class Signature:
 
     Attributes:
         suspect: with its strength's scale set to where its effect is as large as the residual.
-        shape: (R,) whitened change of all predictions per scale, less what nominals and starts could explain; unit norm.
-        norm: its norm before. raw: its norm before the projection.
+        parts: per screened block, the whitened change of the predictions for a change of the strength by `size`.
+        size: that change [SI], signed.
+        shape: (R,) the same less what nominals and starts could explain, all blocks together; unit norm, for a growing
+            strength. norm: its norm for `size`. raw: the norm before the projection.
         score: z of the matched filter, signed; 0 where physics forbids the sign. strength: estimate from it [SI].
         error: standard deviation of that estimate.
         status: "", or why the suspect cannot be tested.
     """
 
     suspect: Suspect
+    parts: list[np.ndarray]
+    size: float
     shape: np.ndarray
     norm: float
     raw: float
@@ -50,50 +58,50 @@ class Screening:
 
     Attributes:
         signatures: of suspects that can be tested. untestable: of those that cannot.
-        residual: (R,) whitened residual without what nominals and starts could explain.
-        total: its sum of squares. degrees: about how many independent numbers it holds.
+        blocks: the blocks that were used.
+        residual: (R,) whitened residual without what nominals and starts could explain. total: its sum of squares.
     """
 
     signatures: list[Signature]
     untestable: list[Signature]
+    blocks: list[int]
     residual: np.ndarray
     total: float
-    degrees: float
 
     def overlap(self) -> np.ndarray:
         """[S, S] isolability |cos| between signatures: 1 where two suspects look the same."""
         shapes = np.stack([s.shape for s in self.signatures]) if self.signatures else np.zeros((0, 1))
         return np.abs(shapes @ shapes.T)
 
-    def explained(self) -> list[float]:
-        """Part of the residual's squares that each signature explains."""
-        return [s.score**2 / self.total if self.total > 0 else 0.0 for s in self.signatures]
-
 
 class Projector:
-    """Removes what nominal parameters (with priors) and starts could explain from whitened columns."""
+    """Removes what the fitted numbers (with priors) and starts could explain from whitened columns."""
 
-    def __init__(self, forward, base: Fit):
+    def __init__(self, base: Fit, blocks: Sequence[int]):
         line = base.linear
         assert line is not None
-        self.line, self.base = line, base
-        count = len(forward.subject.nominals)
-        free = base.free[:count]
-        rows = [line.clear(n, t[:, :count]) for n, t in enumerate(line.tangent)]
-        prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
-        self._rows = np.concatenate(rows)
-        stacked = np.concatenate([self._rows, np.diag(prior)])
-        q, r = np.linalg.qr(stacked) if count else (np.zeros((len(stacked), 0)), np.zeros((0, 0)))
-        size = np.abs(np.diag(r))
-        keep = size > 1e-8 * size.max(initial=1e-300)
-        self._q = q[:, keep]
+        self.line = line
+        self._index = [base.blocks.index(b) for b in blocks]
+        prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in base.free])
+        width = line.tangent[0].shape[1]  # none where only the starts were fitted
+        rows = [line.clear(n, line.tangent[n]) for n in self._index]
+        stacked = np.concatenate([*rows, np.diag(prior)[:, :width]])
         self._pad = len(prior)
+        if width:
+            q, r = np.linalg.qr(stacked)
+            size = np.abs(np.diag(r))
+            self._q = q[:, size > 1e-8 * size.max(initial=1e-300)]
+        else:
+            self._q = np.zeros((len(stacked), 0))
 
     def __call__(self, parts: Sequence[np.ndarray]) -> np.ndarray:
-        """Projected columns (R + priors, ...) from one array [r, ...] per block."""
-        cleared = np.concatenate([self.line.clear(n, p) for n, p in enumerate(parts)])
-        padded = np.concatenate([cleared, np.zeros((self._pad, *cleared.shape[1:]))])
+        """Projected column (R + priors,) from one array [r] per block."""
+        cleared = np.concatenate([self.line.clear(n, p) for n, p in zip(self._index, parts, strict=True)])
+        padded = np.concatenate([cleared, np.zeros(self._pad)])
         return padded - self._q @ (self._q.T @ padded)
+
+    def residual(self) -> np.ndarray:
+        return self([self.line.residual[n] for n in self._index])
 
 
 def screen(
@@ -102,76 +110,131 @@ def screen(
     base: Fit,
     weights: Weights,
     *,
+    most: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Screening:
-    """Scores all suspects against the residual of a fitted nominal model."""
-    project = Projector(forward, base)
-    residual = project(base.linear.residual)  # type: ignore[union-attr]
-    total = float(residual @ residual)
+    """Scores all suspects against the residual of a fitted nominal model.
+
+    What all creases (or panels) would do together is the sum of what each would do, so that only single ones are
+    simulated.
+
+    Args:
+        most: use at most so many blocks, evenly spread.
+    """
+    blocks = list(base.blocks)
+    if most is not None and len(blocks) > most:
+        blocks = [blocks[i] for i in np.round(np.linspace(0, len(blocks) - 1, most)).astype(int)]
+    single = [s for s in suspects if not _together(s, suspects)]
     groups: list[list[Suspect]] = []
-    for s in suspects:
-        for g in groups:
-            effects = {t.effect for t in g}
-            if s.effect in effects or len(effects) < CHUNK:
-                g.append(s)
-                break
+    for s in sorted(single, key=lambda s: s.effect):
+        if groups and (len({t.effect for t in groups[-1]} | {s.effect}) <= CHUNK):
+            groups[-1].append(s)
         else:
             groups.append([s])
-    found: list[Signature] = []
+    simulated: list[tuple[Suspect, float, list[np.ndarray]]] = []
     for n, group in enumerate(groups):
-        found += _signatures(forward, group, base, weights, project, residual)
+        simulated += _changes_of(forward, group, base, weights, blocks)
         if progress:
             progress((n + 1) / len(groups))
-    tested = sorted((s for s in found if not s.status), key=lambda s: -abs(s.score))
-    degrees = _degrees(residual)
-    return Screening(tested, [s for s in found if s.status], residual, total, degrees)
+    for s in suspects:
+        if _together(s, suspects):
+            mine = [m for m in simulated if m[0].effect == s.effect]
+            size = float(np.median([abs(m[1]) for m in mine])) * np.sign(mine[0][1])
+            parts = [sum(m[2][n] * (size / m[1]) for m in mine) for n in range(len(blocks))]
+            simulated.append((s, size, parts))  # type: ignore[arg-type]
+    return rated(simulated, base, blocks)
 
 
-def _degrees(residual: np.ndarray) -> float:
-    return float(max(np.count_nonzero(residual), 1))
+def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
+    """Whether a suspect is the sum of other suspects of its effect at single entities."""
+    return s.entities is None and any(t.effect == s.effect and t.entities is not None for t in suspects)
 
 
-def _signatures(forward, group, base: Fit, weights: Weights, project: Projector, residual) -> list[Signature]:
-    """Signatures of suspects that share a program; strengths are scaled until the effect is as large as the residual."""
-    blocks = list(base.blocks)
-    few = blocks[:: max(1, len(blocks) // 3)][:3]
-    target = {b: float(np.sum(whitened(base.residuals[n], weights) ** 2)) for n, b in enumerate(blocks)}
-    goal = np.sqrt(sum(target[b] for b in few)) + 1.0
-    size = np.array([s.free[0].scale for s in group])
-    settled = np.zeros(len(group), bool)
-    for _ in range(4):  # on a few blocks
-        change = _changes(forward, group, size, base, few)
-        norm = np.array(
-            [np.sqrt(sum(np.sum(whitened(c[k], weights) ** 2) for c in change)) for k in range(len(group))]
-        )
-        ratio = np.where(np.isfinite(norm) & (norm > 0), goal / np.maximum(norm, 1e-30), np.where(norm > 0, 0.01, 100.0))
-        settled = (ratio > 0.3) & (ratio < 3.0)
-        if np.all(settled):
-            break
-        factor = np.where(settled, 1.0, np.clip(ratio, 1e-3, 1e3))
-        size = np.array([_admissible(s, z) for s, z in zip(group, size * factor, strict=True)])
-    change = _changes(forward, group, size, base, blocks)
-    out = []
-    for k, s in enumerate(group):
-        parts = [whitened(c[k], weights) for c in change]
-        s = scaled(s, abs(size[k]))
-        raw = float(np.sqrt(sum(p @ p for p in parts)))
-        if not np.isfinite(raw) or any(np.any(np.isnan(c[k])) for c in change):
-            out.append(Signature(s, residual * 0, 0.0, np.nan, 0.0, 0.0, np.inf, "its simulation goes unstable"))
+def again(screening: Screening, base: Fit, without: Sequence[str] = ()) -> Screening:
+    """The same signatures against the residual of another fit, without new simulations."""
+    kept = [
+        (s.suspect, s.size, s.parts)
+        for s in (*screening.signatures, *screening.untestable)
+        if s.suspect.effect not in without and s.parts
+    ]
+    return rated(kept, base, screening.blocks)
+
+
+def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fit, blocks: list[int]) -> Screening:
+    """Scores of simulated changes against the residual of a fit."""
+    project = Projector(base, blocks)
+    residual = project.residual()
+    found = []
+    for s, size, parts in simulated:
+        nothing = residual * 0
+        if not all(np.all(np.isfinite(p)) for p in parts):
+            found.append(
+                Signature(s, [], size, nothing, 0.0, np.nan, 0.0, 0.0, np.inf, "its simulation goes unstable")
+            )
             continue
+        raw = float(np.sqrt(sum(p @ p for p in parts)))
         shape = project(parts)
         norm = float(np.linalg.norm(shape))
+        s = scaled(s, abs(size))
         if norm < SILENT:
             why = "these recordings do not excite it" if raw < SILENT else "nominal parameters can take its place"
-            out.append(Signature(s, residual * 0, norm, raw, 0.0, 0.0, np.inf, why))
+            found.append(Signature(s, parts, size, nothing, norm, raw, 0.0, 0.0, np.inf, why))
             continue
-        score = float(shape @ residual / norm)
-        strength = score / norm * size[k]
+        score = float(shape @ residual / norm) * np.sign(size)
+        strength = float(shape @ residual / norm**2) * size
         p = s.free[0]
         if not p.lower - 1e-12 <= p.start + strength <= p.upper + 1e-12:
             score, strength = 0.0, 0.0
-        out.append(Signature(s, shape / norm * np.sign(size[k]), norm, raw, score, strength, abs(size[k]) / norm))
+        shape = shape / norm * np.sign(size)
+        found.append(Signature(s, parts, size, shape, norm, raw, score, strength, abs(size) / norm))
+    tested = sorted((s for s in found if not s.status), key=lambda s: -abs(s.score))
+    return Screening(tested, [s for s in found if s.status], blocks, residual, float(residual @ residual))
+
+
+def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
+    """Changes by suspects that share a program; strengths are scaled until the change is as large as the residual."""
+    few = [max(blocks, key=lambda b: _size(base, b, weights))]
+    goal = np.sqrt(_size(base, few[0], weights)) + 1.0
+    size = np.array([s.free[0].scale for s in group])
+    size = np.array([_affordable(forward, base, s, z) for s, z in zip(group, size, strict=True)])
+    for _ in range(3):  # on one block
+        change = _changes(forward, group, size, base, few)
+        with np.errstate(invalid="ignore", over="ignore"):
+            norm = np.array([np.linalg.norm(whitened(change[0][k], weights)) for k in range(len(group))])
+        lost = np.array([np.any(np.isnan(change[0][k])) for k in range(len(group))])
+        ratio = np.where(lost, 0.01, np.where(norm > 0, goal / np.maximum(norm, 1e-30), 100.0))
+        if np.all((ratio > 0.2) & (ratio < 5.0)):
+            break
+        factor = np.where((ratio > 0.2) & (ratio < 5.0), 1.0, np.clip(ratio, 1e-4, 1e4))
+        size = np.array([_affordable(forward, base, s, z) for s, z in zip(group, size * factor, strict=True)])
+    change = _changes(forward, group, size, base, blocks)
+    out = []
+    for k, s in enumerate(group):
+        lost = any(np.any(np.isnan(c[k])) for c in change)
+        parts = [np.full(c[k].size, np.nan) if lost else whitened(c[k], weights) for c in change]
+        out.append((s, float(size[k]), parts))
     return out
+
+
+def _size(base: Fit, block: int, weights: Weights) -> float:
+    r = whitened(base.residuals[base.blocks.index(block)], weights)
+    return float(r @ r)
+
+
+def _affordable(forward, base: Fit, s: Suspect, change: float) -> float:
+    """A change within the bounds that does not make the solver's step much smaller than it is."""
+    change = _admissible(s, change)
+    enough = forward.step(base.hypothesis, base.theta) / SLOWEST
+    rest = [f.start for f in s.free[1:]]
+    hypothesis = base.hypothesis.plus(s)
+    for _ in range(12):
+        try:
+            if forward.step(hypothesis, np.concatenate([base.theta, [s.free[0].start + change], rest])) >= enough:
+                break
+        except InputError:
+            pass
+        change /= 4.0
+    return change
 
 
 def _admissible(s: Suspect, change: float) -> float:
@@ -181,14 +244,12 @@ def _admissible(s: Suspect, change: float) -> float:
 
 
 def _changes(forward, group, size, base: Fit, blocks) -> list[np.ndarray]:
-    """Per block, what each suspect changes in the predictions [S, n, D]."""
-    count = len(forward.subject.nominals)
-    nominal = base.theta[:count]
+    """Per block, what each suspect changes in the predictions [S, n, D]; nan where the simulation fails."""
     rest = [np.array([f.start for f in s.free], float) for s in group]
     for values, z in zip(rest, size, strict=True):
         values[0] += z
-    thetas = [nominal] + [np.concatenate([nominal, v]) for v in rest]
-    hypotheses = [Hypothesis()] + [Hypothesis((s,)) for s in group]
+    thetas = [base.theta] + [np.concatenate([base.theta, v]) for v in rest]
+    hypotheses = [base.hypothesis] + [base.hypothesis.plus(s) for s in group]
     local = np.repeat(base.local[None], len(thetas), axis=0)
     predicted = forward.predict(hypotheses, thetas, local, blocks)
     out = []

@@ -69,6 +69,7 @@ class Batch:
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         # rows a multiple of 4 KiB apart would all fall into one cache set
+        self._pool: ThreadPoolExecutor | None = None
         self._stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
         self.step = state.step
 
@@ -172,8 +173,9 @@ class Batch:
         else:
             wp.load_module(kernel.module, device=self.device)  # compile before the threads meet
             cuts = np.linspace(0, self.worlds, self.threads + 1).astype(int)
-            with ThreadPoolExecutor(self.threads) as pool:
-                list(pool.map(run, cuts[:-1], cuts[1:]))
+            if self._pool is None:
+                self._pool = ThreadPoolExecutor(self.threads)
+            list(self._pool.map(run, cuts[:-1], cuts[1:]))
 
     def advance(self, steps: int, dt: float, speed_limit: float):
         """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""

@@ -1,0 +1,190 @@
+"""What methods without physics would do with the same data: a parameter refit, sparse regression, a Gaussian process.
+
+The two that learn a correction learn it from the residual moment of equation error at each crease (`locate.motion`), on half of
+the segments, as a function of that crease's angle and rate. It is then put into the simulator as a table and predicts the
+other half, with the starts adapted exactly as for every hypothesis.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from origami_sim.diagnose.compare import Score
+from origami_sim.diagnose.diagnosis import Baseline
+from origami_sim.diagnose.forward import Forward
+from origami_sim.diagnose.hypothesis import NOMINAL, Free, Hypothesis, Subject
+from origami_sim.diagnose.locate import motion
+from origami_sim.diagnose.refit import Fit, Weights, fit
+
+KNOTS = 9
+
+THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
+"""Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the training data."""
+
+LIBRARY: dict[str, Callable] = {
+    "1": lambda a, w: np.ones_like(a),
+    "angle": lambda a, w: a,
+    "angle^2": lambda a, w: a**2,
+    "angle^3": lambda a, w: a**3,
+    "sin angle": lambda a, w: np.sin(a),
+    "rate": lambda a, w: w,
+    "rate |rate|": lambda a, w: w * np.abs(w),
+    "rate^3": lambda a, w: w**3,
+    "sign rate": lambda a, w: np.sign(w),
+    "angle rate": lambda a, w: a * w,
+}
+
+
+def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -> list[Baseline]:
+    """Held-out rms of each baseline [SI], on two halves of the segments learnt on the other half."""
+    out = [Baseline("best parameter-only refit", reference.rms.tolist())]
+    motions = [motion(forward, base, r) for r in range(len(forward.recordings))]
+    if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
+        why = "needs recorded coordinates of every crease"
+        nan = [float("nan")] * len(forward.components)
+        return [*out, Baseline("sparse regression (STLSQ)", nan, why), Baseline("Gaussian process", nan, why)]
+    halves = _halves(forward)
+    for name, learn in (("sparse regression (STLSQ)", _sparse), ("Gaussian process", _process)):
+        squares, count, terms = 0.0, 0.0, []
+        for held in halves:
+            tables, said = [], []
+            for k in range(len(forward.articulation.creases)):
+                a, w, y = _samples(forward, motions, k, held)
+                grid_a, grid_w = _range(a), _range(w)
+                values, text = learn(a, w, y, np.linspace(*grid_a, KNOTS), np.linspace(*grid_w, KNOTS))
+                tables.append((grid_a, grid_w, values))
+                said.append(text)
+            terms.append("; ".join(said))
+            f = _predict(forward, base, tables, held, weights)
+            if f is None or f.failed:
+                squares = np.full(len(forward.components), np.nan)
+                break
+            r = np.concatenate(f.residuals)
+            squares = squares + np.nansum(r**2, axis=0)
+            count = count + np.sum(np.isfinite(r), axis=0)
+        rms = np.sqrt(squares / np.maximum(count, 1))
+        out.append(Baseline(name, np.atleast_1d(rms).tolist(), terms[0] if terms else ""))
+    return out
+
+
+def _halves(forward: Forward) -> list[list[int]]:
+    blocks = np.arange(len(forward.blocks))
+    recordings = np.array([b.recording for b in forward.blocks])
+    if recordings.max() > 0:
+        return [list(map(int, blocks[recordings == r])) for r in range(recordings.max() + 1)]
+    return [list(map(int, part)) for part in np.array_split(blocks, 2)]
+
+
+def _samples(forward: Forward, motions, k: int, held: list[int]):
+    """Angle, rate and missing moment of a crease (coordinate k) outside the held-out segments."""
+    parts = []
+    for r, m in enumerate(motions):
+        inside = np.zeros(len(m.times), bool)
+        for b in held:
+            block = forward.blocks[b]
+            if block.recording == r:
+                t0 = forward.recordings[r].times[block.first]
+                inside |= (m.times >= t0) & (m.times <= t0 + block.times[-1])
+        if len(motions) == 1:  # also what lies between held-out segments: nothing leaks from a neighbour
+            span = m.times[inside]
+            inside |= (m.times >= span.min()) & (m.times <= span.max())
+        keep = ~inside
+        parts.append((m.q[k, keep], m.rate[k, keep], m.missing[k, keep]))
+    return (np.concatenate(p) for p in zip(*parts, strict=True))
+
+
+def _range(x: np.ndarray) -> tuple[float, float]:
+    low, high = np.quantile(x, [0.002, 0.998])
+    return float(min(low, -1e-6)), float(max(high, 1e-6))
+
+
+def _sparse(a, w, y, grid_a, grid_w):
+    """Sequentially thresholded least squares over LIBRARY (Brunton, Proctor & Kutz 2016)."""
+    names = list(LIBRARY)
+    columns = np.stack([LIBRARY[n](a, w) for n in names], axis=1)
+    scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    x = columns / scale
+    third = len(y) // 3
+    best, error = np.zeros(len(names)), np.inf
+    for threshold in THRESHOLDS:
+        c = _thresholded(x[third:], y[third:], threshold)
+        e = float(np.mean((y[:third] - x[:third] @ c) ** 2))
+        if e < error:
+            best, error = _thresholded(x, y, threshold), e
+    mesh_a, mesh_w = np.meshgrid(grid_a, grid_w, indexing="ij")
+    table = sum(c / s * LIBRARY[n](mesh_a, mesh_w) for n, c, s in zip(names, best, scale, strict=True))
+    used = [f"{c / s:.2g} {n}" for n, c, s in zip(names, best, scale, strict=True) if c]
+    return np.broadcast_to(table, mesh_a.shape), " + ".join(used) or "nothing"
+
+
+def _thresholded(x, y, threshold):
+    keep = np.ones(x.shape[1], bool)
+    c = np.zeros(x.shape[1])
+    for _ in range(10):
+        c[:] = 0.0
+        if not np.any(keep):
+            break
+        c[keep] = np.linalg.lstsq(x[:, keep], y, rcond=None)[0]
+        new = np.abs(c) > threshold * np.abs(c).max()
+        if np.array_equal(new, keep):
+            break
+        keep = new
+    return c
+
+
+def _process(a, w, y, grid_a, grid_w):
+    """Posterior mean of a Gaussian process with a squared-exponential kernel; length scales by marginal likelihood."""
+    size = 350
+    order = np.argsort(a + 1e-9 * np.arange(len(a)), kind="stable")
+    pick = order[np.linspace(0, len(a) - 1, min(size, len(a))).astype(int)]
+    # neighbours are averaged, because the noise of a second derivative is large
+    spread_a, spread_w = a.std() + 1e-300, w.std() + 1e-300
+    points = np.stack([a[pick] / spread_a, w[pick] / spread_w], axis=1)
+    everything = np.stack([a / spread_a, w / spread_w], axis=1)
+    from scipy.spatial import cKDTree
+
+    owner = cKDTree(points).query(everything)[1]
+    number = np.bincount(owner, minlength=len(pick))
+    z = np.bincount(owner, weights=y, minlength=len(pick)) / np.maximum(number, 1)
+    noise = y.var() / np.maximum(number, 1)
+    gap = (points[:, None] - points[None]) ** 2
+    best, highest = (1.0, 0.5), -np.inf
+    for length in (0.3, 0.6, 1.2, 2.5):
+        for part in (0.01, 0.1, 0.3, 1.0):
+            k = part * y.var() * np.exp(-0.5 * gap.sum(2) / length**2) + np.diag(noise + 1e-12 * y.var())
+            chol = np.linalg.cholesky(k)
+            v = np.linalg.solve(chol, z)
+            likelihood = -0.5 * v @ v - np.log(np.diag(chol)).sum()
+            if likelihood > highest:
+                best, highest = (length, part), likelihood
+    length, part = best
+    k = part * y.var() * np.exp(-0.5 * gap.sum(2) / length**2) + np.diag(noise + 1e-12 * y.var())
+    alpha = np.linalg.solve(k, z)
+    mesh = np.stack(np.meshgrid(grid_a / spread_a, grid_w / spread_w, indexing="ij"), axis=-1).reshape(-1, 2)
+    cross = part * y.var() * np.exp(-0.5 * ((mesh[:, None] - points[None]) ** 2).sum(2) / length**2)
+    return (cross @ alpha).reshape(len(grid_a), len(grid_w)), f"length scale {length:g}, {part:.0%} of the variance"
+
+
+def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weights) -> Fit | None:
+    """Fit of the starts of the held-out segments with the learnt moment in the model."""
+    count = len(forward.subject.nominals)
+    build = forward.subject.build
+    creases = forward.articulation.creases
+
+    def corrected(values):
+        model, parameters, drive = build(values)
+        richer = model.with_effects("crease_discrepancy")
+        out = parameters.for_model(richer)
+        for c, (grid_a, grid_w, table) in zip(creases, tables, strict=True):
+            for name, value in zip(("angle_low", "angle_high", "rate_low", "rate_high"), (*grid_a, *grid_w), strict=True):
+                out.set("crease_discrepancy", name, value, np.array([c]))
+            out.set("crease_discrepancy", "missing_moment", table.reshape(1, 1, -1), np.array([c]))
+        return richer, out, drive
+
+    import copy
+
+    other = copy.copy(forward)
+    nominals = tuple(Free(NOMINAL, f.name, f.unit, t, f.scale) for f, t in zip(base.free[:count], base.theta, strict=False))
+    other.subject = Subject(corrected, nominals)
+    other._built = {}
+    return fit(other, Hypothesis(), weights, theta=base.theta[:count], local=base.local, blocks=held, fixed=True)

@@ -1,0 +1,157 @@
+"""The next experiment: of a menu, the one that would best tell the surviving explanations apart."""
+
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.diagnose.diagnosis import Experiment
+from origami_sim.diagnose.forward import Forward
+from origami_sim.diagnose.refit import Fit, Weights, linearise, whitened
+from origami_sim.drive import Drive, Signal
+
+WANTED = 5.0
+"""Separation d' at which two explanations count as told apart."""
+
+
+def propose(
+    forward: Forward, judged, weights: Weights, *, progress: Callable[[float], None] | None = None, most: int = 4
+) -> list[Experiment]:
+    """Experiments, best first: the expected whitened separation of the best explanation from its strongest rivals.
+
+    Each experiment is simulated under both explanations from the same start. What the rival's numbers, known as well as
+    the recordings left them, and a new start could still absorb is projected out.
+    """
+    rivals = rivals_of(judged)
+    if not rivals:
+        return []
+    menu = _menu(forward)
+    out = []
+    for n, (what, changed) in enumerate(menu):
+        separations = []
+        for rival in rivals:
+            try:
+                separations.append(separation(changed, judged.best, rival, weights))
+            except (FloatingPointError, np.linalg.LinAlgError):
+                separations.append(0.0)
+        d = float(np.min(separations)) if separations else 0.0
+        if np.isfinite(d):
+            repeats = int(np.clip(np.ceil((WANTED / max(d, 0.05)) ** 2), 1, 9999))
+            labels = [judged.best.hypothesis.label, *(r.hypothesis.label for r in rivals)]
+            out.append(Experiment(what, labels, d, repeats))
+        if progress:
+            progress((n + 1) / len(menu))
+    return sorted(out, key=lambda e: -e.expected)[:most]
+
+
+def rivals_of(judged, most: int = 2) -> list[Fit]:
+    """The strongest other explanations that were fitted."""
+    tied = [f for f in judged.tied if f is not judged.best]
+    return tied[:most] if tied else judged.others[:1]
+
+
+def separation(forward: Forward, a: Fit, b: Fit, weights: Weights) -> float:
+    """Expected separation d' of two fitted explanations in an experiment."""
+    blocks = list(range(len(forward.blocks)))
+    local = np.zeros((len(blocks), forward.local))
+    truth = forward.predict(a.hypothesis, a.theta[None], local[None])
+    for n, v in enumerate(truth):
+        if not np.all(np.isfinite(v[0])):
+            return 0.0
+        forward.blocks[n] = replace(forward.blocks[n], values=v[0])
+    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights)
+    rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
+    gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
+    scale = np.array([f.scale for f in b.free])
+    known = np.linalg.pinv(np.linalg.cholesky(b.covariance + 1e-12 * np.diag(scale**2))) * scale
+    stacked = np.concatenate([rows, known])
+    target = np.concatenate([gap, np.zeros(len(known))])
+    if not np.all(np.isfinite(stacked)) or not np.all(np.isfinite(target)):
+        return 0.0
+    x, *_ = np.linalg.lstsq(stacked, target, rcond=None)
+    return float(np.linalg.norm(target - stacked @ x))
+
+
+def _menu(forward: Forward) -> list[tuple[str, Forward]]:
+    """Variants of the recordings' own experiments that a user could make."""
+    out = [("repeat the same experiment", _variant(forward))]
+    if forward.start == "fit":
+        for size in (0.1, 0.3, 2.0):
+            out.append((f"start from {size:g} times the displacement and rate", _variant(forward, size=size)))
+        out.append(("let it run three times as long", _variant(forward, stretch=3.0)))
+    varying = [n for n, s in forward._drives[0].signals.items() if not s.is_zero]
+    if varying:
+        names = ", ".join(sorted({n.split("_")[0] for n in varying}))
+        for gain in (0.3, 0.6, 1.5):
+            out.append((f"{names} at {gain:g} times the level", _variant(forward, gain=gain)))
+        out.append((f"{names} reversed", _variant(forward, gain=-1.0)))
+        for speed in (0.3, 3.0):
+            out.append((f"{names} at {speed:g} times the frequency", _variant(forward, speed=speed)))
+    out.append(("the set-up tilted by 10 degrees about y", _variant(forward, tilt=np.deg2rad(10.0))))
+    out.append(("a tenth more mass on every panel", _variant(forward, load=1.1)))
+    return out
+
+
+def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, tilt=0.0, load=1.0) -> Forward:
+    """The same object in another experiment; recordings keep their frames, whose values are replaced by predictions."""
+    out = copy.copy(forward)
+    arm = forward.articulation
+    out.blocks = []
+    chosen = forward.blocks[:: max(1, len(forward.blocks) // 4)][:4]
+    for b in chosen:
+        pose, rates = b.pose, b.rates
+        if forward.start == "fit" and size != 1.0 and not arm.floating:
+            rest = arm.reference()
+            pose = arm.moved(rest, size * (b.pose.angles - rest.angles))
+            rates = size * rates
+        times = b.times
+        if stretch != 1.0:
+            step = times[1] - times[0]
+            times = np.arange(round((times[-1] / step) * stretch) + 1) * step
+        out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=np.zeros((len(times), b.values.shape[1]))))
+    if gain != 1.0 or speed != 1.0:
+        out._drives = [_changed(d, gain, speed) for d in forward._drives]
+    if tilt or load != 1.0:
+        build = forward.subject.build
+
+        def other(values):
+            model, parameters, drive = build(values)
+            parameters = parameters.copy()
+            if load != 1.0:
+                parameters.set("inertia", "mass", parameters["inertia", "mass"] * load)
+            if tilt and ("gravity", "gravity_z") in set(parameters):
+                gx, gz = parameters["gravity", "gravity_x"], parameters["gravity", "gravity_z"]
+                parameters.set("gravity", "gravity_x", np.cos(tilt) * gx - np.sin(tilt) * gz)
+                parameters.set("gravity", "gravity_z", np.sin(tilt) * gx + np.cos(tilt) * gz)
+            return model, parameters, drive
+
+        out.subject = replace(forward.subject, build=other)
+    out._built = {}
+    return out
+
+
+def _changed(drive: Drive, gain: float, speed: float) -> Drive:
+    changed = {}
+    for name, s in drive.signals.items():
+        if s.is_zero:
+            continue
+        times = None if s.times is None else s.times / speed
+        changed[name] = Signal(
+            offset=gain * np.asarray(s.offset),
+            amplitude=gain * np.asarray(s.amplitude),
+            frequency=speed * np.asarray(s.frequency),
+            phase=s.phase,
+            times=times,
+            values=s.values,
+            scale=gain * np.asarray(s.scale),
+        )
+        if times is not None and s.values is not None and speed > 1.0:  # a run must not outlast its drive: repeat it
+            span = times[-1] - times[0]
+            count = int(np.ceil(speed)) + 1
+            tiled = np.concatenate([times + k * (span + (times[1] - times[0])) for k in range(count)])
+            changed[name] = replace(changed[name], times=tiled, values=np.concatenate([s.values] * count))
+    return drive.replace(**changed)
+
+
+__all__ = ["propose", "separation", "whitened"]

@@ -1,0 +1,275 @@
+"""The verdict: which explanation the recordings support, in one of eight words and one sentence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from origami_sim.diagnose.compare import Score, Weights, difference, probabilities
+from origami_sim.diagnose.refit import Fit, whitened
+from origami_sim.diagnose.screen import Screening
+from origami_sim.effects import get
+from origami_sim.recording.units import quantity
+
+FLOOR = 1.3
+"""Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
+
+REMOVED = 0.5
+"""Part of the removable squared error that named physics must remove on held-out data; with less it is UNKNOWN."""
+
+
+@dataclass
+class Judgement:
+    """The verdict with what led to it.
+
+    Attributes:
+        verdict, sentence, probability, chosen: as in `Diagnosis`. best: the fit of the verdict. tied: fits in the tie.
+        removed: part of the removable squared error that it removes on held-out data. left: residual over noise after it.
+        onset: first lasting departure of the refitted nominal [s]; nan: none. others: other explanations, best first.
+    """
+
+    verdict: str
+    sentence: str
+    probability: float
+    chosen: list[str]
+    best: Fit
+    tied: list[Fit]
+    removed: float
+    left: float
+    onset: float
+    notes: list[str] = field(default_factory=list)
+    others: list[Fit] = field(default_factory=list)
+
+
+def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, relax, o):
+    """Weighs all fits; see `docs/diagnosis.md` for the rules in words."""
+    sigma = noise.deviation
+    rows = [f for f in fits if id(f) in scores]
+    p = probabilities([scores[id(f)].evidence for f in rows])
+    order = np.argsort(-p)
+    best = rows[order[0]]
+    notes = _notes(forward, rows, screening, sigma)
+    rms_base, rms_best = scores[id(base)].rms, scores[id(best)].rms
+    over = float(np.max(rms_base / sigma))
+    left = float(np.max(rms_best / sigma))
+    removed = removable(rms_base, rms_best, sigma)
+    onset = departure(forward, base, sigma)
+    others = [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)]
+
+    def result(verdict, sentence, probability, chosen, fit=best, tied=()):
+        return Judgement(
+            verdict, sentence, float(probability), list(chosen), fit, list(tied), removed, left, onset, notes, others
+        )
+
+    gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
+    reproducible = best is not base and gain > 2.0 * error and gain > 2.0
+    if best is base or p_value > o.significance or not reproducible:
+        if not screening.signatures and over > FLOOR:
+            return result(
+                "UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base
+            )
+        if over <= FLOOR or (p_value > o.significance and not structured(forward, base, sigma)):
+            return _adequate_or_parameter(forward, given, base, weights, result, over, p[rows.index(base)])
+        if p_value <= o.significance and best is not base and p[rows.index(base)] < 0.5:
+            names = _distinct([rows[i] for i in order])[:2]
+            return result(
+                "UNKNOWN",
+                f"The refitted model misses the recordings by {over:.1f} times the noise, and no suspect explains it "
+                f"reproducibly: the closest, {names[0]}, gains {gain:.1f} +- {error:.1f} in held-out log score.",
+                1 - p[rows.index(base)],
+                [],
+                base,
+            )
+        return result(
+            "UNKNOWN",
+            f"The refitted model misses the recordings by {over:.1f} times the noise, and nothing in the catalogue "
+            f"explains it (chance of so good a suspect under noise: {p_value:.2g}).",
+            p[rows.index(base)],
+            [],
+            base,
+        )
+    tied = [rows[i] for i in order if p[i] > 0.0]
+    total, kept = 0.0, []
+    for f in tied:
+        kept.append(f)
+        total += p[rows.index(f)]
+        if total >= 0.95:
+            break
+    same = [f for f in rows if _effects(f) == _effects(best)]
+    mechanism_p = float(sum(p[rows.index(f)] for f in same))
+    fall = (
+        f"held-out error falls from {over:.1f} to {left:.1f} times the noise floor "
+        f"(of what could be removed, {max(removed, 0.0):.0%} is)"
+    )
+    if removed < REMOVED and left > 1.5:
+        return result(
+            "UNKNOWN",
+            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, removes only "
+            f"{max(removed, 0.0):.0%} of the removable error; {fall}.",
+            mechanism_p,
+            [best.hypothesis.label],
+        )
+    rivals = [f for f in kept if _effects(f) != _effects(best)]
+    if mechanism_p < o.clear and rivals:
+        names = _distinct(kept)
+        return result(
+            "TIE",
+            f"{_join(names)} explain the recordings about equally well (p = "
+            + ", ".join(f"{p[rows.index(f)]:.2f}" for f in kept[: len(names)])
+            + f"); {fall}.",
+            total,
+            names,
+            best,
+            kept,
+        )
+    kinds = {kind(best)}
+    if len(best.hypothesis.suspects) > 1:
+        word = "SEVERAL"
+        text = f"{len(best.hypothesis.suspects)} effects are missing: {_say(best)} (p = {mechanism_p:.2f}); {fall}."
+    elif kinds == {"measurement"}:
+        word = "MEASUREMENT"
+        text = f"The measurement, not the device, explains the mismatch: {_say(best)} (p = {mechanism_p:.2f}); {fall}."
+    else:
+        word = "MECHANISM"
+        s = best.hypothesis.suspects[0]
+        where = "" if len(same) == 1 or p[rows.index(best)] > 0.9 * mechanism_p else " (the site is less certain)"
+        text = f"At {s.site} the model lacks {_say(best)}{where}, p = {mechanism_p:.2f}; {fall}."
+    return result(word, text, mechanism_p, [s.label for s in best.hypothesis.suspects])
+
+
+def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, result, over, probability):
+    count = len(base.free)
+    before = float(sum(whitened(r, weights) @ whitened(r, weights) for r in given.residuals))
+    better = before - base.misfit - base.penalty
+    from scipy.stats import chi2
+
+    deviation = np.array([f.spread for f in base.free])
+    moved = [(f, t) for f, t in zip(base.free, base.theta, strict=True)]
+    if count and better > chi2.ppf(0.99, count):
+        far = sorted(zip(moved, deviation, strict=True), key=lambda m: -abs(m[0][1] - m[0][0].start) / m[1])
+        (f, t), spread = far[0]
+        text = (
+            f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
+            f"{quantity(f.start, f.unit, digits=3)} to {quantity(t, f.unit, digits=3)}, "
+            f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; what is left is {over:.1f} times the noise."
+        )
+        return result("PARAMETER", text, probability, [f.label for (f, t), s in far if abs(t - f.start) > s], base)
+    return result(
+        "ADEQUATE", f"The model is adequate: what is left is {over:.2f} times the noise.", probability, [], base
+    )
+
+
+def kind(f: Fit) -> str:
+    """nominal, mechanism or measurement."""
+    kinds = {s.kind for s in f.hypothesis.suspects}
+    if not kinds:
+        return "nominal"
+    return "measurement" if kinds == {"measurement"} else "mechanism"
+
+
+def removable(before: np.ndarray, after: np.ndarray, sigma: np.ndarray) -> float:
+    """(E0^2 - E1^2) / (E0^2 - sigma^2), components pooled in units of their noise."""
+    e0, e1 = float(np.sum((before / sigma) ** 2)), float(np.sum((after / sigma) ** 2))
+    excess = e0 - len(sigma)
+    return (e0 - e1) / excess if excess > 0 else 0.0
+
+
+def structured(forward, f: Fit, sigma: np.ndarray) -> bool:
+    """Whether residuals beyond the noise have a memory, so that they are not just more noise."""
+    from origami_sim.diagnose.compare import memory
+
+    rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
+    return bool(np.any(rms > FLOOR * sigma) and memory([r / sigma for r in f.residuals]) > 3.0)
+
+
+def departure(forward, f: Fit, sigma: np.ndarray) -> float:
+    """First time at which five values in a row are beyond five standard deviations of the noise; nan: never."""
+    first = np.nan
+    for n, b in enumerate(f.blocks):
+        block = forward.blocks[b]
+        far = np.abs(f.residuals[n]) > 5.0 * sigma
+        for d in range(far.shape[1]):
+            run = np.convolve(far[:, d], np.ones(5), "valid")
+            hits = np.flatnonzero(run >= 5)
+            if len(hits):
+                t = forward.recordings[block.recording].times[block.first] + block.times[hits[0]]
+                first = t if np.isnan(first) else min(first, t)
+    return float(first)
+
+
+def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:
+    """Why a row won or lost, in words."""
+    if f is judged.best:
+        return "chosen" if judged.verdict not in ("UNKNOWN", "UNTESTABLE") else "closest, but not enough"
+    d, error = difference(scores[id(f)], scores[id(judged.best)])
+    evidence = scores[id(f)].evidence - scores[id(judged.best)].evidence
+    if f is base:
+        return f"predicts held-out data worse by {-d:.1f} +- {error:.1f} in log score" if d < 0 else "the simplest"
+    if any(t in judged.tied for t in (f,)):
+        return f"in the tie: evidence {evidence:+.1f}"
+    extra = len(f.free) - len(judged.best.free)
+    if d > -2 and extra > 0:
+        return f"no better, with {extra} more numbers"
+    return f"predicts held-out data worse by {-d:.1f} +- {error:.1f}; evidence {evidence:+.1f}"
+
+
+def distrust(f: Fit, forward) -> str:
+    """When not to trust a row."""
+    out = []
+    for n, t, b in zip(f.free, f.theta, f.at_bound, strict=True):
+        if b:
+            out.append(f"{n.label} lies on its bound ({t:.3g} {n.unit})")
+        elif np.isfinite(n.spread) and abs(t - n.start) > 3 * n.spread:
+            out.append(f"{n.label} left its prior by {abs(t - n.start) / n.spread:.1f} sd")
+    deviation = f.deviations()
+    for n, t, d in zip(f.free[len(forward.subject.nominals) :], f.theta[len(forward.subject.nominals) :],
+                       deviation[len(forward.subject.nominals) :], strict=True):  # fmt: skip
+        if abs(t) < 2 * d:
+            out.append(f"{n.label} is not told from zero")
+    return "; ".join(out)
+
+
+def _notes(forward, rows: Sequence[Fit], screening: Screening, sigma) -> list[str]:
+    notes = []
+    if len({b.recording for b in forward.blocks}) == 1:
+        notes.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
+    lost = [s.suspect.label for s in screening.untestable]
+    if lost:
+        notes.append(f"Not tested, because these recordings do not tell: {', '.join(lost)}.")
+    return notes
+
+
+def _effects(f: Fit) -> tuple[str, ...]:
+    return tuple(sorted(s.effect for s in f.hypothesis.suspects))
+
+
+def _distinct(fits: Sequence[Fit]) -> list[str]:
+    return list(dict.fromkeys(f.hypothesis.label for f in fits))
+
+
+def _say(f: Fit) -> str:
+    """The effects of a fit with their strengths and intervals."""
+    out = []
+    deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
+    value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    for s in f.hypothesis.suspects:
+        n = s.free[0]
+        t, d = value[id(n)], deviation[id(n)]
+        low, high = (quantity(v, n.unit) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
+        what = title(s.effect)
+        out.append(f"{what} at {s.site} ({n.name.replace('_', ' ')} {quantity(t, n.unit)}, 95 %: {low} to {high})")
+    return _join(out)
+
+
+def title(effect: str) -> str:
+    """The first words of an effect's file: its name as a physicist would say it."""
+    import importlib
+
+    e = get(effect)
+    text = importlib.import_module(f"origami_sim.effects.{e.name}").__doc__ or e.name
+    text = text.strip().splitlines()[0].split(":")[0].rstrip(".")
+    return text[0].lower() + text[1:] if not text[:2].isupper() else text
+
+
+def _join(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
