@@ -49,6 +49,7 @@ class Articulation:
         self.model = model
         x, panels = model.position, model.triangle_panel
         nodes = [np.unique(model.triangles[panels == p]) for p in range(int(panels.max(initial=-1)) + 1)]
+        nodes = nodes or [np.arange(len(x))]  # without panels it is one body
         held = ~np.any(model.free, axis=1)
         fixed = [p for p, n in enumerate(nodes) if len(n) and np.all(held[n])]
         self.floating = not np.any(held)

@@ -38,7 +38,7 @@ LIBRARY: dict[str, Callable] = {
 def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -> list[Baseline]:
     """Held-out rms of each baseline [SI], on two halves of the segments learnt on the other half."""
     out = [Baseline("best parameter-only refit", reference.rms.tolist())]
-    motions = [motion(forward, base, r) for r in range(len(forward.recordings))]
+    motions = [motion(forward, base, r) for r in range(len(forward.recordings))] if forward.start == "fit" else [None]
     if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
         why = "needs recorded coordinates of every crease"
         nan = [float("nan")] * len(forward.components)

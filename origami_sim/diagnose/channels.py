@@ -32,7 +32,11 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
         node = _index(model, channel, "node", len(model.position))
         if channel.kind == "marker":
             return np.moveaxis(x[:, node], 2, 1)
-        return np.linalg.norm(x[:, node] - model.position[node], axis=-1)[:, None]
+        moved = x[:, node] - model.position[node]
+        along = channel.attachment.get("direction")
+        if along is None:
+            return np.linalg.norm(moved, axis=-1)[:, None]
+        return (moved @ (np.asarray(along, float) / np.linalg.norm(along)))[:, None]
     raise InputError(
         "this kind of channel cannot be diagnosed yet",
         field=f"channels.{channel.name}.kind",

@@ -5,7 +5,7 @@ its blocks when the numbers are fitted to all other blocks; only the starts of t
 same rule for every hypothesis.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,6 +132,33 @@ def probabilities(scores: Sequence[float], temperature: float = TEMPERATURE) -> 
     a = np.where(np.isfinite(a), a, -np.inf)
     e = np.exp(a - a.max())
     return e / e.sum()
+
+
+def reproducible(a: Score, b: Score) -> bool:
+    """Whether a predicts held-out data better than b, and not by luck in one place.
+
+    The gain must come from at least two blocks (if there are as many), and what other blocks lose must be a small part
+    of it. A standard error over blocks would not do: an effect of large motions gains nothing where the motion has died.
+    """
+    d = a.held_out - b.held_out
+    enough = np.count_nonzero(d > 1.0) >= min(2, len(d))
+    return bool(d.sum() > 4.0 and enough and -d[d < 0].sum() < 0.2 * d[d > 0].sum())
+
+
+def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:
+    """Evidence of each fit; one that is no reproducible gain over a simpler one that it contains falls below that."""
+    out = []
+    for f in fits:
+        evidence = scores[id(f)].evidence
+        mine = {s.label for s in f.hypothesis.suspects}
+        for g in fits:
+            inner = {s.label for s in g.hypothesis.suspects}
+            if inner < mine:
+                a, b = scores[id(f)], scores[id(g)]
+                if not (reproducible(a, b) and a.evidence > b.evidence + 3.0):
+                    evidence = min(evidence, b.evidence - 5.0)
+        out.append(evidence)
+    return out
 
 
 def difference(a: Score, b: Score) -> tuple[float, float]:

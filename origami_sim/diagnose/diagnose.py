@@ -1,7 +1,7 @@
 """`diagnose`: from a model and recordings to a verdict, stage by stage."""
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,16 +14,22 @@ from origami_sim.diagnose.compare import (
     effective_samples,
     memory,
     probabilities,
+    reproducible,
     score,
+    supported,
     weights_from,
 )
 from origami_sim.diagnose.diagnosis import Candidate, Correlation, Diagnosis, Number, Suspected, Trace
 from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.forward import Forward, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
+from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, screen
+from origami_sim.diagnose.static import CurveForward
+from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.recording import Recording
@@ -69,19 +75,24 @@ Report = Callable[[str, float], None]
 
 
 def diagnose(
-    subject: Subject,
-    recordings: Sequence[Recording],
+    subject: Source,
+    recordings: Sequence[Recording] | Recording,
     options: Options | None = None,
     *,
     catalogue: Sequence[str] | None = None,
+    priors: Mapping[str, float | str] | None = None,
     progress: Report | None = None,
+    keep: Keep | None = None,
 ) -> Diagnosis:
     """Locates the mismatch between a model and recordings of one object, and says what it is.
 
     Args:
-        subject: the model and what is uncertain in it. recordings: of one object, with their drives.
+        subject: the model and what is uncertain in it; or a scene, or (model, parameters), see `subject_of`.
+        recordings: of one object, with their drives.
         options: see `Options`. catalogue: suspect only these effects (default: all that can act).
+        priors: standard deviations of the model's numbers, see `subject_of`.
         progress: called with the stage and the fraction done.
+        keep: remembers predictions, so that an interrupted diagnosis resumes, and the fits.
 
     Raises:
         InputError: no recording, recordings of different channels, too few frames, a drive that the model does not know.
@@ -95,20 +106,25 @@ def diagnose(
         seconds[stage] = clock.perf_counter() - began - sum(seconds.values())
 
     tell("prepare", 0.0)
-    recordings = prepared(recordings, o.rate)
+    subject = subject_of(subject, priors)
+    recordings = prepared([recordings] if isinstance(recordings, Recording) else list(recordings), o.rate)
     forward = arranged(subject, recordings, o)
+    if keep is not None:
+        keep.follow(forward)
     tell("nominal", 0.0)
     given, base, weights, free_start = nominal_fits(forward)
     lap("nominal")
     tell("screen", 0.0)
-    every = suspects(forward.model, recordings, _union(forward))
+    every = suspects(forward.model, recordings, _union(forward), forward.parameters)
+    if isinstance(forward, CurveForward):
+        every = forward.admitted(every)
     if catalogue is not None:
         every = [s for s in every if s.effect in catalogue]
     screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
     p_value = look_elsewhere(screening, o.draws, o.seed)
     lap("screen")
     tell("locate", 0.0)
-    places = locate(forward, base)
+    places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, base)
     lap("locate")
     fits = [base]
     finalists = chosen(screening, o.finalists)
@@ -127,6 +143,8 @@ def diagnose(
     tell("verdict", 0.0)
     judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, relax, o)
     best = judged.best
+    if keep is not None:
+        keep.fits = {"before": given, "refitted": base, "after": best}
     experiments = propose(forward, judged, weights, progress=lambda part: tell("next experiment", part))
     lap("next experiment")
     tell("baselines", 0.0)
@@ -188,12 +206,13 @@ def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
                 value=", ".join(r.channels),
                 allowed=", ".join(names),
             )
-        if len(r.times) < 16:
+        fewest = 8 if r.by_step else 16
+        if len(r.times) < fewest:
             raise InputError(
                 "a recording is too short for a diagnosis",
                 field=f"{r.name}.frames",
                 value=len(r.times),
-                allowed="at least 16",
+                allowed=f"at least {fewest}",
             )
         every = max(1, int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6))
         out.append(thinned(r, every))
@@ -209,17 +228,24 @@ def thinned(recording: Recording, every: int) -> Recording:
         recording,
         times=recording.times[cut],
         channels={n: replace(c, values=c.values[cut]) for n, c in recording.channels.items()},
-        drive={n: d if d.constant else replace(d, values=d.values[cut]) for n, d in recording.drive.items()},
+        drive={
+            n: d if d.constant or d.times is not None else replace(d, values=d.values[cut])
+            for n, d in recording.drive.items()
+        },
     )
 
 
 def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forward:
-    """Segments that are short enough to be predictable, and start modes."""
+    """Segments that are short enough to be predictable, and start modes; for curves, what predicts them."""
+    curve = curves(subject, recordings, o.threads)
+    if curve is not None:
+        return curve
     start = o.start or starting(subject, recordings)
     if start == "rest":
         return Forward(subject, recordings, segment=o.segment, start="rest", threads=o.threads)
     whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
     step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
+    step = min(step, float(np.median(np.diff(recordings[0].times))))  # without stiffness any step is stable
     length = o.segment
     if length is None:
         count = FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings))
@@ -297,6 +323,8 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
         base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, fixed=not len(theta), most=4)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
+    if len(theta):  # compared like with like: the same weights, starts as well fitted
+        given = fit(forward, Hypothesis(), w, local=base.local, fixed=True, most=4)
     return given, base, w, Weights(noise, 1.0)
 
 
@@ -404,26 +432,51 @@ def combine(forward, base, fits, scores, screening: Screening, weights, relax, o
         top = left.signatures[0]
         if p > o.significance or top.score**2 < 0.05 * left.total:
             break
-        f = refit(forward, best, top, weights)
-        if f.failed:
+        rivals = [g for g in left.signatures if g.suspect.effect == top.suspect.effect]  # the same at other sites
+        tried = []
+        for g in [g for g in rivals if g.score**2 > 0.7 * top.score**2][:3]:
+            f = refit(forward, best, g, weights)
+            if not f.failed:
+                scores[id(f)] = scored(forward, f, weights, relax)
+                tried.append(f)
+        if not tried:
             break
-        scores[id(f)] = scored(forward, f, weights, relax)
-        more.append(f)
-        gain, error = difference(scores[id(f)], scores[id(best)])
-        if not (gain > 2.0 * error and scores[id(f)].evidence > scores[id(best)].evidence + 3.0):
+        more += tried
+        f = max(tried, key=lambda f: scores[id(f)].evidence)
+        if not (reproducible(scores[id(f)], scores[id(best)]) and scores[id(f)].evidence > scores[id(best)].evidence + 3.0):
             break
         best = f
-        for s in best.hypothesis.suspects[:-1]:  # is an earlier one still needed?
-            rest = tuple(t for t in best.hypothesis.suspects if t is not s)
-            if any(g.hypothesis.suspects == rest for g in (*fits, *more)):
-                continue
-            g = fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
-            if not g.failed:
-                scores[id(g)] = scored(forward, g, weights, relax)
-                more.append(g)
-                if scores[id(g)].evidence >= scores[id(best)].evidence:
-                    best = g
+    if best is not None and len(best.hypothesis.suspects) > 1:
+        more += swaps(forward, base, best, [*fits, *more], scores, screening, weights, relax)
     return more
+
+
+def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, weights, relax) -> list[Fit]:
+    """Of several effects, each is left out in turn, and the others that could take its place are tried."""
+    out: list[Fit] = []
+    for s in best.hypothesis.suspects:
+        rest = tuple(t for t in best.hypothesis.suspects if t is not s)
+        known = [f for f in (*fits, *out) if _same(f.hypothesis, rest) and not f.failed]
+        inner = known[0] if known else fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
+        if inner.failed:
+            continue
+        if not known:
+            scores[id(inner)] = scored(forward, inner, weights, relax)
+            out.append(inner)
+        left = again(screening, inner, without=inner.hypothesis.effects)
+        for g in left.signatures[:3]:
+            wanted = (*inner.hypothesis.suspects, g.suspect)
+            if any(_same(f.hypothesis, wanted) for f in (*fits, *out)):
+                continue
+            f = refit(forward, inner, g, weights)
+            if not f.failed:
+                scores[id(f)] = scored(forward, f, weights, relax)
+                out.append(f)
+    return out
+
+
+def _same(hypothesis: Hypothesis, wanted: tuple[Suspect, ...]) -> bool:
+    return {s.label for s in hypothesis.suspects} == {s.label for s in wanted}
 
 
 def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
@@ -436,7 +489,7 @@ def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
 def leader(fits: Sequence[Fit], scores: dict[int, Score]) -> Fit | None:
     """The fit of the highest evidence."""
     good = [f for f in fits if id(f) in scores]
-    return max(good, key=lambda f: scores[id(f)].evidence) if good else None
+    return good[int(np.argmax(supported(good, scores)))] if good else None
 
 
 def relaxation(old: Weights, new: Weights) -> float:
@@ -460,7 +513,7 @@ def table(forward, given: Fit, fits: list[Fit], scores, judged, screening: Scree
     """All explanations that were fitted, best first, with the reason why each lost."""
     base = fits[0]
     rows = [f for f in fits if id(f) in scores]
-    p = probabilities([scores[id(f)].evidence for f in rows])
+    p = probabilities(supported(rows, scores))
     out = []
     for f, probability in zip(rows, p, strict=True):
         gain, error = difference(scores[id(f)], scores[id(base)]) if f is not base else (0.0, 0.0)

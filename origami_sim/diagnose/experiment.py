@@ -9,6 +9,7 @@ import numpy as np
 from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.refit import Fit, Weights, linearise, whitened
+from origami_sim.diagnose.static import CurveForward
 from origami_sim.drive import Drive, Signal
 
 WANTED = 5.0
@@ -26,7 +27,7 @@ def propose(
     rivals = rivals_of(judged)
     if not rivals:
         return []
-    menu = _menu(forward)
+    menu = forward.menu() if isinstance(forward, CurveForward) else _menu(forward)
     out = []
     for n, (what, changed) in enumerate(menu):
         separations = []

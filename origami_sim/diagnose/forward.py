@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose.articulation import Articulation, Pose
 from origami_sim.diagnose.channels import read
@@ -14,9 +16,13 @@ from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.observe import _index
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import stable_step
+
+LEAD = 1500
+"""Frames before a segment along which laws with memory are taken, at most; the motion there is as recorded."""
 
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
@@ -72,6 +78,7 @@ class Forward:
         self.model, self.parameters, self.drive = subject.build(self.values)
         self.articulation = Articulation(self.model)
         self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._paths: dict[int, np.ndarray | None] = {}
         self._built: dict[tuple, tuple[Model, Parameters]] = {}
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
@@ -103,7 +110,7 @@ class Forward:
     def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray]:
         """Pose and rates of the coordinates at a frame, from a local polynomial of the channels."""
         level, slope = local_line(recording.times, values, noise, first)
-        arm, pose = self.articulation, self.articulation.reference()
+        arm, pose = self.articulation, self._placed(recording, level)
         for _ in range(30):
             now, tangent = self._channel_tangent(recording, pose, level)
             weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
@@ -117,6 +124,26 @@ class Forward:
         weight = np.where(np.isfinite(slope), 1.0 / noise, 0.0)
         rates = np.linalg.lstsq(tangent * weight[:, None], np.nan_to_num(slope) * weight, rcond=1e-8)[0]
         return pose, rates
+
+    def _placed(self, recording: Recording, level: np.ndarray) -> Pose:
+        """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
+
+        From there the pose is found in small turns, however far the device has turned.
+        """
+        pose, row = self.articulation.reference(), 0
+        nodes, places = [], []
+        for channel in recording.channels.values():
+            width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
+            if channel.kind == "marker" and np.all(np.isfinite(level[row : row + width])):
+                nodes.append(_index(self.model, channel, "node", len(self.model.position)))
+                places.append(level[row : row + width])
+            row += width
+        if not self.articulation.floating or len(nodes) < 3:
+            return pose
+        here, there = self.model.position[nodes], np.array(places)
+        turn = Rotation.align_vectors(there - there.mean(0), here - here.mean(0))[0].as_matrix()
+        centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
+        return Pose(turn[None], centre[None], pose.angles)
 
     def _channel_tangent(self, recording: Recording, pose: Pose, near: np.ndarray):
         """Channels (D,) of a pose, turned as in `near`, and their derivatives by the coordinates [D, m]."""
@@ -168,13 +195,14 @@ class Forward:
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             for group in _by_length(self.blocks, mine):
-                for b, values in zip(group, self._roll(r, group, worlds, local), strict=True):
+                for b, values in zip(group, self._roll(r, group, each, worlds, local), strict=True):
                     out[b] = values
         return [out[b] for b in wanted]
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
-        """The solver's step for one world [s]."""
-        return stable_step(*self._world(hypothesis, theta, hypothesis.effects)).dt
+        """The solver's step for one world, a frame at most [s]."""
+        frame = float(np.median(np.diff(self.recordings[0].times)))
+        return min(frame, stable_step(*self._world(hypothesis, theta, hypothesis.effects)).dt)
 
     def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
         """The model with these effects, and the parameters of one world."""
@@ -186,7 +214,9 @@ class Forward:
         richer = model.with_effects(*effects)
         return richer, apply(parameters, hypothesis, values[count:], richer)
 
-    def _roll(self, r: int, group: list[int], worlds: list[tuple[Model, Parameters]], local) -> list[np.ndarray]:
+    def _roll(
+        self, r: int, group: list[int], each: list[Hypothesis], worlds: list[tuple[Model, Parameters]], local
+    ) -> list[np.ndarray]:
         """[K, n, D] for blocks of equal length of one recording; the batch runs over worlds, then over blocks."""
         recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
         k, count = len(worlds), len(blocks)
@@ -199,11 +229,12 @@ class Forward:
         drive = shifted(self._drives[r], recording.times[[b.first for b in blocks]] - recording.times[0], span, k)
         drive = distorted(model, parameters, drive, span)
         state = self._state(model, worlds, blocks, None if local is None else local[:, group])
+        state.memory[:] = self._memory(r, model, parameters, blocks, k)
         chosen = stable_step(model, parameters)
         substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
         batch = Batch(model, parameters, drive, state, threads=self.threads)
         lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
-        limit = 0.5 * lengths.min(initial=1.0) * substeps / step
+        limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
         raw = []
         for n in range(frames):
             batch.advance(substeps if n else 0, step / substeps, limit)
@@ -215,7 +246,7 @@ class Forward:
         grid = np.arange(frames) * step
         distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
-            values = self._measured(model, parameters, recording, distort, grid, channels, times)
+            values = self._measured(model, parameters, recording, distort, each, grid, channels, times)
         elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
             values = channels[: len(times)]
         else:
@@ -251,23 +282,74 @@ class Forward:
         state.v[:] = np.concatenate(vs, axis=1)
         return state
 
-    def _measured(self, model, parameters, recording, distort, grid, channels, times) -> np.ndarray:
+    def _memory(self, r: int, model: Model, parameters: Parameters, blocks: list[Block], k: int) -> np.ndarray:
+        """Memory [M, W] of the laws where the segments start: that of the recorded motion up to there.
+
+        All nodes are held and carried along as recorded, so that the laws feel the motion without changing it.
+        """
+        count = len(blocks)
+        start = State.at_rest(model, k * count)
+        firsts = np.array([b.first for b in blocks])
+        lead = min(LEAD, int(firsts.max(initial=0)))
+        if not len(start.memory) or not lead:
+            return start.memory
+        path = self._path(r)
+        if path is None:
+            return start.memory
+        step = float(np.median(np.diff(self.recordings[r].times)))
+        frames = np.maximum(firsts[:, None] - lead + np.arange(lead + 1), 0)  # held still before the recording
+        frames = np.minimum(frames, len(path) - 1)
+        held = Model(**{**{f: getattr(model, f) for f in model.__dataclass_fields__}, "free": np.zeros_like(model.free)})
+        begin = self.recordings[r].times[frames[:, 0]] - self.recordings[r].times[0]
+        drive = distorted(model, parameters, shifted(self._drives[r], begin, lead * step, k), lead * step)
+        state = State.at_rest(held, k * count, position=np.tile(np.moveaxis(path[frames[:, 0]], 0, 1), (1, k, 1)))
+        batch = Batch(held, parameters, drive, state, threads=self.threads)
+        batch.advance(0, step, np.inf)
+        for n in range(lead):
+            by = np.moveaxis(path[frames[:, n + 1]] - path[frames[:, n]], 0, 1) / step
+            batch.carry(np.tile(by, (1, k, 1)))
+            batch.advance(1, step, np.inf)
+        return batch.state().memory
+
+    def _path(self, r: int) -> np.ndarray | None:
+        """Positions [F, N, 3] of the recorded motion, smoothed; None if the channels do not give them."""
+        if r not in self._paths:
+            found = coordinates(self, r)
+            self._paths[r] = None
+            if found is not None:
+                q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
+                arm = self.articulation
+                pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
+                self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
+        return self._paths[r]
+
+    def _measured(self, model, parameters, recording, distort, each, grid, channels, times) -> np.ndarray:
         """Channels [n, D, W] as distorted measurements show them."""
         worlds = channels.shape[2]
+        repeat = worlds // len(each)
         at = np.repeat(times[:, None], worlds, axis=1)
         parts, row = [], 0
-        for channel in recording.channels.values():
+        for index, channel in enumerate(recording.channels.values()):
             width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
             reader = _reader(grid, channels[:, row : row + width])
             for name in distort:
                 effect = get(name)
                 if effect.channels and channel.kind not in effect.channels:
                     continue
-                given = {n: np.broadcast_to(v[0], (worlds,)) for n, v in parameters.of(name).items()}
+                own = name in self.model.effects  # a measurement that the model itself describes holds for all
+                here = np.repeat([own or _acts(h, name, index) for h in each], repeat)
+                given = {
+                    n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()
+                }
                 reader = _wrapped(effect, reader, given)
             parts.append(reader(at))
             row += width
         return np.concatenate(parts, axis=1)
+
+
+def _acts(hypothesis: Hypothesis, effect: str, channel: int) -> bool:
+    """Whether a hypothesis distorts the measurement of a channel by an effect."""
+    return any(s.effect == effect and (s.entities is None or channel in s.entities) for s in hypothesis.suspects)
 
 
 def _wrapped(effect, inner, given):
@@ -386,6 +468,7 @@ def drive_of(recording: Recording, default: Drive) -> Drive:
     times = recording.times - recording.times[0]
     for name, channel in recording.drive.items():
         columns = np.atleast_2d(np.asarray(channel.values, float).T)
+        clock = times if channel.times is None else channel.times - recording.times[0]
         if channel.constant:
             columns = np.asarray(channel.values, float).reshape(-1, 1)
         names = [f"{name}_{a}" for a in "xyz"] if name == "field" else [name]
@@ -401,7 +484,7 @@ def drive_of(recording: Recording, default: Drive) -> Drive:
                     value=one,
                     allowed=", ".join(default.signals),
                 )
-            changed[one] = Signal(offset=float(column[0])) if channel.constant else series(times, column)
+            changed[one] = Signal(offset=float(column[0])) if channel.constant else series(clock, column)
     return default.replace(**changed)
 
 
@@ -421,3 +504,44 @@ def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> D
         values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
         changed[name] = series(local, np.tile(values, (1, repeat)))
     return drive.replace(**changed)
+
+
+def coordinates(forward: Forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Coordinates [m, n] of all frames of a recording and their noise (m,); None if the channels do not give them."""
+    recording, arm = forward.recordings[index], forward.articulation
+    if arm.floating or not arm.size:
+        return None
+    values, noise = stacked(recording)
+    if not np.all(np.isfinite(values)):
+        good = np.all(np.isfinite(values), axis=1)
+        if good.sum() < 20:
+            return None
+        for d in range(values.shape[1]):
+            values[:, d] = np.interp(recording.times, recording.times[good], values[good, d])
+    pose = arm.reference(len(values))
+    turning = angle_mask(recording)
+    weight = 1.0 / noise
+    spread = None
+    for _ in range(25):
+        now = channel_values(forward.model, recording, arm.positions(pose)[None], None)[0]
+        gap = values.T - now
+        gap[turning] -= 2 * np.pi * np.round(gap[turning] / (2 * np.pi))
+        tangent = np.empty((len(noise), arm.size, len(values)))
+        for k in range(arm.size):
+            by = np.zeros((arm.size, len(values)))
+            by[k] = 1e-6
+            ahead = channel_values(forward.model, recording, arm.positions(arm.moved(pose, by))[None], None)[0]
+            change = ahead - now
+            change[turning] -= 2 * np.pi * np.round(change[turning] / (2 * np.pi))
+            tangent[:, k] = change / 1e-6
+        scaled = np.moveaxis(tangent * weight[:, None, None], 2, 0)
+        if np.linalg.matrix_rank(scaled[len(scaled) // 2], tol=1e-6 * np.abs(scaled).max()) < arm.size:
+            return None
+        inverse = np.linalg.pinv(scaled)
+        by = np.einsum("nkd,dn->kn", inverse, gap * weight[:, None])
+        pose = arm.moved(pose, np.clip(by, -0.7, 0.7))
+        spread = np.sqrt(np.median(np.sum(inverse**2, axis=2), axis=0))
+        if np.abs(by).max() < 1e-9:
+            break
+    assert spread is not None
+    return np.unwrap(pose.angles, axis=1), spread

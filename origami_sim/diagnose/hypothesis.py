@@ -182,42 +182,67 @@ def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float
     for s in hypothesis.suspects:
         for f in s.free:
             value = float(np.clip(values[index], *get(s.effect).parameter(f.name).bounds))
-            out.set(s.effect, f.name, value, None if s.entities is None else np.array(s.entities))
+            everywhere = s.entities is None or s.kind == "measurement"  # channels are told apart where they are read
+            out.set(s.effect, f.name, value, None if everywhere else np.array(s.entities))
             index += 1
     return out
 
 
-def suspects(model: Model, recordings: Sequence[Recording], drive: Drive) -> list[Suspect]:
+def suspects(
+    model: Model, recordings: Sequence[Recording], drive: Drive, parameters: Parameters | None = None
+) -> list[Suspect]:
     """Everything in the catalogue that could act on this object and is not part of its model.
 
     An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
     channel of its kind was recorded; one of the ground, if the device has contact points. Creases and panels are
-    suspected one by one and all together.
+    suspected one by one and all together. An effect that the model has to state (`Effect.stated`) is a suspect where it
+    does so and leaves it at no strength.
     """
     kinds = {c.kind for r in recordings for c in r.channels.values()}
     driven = _driven(recordings, drive)
     found = []
     for name, effect in CATALOGUE.items():
-        if not effect.fitted or name in model.effects:
+        if not effect.fitted or not model.count(effect.family):
+            continue
+        if name in model.effects and not (effect.stated and parameters and _off(parameters, name)):
+            continue
+        if effect.stated and name not in model.effects:
             continue
         if effect.family == "measurement" and effect.channels and not kinds & set(effect.channels):
             continue
         if effect.family == "drive" and not any(n.split("_")[0] in driven for n in (name, *effect.channels)):
             continue
-        if effect.family in CONTACTS and not len(model.contacts):
-            continue
         if not set(effect.drives) - {"time"} <= driven:
             continue
-        for site, kind, entities in _sites(model, effect.family):
+        sites = _sites(model, effect.family)
+        if effect.family == "measurement":
+            sites = _channel_sites(recordings[0], effect.channels)
+        for site, kind, entities in sites:
             free = tuple(_free(name, p, entities) for p in effect.fitted)
             found.append(Suspect(name, site, kind, free, entities))
     return found
+
+
+def _off(parameters: Parameters, name: str) -> bool:
+    """Whether an effect of the model has no strength anywhere."""
+    strength = get(name).fitted[0]
+    return bool(np.all(parameters[name, strength] == get(name).parameter(strength).default))
 
 
 def _driven(recordings: Sequence[Recording], drive: Drive) -> set[str]:
     names = {n for n, s in drive.signals.items() if not s.is_zero}
     names |= {n for r in recordings for n, c in r.drive.items() if np.any(c.values)}
     return {n.split("_")[0] for n in names} | ({"drive"} if names else set())
+
+
+def _channel_sites(recording: Recording, kinds: Sequence[str]):
+    """All channels that an effect of the measurement can act on, together and one by one."""
+    each = [
+        (f"channel {c.name}", "measurement", (n,))
+        for n, c in enumerate(recording.channels.values())
+        if not kinds or c.kind in kinds
+    ]
+    return [("the measurement", "measurement", None), *(each if len(each) > 1 else [])]
 
 
 def _sites(model: Model, family: str):

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from origami_sim.diagnose.diagnosis import Curve, Place
-from origami_sim.diagnose.forward import Forward, angle_mask, channel_values, stacked
+from origami_sim.diagnose.forward import Forward, coordinates
 from origami_sim.diagnose.refit import Fit
 from origami_sim.distort import distorted
 from origami_sim.drive import Signal
@@ -43,47 +43,6 @@ class Motion:
     error: np.ndarray
     drive: dict[str, np.ndarray]
     half: int
-
-
-def coordinates(forward: Forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Coordinates [m, n] of all frames of a recording and their noise (m,); None if the channels do not give them."""
-    recording, arm = forward.recordings[index], forward.articulation
-    if arm.floating or not arm.size:
-        return None
-    values, noise = stacked(recording)
-    if not np.all(np.isfinite(values)):
-        good = np.all(np.isfinite(values), axis=1)
-        if good.sum() < 20:
-            return None
-        for d in range(values.shape[1]):
-            values[:, d] = np.interp(recording.times, recording.times[good], values[good, d])
-    pose = arm.reference(len(values))
-    turning = angle_mask(recording)
-    weight = 1.0 / noise
-    spread = None
-    for _ in range(25):
-        now = channel_values(forward.model, recording, arm.positions(pose)[None], None)[0]
-        gap = values.T - now
-        gap[turning] -= 2 * np.pi * np.round(gap[turning] / (2 * np.pi))
-        tangent = np.empty((len(noise), arm.size, len(values)))
-        for k in range(arm.size):
-            by = np.zeros((arm.size, len(values)))
-            by[k] = 1e-6
-            ahead = channel_values(forward.model, recording, arm.positions(arm.moved(pose, by))[None], None)[0]
-            change = ahead - now
-            change[turning] -= 2 * np.pi * np.round(change[turning] / (2 * np.pi))
-            tangent[:, k] = change / 1e-6
-        scaled = np.moveaxis(tangent * weight[:, None, None], 2, 0)
-        if np.linalg.matrix_rank(scaled[len(scaled) // 2], tol=1e-6 * np.abs(scaled).max()) < arm.size:
-            return None
-        inverse = np.linalg.pinv(scaled)
-        by = np.einsum("nkd,dn->kn", inverse, gap * weight[:, None])
-        pose = arm.moved(pose, np.clip(by, -0.7, 0.7))
-        spread = np.sqrt(np.median(np.sum(inverse**2, axis=2), axis=0))
-        if np.abs(by).max() < 1e-9:
-            break
-    assert spread is not None
-    return np.unwrap(pose.angles, axis=1), spread
 
 
 def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
@@ -186,13 +145,23 @@ def locate(forward: Forward, fit: Fit) -> list[Place]:
     return sorted(out, key=lambda p: -p.score)
 
 
+WINDOW = 0.1
+"""Length of the windows over which the missing moment is averaged [s], at least that of the smoother."""
+
+
 def _windows(m: Motion, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Means over windows of the smoother's length: times, missing moment, and its deviation."""
-    width = 2 * m.half + 1
+    """Means over windows: times, missing moment, and its deviation.
+
+    The noise of a mean acceleration is that of the rates at the two ends, much less than that of one acceleration.
+    """
+    step = m.times[1] - m.times[0]
+    width = max(2 * m.half + 1, round(WINDOW / step))
+    point = savgol_coeffs(2 * m.half + 1, 4, deriv=2)
+    calmer = np.linalg.norm(np.convolve(point, np.ones(width) / width)) / np.linalg.norm(point)
     count = max(1, len(m.times) // width)
     cut = slice(0, count * width)
     times = m.times[cut].reshape(count, -1).mean(1)
-    return times, m.missing[k, cut].reshape(count, -1).mean(1), m.error[k, cut].reshape(count, -1).mean(1)
+    return times, m.missing[k, cut].reshape(count, -1).mean(1), calmer * m.error[k, cut].reshape(count, -1).mean(1)
 
 
 def _onset(times: np.ndarray, value: np.ndarray, error: np.ndarray) -> float:

@@ -87,7 +87,7 @@ class Linearisation:
 def whitened(values: np.ndarray, weights: Weights) -> np.ndarray:
     """Residuals [..., n, D] as (..., n D) numbers of unit variance; missing ones are zero."""
     scaled = np.nan_to_num(values / weights.deviation) * np.sqrt(weights.part)
-    return scaled.reshape(*values.shape[:-2], -1)
+    return scaled.reshape(*values.shape[:-2], values.shape[-2] * values.shape[-1])
 
 
 def penalty(free: Sequence[Free], theta: np.ndarray) -> float:

@@ -198,9 +198,10 @@ def _claims(d: Diagnosis) -> list[tuple[str, str, str]]:
         out.append(("Where", f"{best.site}, share {percent(best.share)}", "where"))
     if np.isfinite(d.onset):
         out.append(("Since when", f"{amount(d.onset, 's', 3)} after the start", "overlays"))
-    else:
+    elif d.traces:
         out.append(("Since when", "no lasting departure", "overlays"))
-    out.append(("Held-out error", f"{given} as given, {refitted} refitted, {left} now, times {unit}", "figures"))
+    if left != MISSING:
+        out.append(("Held-out error", f"{given} as given, {refitted} refitted, {left} now, times {unit}", "figures"))
     if np.isfinite(d.p_value):
         found = f"p {_p_value(d.p_value)} among {len(d.screening)} suspects"
         out.append(("Against chance", found, "screening"))
@@ -268,6 +269,8 @@ def _figures(d: Diagnosis) -> list:
 
 def _tiles(d: Diagnosis, unit: str) -> Html:
     before, refitted, after = (_multiples(d, e) for e in (d.error_before, d.error_refitted, d.error_after))
+    if not np.isfinite(after):
+        return _nothing("No held-out error could be measured.")
     tiles = [
         ("held-out error", f"{times(before)} → {times(after)}", f"of the {unit}, as given → now"),
         ("after refitting alone", times(refitted), f"of the {unit}"),
@@ -569,8 +572,9 @@ def _candidates(d: Diagnosis) -> list:
         "When not to trust it",
     )
     body = []
+    joint = any(set(c.label.split(" + ")) == set(d.chosen) for c in d.candidates)
     for c in d.candidates:
-        chosen = c.label in d.chosen or (set(d.chosen) == set(c.label.split(" + ")) and len(d.chosen) > 1)
+        chosen = set(c.label.split(" + ")) == set(d.chosen) if joint else c.label in d.chosen
         errors = [
             element("div", f"{times(m)} ", element("small", amount(v, u, 3)))
             for v, u, m in zip(_padded(c.rms, d), d.units, _each_multiple(d, c.rms), strict=True)
@@ -760,6 +764,12 @@ def _notes(d: Diagnosis, geometry: dict | None) -> list:
     ]
     command = d.settings.get("command")
     again = [element("pre", element("code", command), tabindex="0")] if command else []
+    left = _table(_header("Setting", "Value"), settings, "Settings") if settings else _nothing("Nothing recorded.")
+    right = _table(_header("Stage", "Time"), stages, "Time by stage") if stages else _nothing("Not measured.")
+    beside = [
+        element("div", element("h3", "Settings"), left),
+        element("div", element("h3", f"Time: {total:.1f} s" if stages else "Time"), right),
+    ]
     again.append(
         element(
             "p",
@@ -776,14 +786,8 @@ def _notes(d: Diagnosis, geometry: dict | None) -> list:
         _table(_header("Number", "Value [SI]"), patch, "Patch") if patch else _nothing("Nothing to change."),
         element("h3", "How to reproduce"),
         again,
-        element("div",
-            element("div", element("h3", "Settings"),
-                _table(_header("Setting", "Value"), settings, "Settings") if settings else _nothing("None recorded.")),
-            element("div", element("h3", f"Time: {total:.1f} s"),
-                _table(_header("Stage", "Time"), stages, "Time by stage") if stages else _nothing("Not measured.")),
-            class_="two",
-        ),
-    ]  # fmt: skip
+        element("div", beside, class_="two"),
+    ]
 
 
 # --- numbers

@@ -13,7 +13,7 @@ import numpy as np
 
 from origami_sim.diagnose.report_markup import Html, element, scaled_unit
 
-POINTS = 1500
+POINTS = 900
 """Most points that a drawn line has; longer ones keep the least and the greatest value of every column."""
 
 _WIDE, _HIGH = 2000, 1000
@@ -61,7 +61,7 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
     return [float(k * step) for k in np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)]
 
 
-def thin(x: np.ndarray, y: np.ndarray, low: float, high: float, columns: int = (POINTS - 300) // 2) -> np.ndarray:
+def thin(x: np.ndarray, y: np.ndarray, low: float, high: float, columns: int = (POINTS - 100) // 2) -> np.ndarray:
     """Indices of a line's points that can be seen: all, or the least and the greatest of every column, in order."""
     if len(x) <= 2 * columns:
         return np.arange(len(x))
@@ -114,8 +114,8 @@ class Plot:
     def dots(self, x, y, kind: str, *, titles: Sequence[str] = ()) -> "Plot":
         """Single points: one path, or one each where they have titles to hover over."""
         x, y = np.asarray(x, float), np.asarray(y, float)
-        shown = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-        spots = ["M{} {}h0".format(*self._at(x[i], y[i])) for i in shown]
+        shown = np.flatnonzero(np.isfinite(x) & np.isfinite(y)).tolist()
+        spots = ["M{} {}h0".format(*self._at(a, b)) for a, b in zip(x[shown], y[shown], strict=True)]
         if not titles:
             return self._add("".join(spots), f"{kind} dots", "")
         for i, spot in zip(shown, spots, strict=True):
@@ -178,8 +178,14 @@ class Plot:
 
     def _steps(self, x, y) -> str:
         """Steps in whole units of the box: short text, and no drift."""
-        at = np.array([self._at(a, b) for a, b in zip(x, y, strict=True)])
-        steps = "".join(f" {a} {b}" if b >= 0 else f" {a}{b}" for a, b in np.diff(at, axis=0))
+        right = (x - self.x[0]) / (self.x[1] - self.x[0])
+        up = (y - self.y[0]) / (self.y[1] - self.y[0])
+        at = (
+            np.column_stack([_WIDE * np.clip(right, -0.5, 1.5), _HIGH * (1 - np.clip(up, -0.5, 1.5))])
+            .round()
+            .astype(int)
+        )
+        steps = "".join(f" {a} {b}" if b >= 0 else f" {a}{b}" for a, b in np.diff(at, axis=0).tolist())
         return f"M{at[0, 0]} {at[0, 1]}" + (f"l{steps.strip()}" if len(at) > 1 else "h0")
 
 

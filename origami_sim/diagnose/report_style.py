@@ -143,7 +143,8 @@ figcaption .key { margin-right: .6rem; } figcaption .key.key::before { width: 1r
   border-top-color: var(--after); }
 
 .map { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); gap: 2rem; align-items: start; }
-.map table { min-width: 100%; } .origami { position: relative; width: 100%; background: #fbfbfa;
+.map table { min-width: 100%; } .heat { max-width: 44rem; width: 100%; }
+.origami { position: relative; width: 100%; background: #fbfbfa;
   border: 1px solid var(--rule); border-radius: 6px; }
 .origami svg { position: absolute; inset: 0; width: 100%; height: 100%; }
 .origami .face { stroke-width: .5; opacity: .93; } .origami .edge { stroke: #7d858e; stroke-width: 1.2; }
@@ -168,6 +169,7 @@ details { margin: .8rem 0; } summary { cursor: pointer; } summary h3 { display: 
 
 @media (max-width: 52rem) { .map { grid-template-columns: minmax(0, 1fr); } }
 @media (max-width: 38rem) {
+  .matrix tbody th, .matrix thead th:first-child { white-space: normal; min-width: 8rem; }
   body { padding: .9rem .8rem 3rem; } section { margin-top: 2.2rem; }
   .verdict { grid-template-columns: 1fr; padding: .9rem 1rem; } .sentence { font-size: 1.15rem; }
   .sure { grid-column: 1; grid-row: auto; text-align: left; margin-top: .6rem; } .sure b { display: inline;

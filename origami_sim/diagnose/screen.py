@@ -13,6 +13,7 @@ import numpy as np
 
 from origami_sim.diagnose.hypothesis import Suspect, scaled
 from origami_sim.diagnose.refit import Fit, Weights, whitened
+from origami_sim.effects import get
 from origami_sim.errors import InputError
 
 CHUNK = 8
@@ -147,7 +148,7 @@ def screen(
 
 def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
     """Whether a suspect is the sum of other suspects of its effect at single entities."""
-    return s.entities is None and any(t.effect == s.effect and t.entities is not None for t in suspects)
+    return s.kind in ("crease", "panel") and s.entities is None and any(t.effect == s.effect and t.entities is not None for t in suspects)
 
 
 def again(screening: Screening, base: Fit, without: Sequence[str] = ()) -> Screening:
@@ -176,7 +177,9 @@ def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fi
         shape = project(parts)
         norm = float(np.linalg.norm(shape))
         s = scaled(s, abs(size))
-        if norm < SILENT:
+        # sizes make the raw change as large as the residual; where starts take most of that, plausible strengths still show
+        reach = max(1.0, _admissible(s, 10 * np.sign(size) * _typical(s)) / size)
+        if norm * reach < SILENT or norm < 1e-3 * raw:
             why = "these recordings do not excite it" if raw < SILENT else "nominal parameters can take its place"
             found.append(Signature(s, parts, size, nothing, norm, raw, 0.0, 0.0, np.inf, why))
             continue
@@ -235,6 +238,11 @@ def _affordable(forward, base: Fit, s: Suspect, change: float) -> float:
             pass
         change /= 4.0
     return change
+
+
+def _typical(s: Suspect) -> float:
+    """A noticeable strength; ten times as much is the most that is plausible."""
+    return abs(get(s.effect).parameter(s.free[0].name).typical or 0.0)
 
 
 def _admissible(s: Suspect, change: float) -> float:

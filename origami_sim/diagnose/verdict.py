@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import chi2
 
-from origami_sim.diagnose.compare import Score, Weights, difference, probabilities
+from origami_sim.diagnose.compare import Score, Weights, difference, memory, probabilities, reproducible, supported
 from origami_sim.diagnose.refit import Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.effects import get
@@ -45,7 +46,7 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
     """Weighs all fits; see `docs/diagnosis.md` for the rules in words."""
     sigma = noise.deviation
     rows = [f for f in fits if id(f) in scores]
-    p = probabilities([scores[id(f)].evidence for f in rows])
+    p = probabilities(supported(rows, scores))
     order = np.argsort(-p)
     best = rows[order[0]]
     notes = _notes(forward, rows, screening, sigma)
@@ -62,8 +63,8 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
         )
 
     gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
-    reproducible = best is not base and gain > 2.0 * error and gain > 2.0
-    if best is base or p_value > o.significance or not reproducible:
+    holds = best is not base and reproducible(scores[id(best)], scores[id(base)])
+    if best is base or p_value > o.significance or not holds:
         if not screening.signatures and over > FLOOR:
             return result(
                 "UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base
@@ -141,8 +142,6 @@ def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, res
     count = len(base.free)
     before = float(sum(whitened(r, weights) @ whitened(r, weights) for r in given.residuals))
     better = before - base.misfit - base.penalty
-    from scipy.stats import chi2
-
     deviation = np.array([f.spread for f in base.free])
     moved = [(f, t) for f, t in zip(base.free, base.theta, strict=True)]
     if count and better > chi2.ppf(0.99, count):
@@ -150,7 +149,7 @@ def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, res
         (f, t), spread = far[0]
         text = (
             f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
-            f"{quantity(f.start, f.unit, digits=3)} to {quantity(t, f.unit, digits=3)}, "
+            f"{said(f.start, f.unit)} to {said(t, f.unit)}, "
             f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; what is left is {over:.1f} times the noise."
         )
         return result("PARAMETER", text, probability, [f.label for (f, t), s in far if abs(t - f.start) > s], base)
@@ -176,8 +175,6 @@ def removable(before: np.ndarray, after: np.ndarray, sigma: np.ndarray) -> float
 
 def structured(forward, f: Fit, sigma: np.ndarray) -> bool:
     """Whether residuals beyond the noise have a memory, so that they are not just more noise."""
-    from origami_sim.diagnose.compare import memory
-
     rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
     return bool(np.any(rms > FLOOR * sigma) and memory([r / sigma for r in f.residuals]) > 3.0)
 
@@ -255,10 +252,15 @@ def _say(f: Fit) -> str:
     for s in f.hypothesis.suspects:
         n = s.free[0]
         t, d = value[id(n)], deviation[id(n)]
-        low, high = (quantity(v, n.unit) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
+        low, high = (said(v, n.unit, 2) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
         what = title(s.effect)
-        out.append(f"{what} at {s.site} ({n.name.replace('_', ' ')} {quantity(t, n.unit)}, 95 %: {low} to {high})")
+        out.append(f"{what} at {s.site} ({n.name.replace('_', ' ')} {said(t, n.unit, 2)}, 95 %: {low} to {high})")
     return _join(out)
+
+
+def said(value: float, unit: str, digits: int = 3) -> str:
+    """A number with its unit; a plain factor has none."""
+    return f"{value:.{digits}g}" if unit in ("-", "1", "") else quantity(value, unit, digits=digits)
 
 
 def title(effect: str) -> str:
@@ -268,7 +270,8 @@ def title(effect: str) -> str:
     e = get(effect)
     text = importlib.import_module(f"origami_sim.effects.{e.name}").__doc__ or e.name
     text = text.strip().splitlines()[0].split(":")[0].rstrip(".")
-    return text[0].lower() + text[1:] if not text[:2].isupper() else text
+    first = text.split()[0]
+    return text if len(first) > 1 and first.isupper() else text[0].lower() + text[1:]
 
 
 def _join(names: Sequence[str]) -> str:

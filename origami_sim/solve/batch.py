@@ -230,6 +230,10 @@ class Batch:
         self._x.assign(self._upload(x, wp.vec3d))
         self._angles.assign(self._upload(angles, wp.float64))
 
+    def carry(self, v: np.ndarray):
+        """Overwrites the velocities [N, W, 3] [m/s]; nodes that are held move with them."""
+        self._v.assign(self._upload(v, wp.vec3d))
+
     def state(self) -> State:
         """The present state, copied to the host."""
         m = self.model

@@ -1,0 +1,263 @@
+"""`origami-sim diagnose`: from files to a verdict, and everything that it leaves behind."""
+
+import json
+import os
+import sys
+import time as clock
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+
+from origami_sim.diagnose.diagnose import Options, diagnose
+from origami_sim.diagnose.diagnosis import Diagnosis
+from origami_sim.diagnose.hypothesis import Subject
+from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.overlay import write_overlays
+from origami_sim.diagnose.patch import write_patch
+from origami_sim.diagnose.report import geometry_of, write_report
+from origami_sim.diagnose.subject import spreads
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.observe import check_scene
+from origami_sim.recording import DataSet, lint_report, read_dataset
+from origami_sim.scene import NAMES, Settings, read_calibration, scene_module, scene_settings
+
+REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
+
+THOROUGH = Options(rate=400.0, steps=600_000, screened=16, finalists=12, most=4, draws=4999)
+
+
+def run(args: Namespace) -> int:
+    """The command; returns the verdict's exit code."""
+    say = (lambda *_, **__: None) if args.json else print
+    folder = Path(args.out or "runs/diagnose")
+    _check_folder(folder)
+    data = read_recordings(args.recordings, args.sidecar)
+    for recording in data:
+        say(lint_report(recording))
+    for note in data.notes:
+        say(f"note: {note}")
+    module, settings = model_of(args.model, data)
+    name = module.__name__.rpartition(".")[2]
+    settings = settings.override([*_overrides(data, name), *args.set])
+    model = module.build(settings)[0]
+    for recording in data:
+        for note in check_scene(recording, model):
+            say(f"note: {note}")
+    known = _priors(settings, data, args.prior)
+    subject = Subject.from_scene(module, settings, spreads=known, name=name)
+    if not subject.nominals:
+        say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
+    options = _options(args)
+    catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
+    keep = Keep(folder / RESUME)
+    progress = Progress()
+    try:
+        found = diagnose(subject, list(data), options, catalogue=catalogue, progress=progress, keep=keep)
+        progress.stage("replay")
+        files = _write(folder, found, keep, settings, name)
+    except KeyboardInterrupt:
+        progress.end()
+        print("origami-sim: the same command goes on from here.", file=sys.stderr)
+        raise
+    progress.end()
+    keep.clear()
+    if args.json:
+        print(json.dumps(_summary(found, files), allow_nan=False))
+    else:
+        print("\n".join(_text(found, files)))
+    return found.exit_code
+
+
+# input ----------------------------------------------------------------------------------------------------------------
+
+
+def read_recordings(paths: Sequence[str], sidecar: str | None = None) -> DataSet:
+    """Recordings of one object: tables, or one folder or listing; known recordings have shipped sidecars.
+
+    Raises:
+        InputError: what `read_dataset` refuses.
+    """
+    files = [Path(p) for p in paths]
+    if len(files) == 1 and (files[0].is_dir() or files[0].suffix.lower() == ".toml"):
+        return read_dataset(files[0], sidecar=sidecar)
+    shipped = None
+    if sidecar is None and not any(f.with_suffix(".toml").exists() for f in files):
+        shipped = next((s for f in files if (s := _shipped(f)) is not None), None)
+    return read_dataset(files, sidecar=sidecar or shipped)
+
+
+def _shipped(recording: Path) -> Path | None:
+    """The sidecar that ships with the package for recordings of this folder, of the same stem or series (a_1, a_2)."""
+    scenes = resources.files("origami_sim.scenes")
+    for stem in (recording.stem, recording.stem.rpartition("_")[0]):
+        found = Path(str(scenes / f"{recording.resolve().parent.name}_{stem}.toml"))
+        if stem and found.is_file():
+            return found
+    return None
+
+
+def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
+    """The scene of a name or of a calibration, with its settings.
+
+    A calibration belongs to the scene that has the same settings; of several, to the one that the sidecar names.
+
+    Raises:
+        InputError: no such scene, a calibration of none, a sidecar that names another scene.
+    """
+    stated = (data[0].metadata.get("scene") or {}).get("name")
+    if not given.endswith(".toml"):
+        module = scene_module(given)
+        _agree(stated, given, data)
+        return module, scene_settings(module)
+    settings = read_calibration(given)
+    own = {n: set(read_calibration(scene_module(n).CALIBRATION)) for n in NAMES}
+    fitting = [n for n, names in own.items() if names == set(settings)]
+    if stated in fitting:
+        fitting = [stated]
+    if len(fitting) != 1:
+        nearest = max(own, key=lambda n: len(own[n] & set(settings)) - len(own[n] ^ set(settings)))
+        odd = sorted(own[nearest] ^ set(settings))
+        raise InputError(
+            "this calibration fits several scenes" if fitting else "this is a calibration of no scene",
+            file=given,
+            field=", ".join(fitting or odd[:5]),
+            allowed="[scene] name in the sidecar" if fitting else f"the settings of a scene; the nearest is {nearest}",
+        )
+    _agree(stated, fitting[0], data)
+    module = scene_module(fitting[0])
+    return module, scene_settings(module, given)
+
+
+def _agree(stated: str | None, scene: str, data: DataSet) -> None:
+    if stated is not None and stated != scene:
+        raise InputError(
+            "the recording is of another scene",
+            file=data[0].metadata.get("sidecar"),
+            field="scene.name",
+            value=stated,
+            allowed=f"--model {stated}, or a sidecar for {scene}",
+        )
+
+
+def _overrides(data: DataSet, scene: str) -> list[str]:
+    """What the sidecar says of this object's settings."""
+    found = data[0].metadata.get("scene") or {}
+    return [f"{n}={v}" for n, v in found.get("overrides", {}).items()] if found.get("name") == scene else []
+
+
+def _priors(settings: Settings, data: DataSet, given: Sequence[str]) -> dict[str, float]:
+    """Standard deviations [SI] from the sidecar, and over them from the command line."""
+    first = data[0].metadata
+    out = spreads(settings, first.get("priors") or {}, source=first.get("sidecar"))
+    stated: dict[str, float | str] = {}
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise InputError(
+                "not a prior", field="--prior", value=text, allowed="name=sd, e.g. length_1=0.5mm or mass_1=1%"
+            )
+        stated[name] = value
+    return out | spreads(settings, stated, source="--prior")
+
+
+def _options(args: Namespace) -> Options:
+    if args.segment is not None and not args.segment > 0:
+        raise InputError("must be positive", field="--segment", value=args.segment, allowed="> 0 s")
+    if args.seed < 0:
+        raise InputError("must not be negative", field="--seed", value=args.seed, allowed=">= 0")
+    return replace(THOROUGH if args.thorough else Options(), segment=args.segment, seed=args.seed)
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuses, before anything is computed, a folder that cannot be written."""
+    existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        what = "cannot be written" if existing.is_dir() else "is a file"
+        raise InputError(what, file=existing, field="--out", allowed="a folder that can be written")
+
+
+# output ---------------------------------------------------------------------------------------------------------------
+
+
+class Progress:
+    """Stages on standard error: one line that moves where somebody watches, else one line each."""
+
+    def __init__(self):
+        self.name, self.shown, self.began = "", -1, clock.perf_counter()
+        self.watched = sys.stderr.isatty()
+
+    def __call__(self, stage: str, part: float) -> None:
+        if stage == "done":
+            return
+        if stage != self.name:
+            self.stage(stage)
+        percent = int(100 * part)
+        if self.watched and percent != self.shown:
+            self.shown = percent
+            sys.stderr.write(f"\r\033[K{clock.perf_counter() - self.began:5.0f} s  {stage} {percent} %")
+            sys.stderr.flush()
+
+    def stage(self, name: str) -> None:
+        self.name, self.shown = name, -1
+        if not self.watched:
+            print(f"{clock.perf_counter() - self.began:5.0f} s  {name}", file=sys.stderr)
+
+    def end(self) -> None:
+        if self.watched:
+            sys.stderr.write("\r\033[K")
+            sys.stderr.flush()
+
+
+def _write(folder: Path, found: Diagnosis, keep: Keep, settings: Settings, scene: str) -> dict[str, list[Path] | Path]:
+    assert keep.forward is not None
+    replays = write_overlays(folder, keep, found)
+    patch = write_patch(folder / PATCH, settings, found, scene=scene)
+    report = write_report(found, folder / REPORT, geometry=geometry_of(keep.forward.model))
+    return {"report": report, "data": found.save_json(folder / JSON), "calibration": patch, "replays": replays}
+
+
+def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
+    whole = d.to_dict()
+    keys = ("verdict", "sentence", "probability", "chosen", "p_value", "components", "noise")
+    errors = ("error_before", "error_refitted", "error_after", "patch", "notes", "seconds")
+    return {
+        **{k: whole[k] for k in (*keys, *errors)},
+        "candidates": [
+            {k: c[k] for k in ("label", "probability", "gain", "error", "failed")} for c in whole["candidates"]
+        ],
+        "files": {n: [str(p) for p in f] if isinstance(f, list) else str(f) for n, f in files.items()},
+        "exit_code": d.exit_code,
+    }
+
+
+def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
+    lines = ["", f"{d.verdict}: {d.sentence}", "", f"{'explanation':48s} {'probability':>11s} {'held-out gain':>18s}"]
+    for c in d.candidates[:8]:
+        if c.failed:
+            lines.append(f"{c.label:48s}      failed: {c.failed}")
+            continue
+        mark = f"   {c.distrust}" if c.distrust else ""
+        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.gain:9.1f} +- {c.error:5.1f}{mark}")
+    best = next((c for c in d.candidates if c.label in d.chosen or not d.chosen), None)
+    for n in best.numbers if best is not None else []:
+        bound = ", at its bound" if n.at_bound else ""
+        lines.append(f"  {n.label} = {n.value:.4g} {n.unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")
+    lines += ["", f"{'rms error, held out':24s} {'noise':>10s} {'as given':>10s} {'refitted':>10s} {'explained':>10s}"]
+    rows = zip(d.components, d.units, d.noise, d.error_before, d.error_refitted, d.error_after, strict=True)
+    lines += [f"{f'{name} [{unit}]':24s} " + " ".join(f"{v:10.3g}" for v in values) for name, unit, *values in rows]
+    lines += ["", *(f"note: {note}" for note in d.notes)]
+    if d.experiments:
+        lines.append(f"next experiment: {d.experiments[0].what}")
+    replays = files["replays"]
+    assert isinstance(replays, list)
+    lines += [
+        f"report: {files['report']}",
+        *(f"replay: origami-sim replay {r}" for r in replays),
+        f"patched: origami-sim run {d.subject} --calibration {files['calibration']}",
+        f"{sum(d.seconds.values()):.0f} s of computing",
+    ]
+    return lines

@@ -1,0 +1,216 @@
+"""A patched calibration: the scene's settings with refitted numbers, and the effects that were found to be missing.
+
+It is a calibration as any other, with one table more:
+
+    [[effects.crease_friction]]
+    site = "crease 1"               # in words; optional, like source
+    entities = [1]                  # of the effect's family; left out: all of them
+    friction_moment = 2.0e-5        # parameters of the effect [SI]
+    yield_angle = 0.01
+
+Parameters that are not stated are those of an effect of the scene that has one of the same name for the same family (a
+magnet keeps its remanence), else their typical value. An effect that the scene already has keeps what is not stated.
+"""
+
+import json
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
+from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply
+from origami_sim.effects import CATALOGUE, get
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters
+from origami_sim.scene import Setting, Settings
+
+_WORDS = ("site", "source")
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect that a calibration adds to its scene.
+
+    Attributes:
+        effect: name in the catalogue. values: its parameters [SI].
+        entities: of the effect's family; None for all. site, source: for readers.
+    """
+
+    effect: str
+    values: Mapping[str, float] = field(default_factory=dict)
+    entities: tuple[int, ...] | None = None
+    site: str = ""
+    source: str = ""
+
+
+def read_additions(tree: object, file: Path) -> tuple[Addition, ...]:
+    """The table `effects` of a calibration.
+
+    Raises:
+        InputError: not a table of tables, an effect or parameter that the catalogue lacks, a value out of its bounds.
+    """
+    if not isinstance(tree, dict):
+        raise InputError("effects are tables, [effects.NAME]", file=file, field="effects", value=tree)
+    out = []
+    for name, entries in tree.items():
+        if name not in CATALOGUE:
+            raise InputError(
+                "there is no such effect", file=file, field=f"effects.{name}", allowed=", ".join(CATALOGUE)
+            )
+        for entry in entries if isinstance(entries, list) else [entries]:
+            out.append(_addition(name, entry, file))
+    return tuple(out)
+
+
+def _addition(name: str, entry: object, file: Path) -> Addition:
+    where, effect = f"effects.{name}", get(name)
+    if not isinstance(entry, dict):
+        raise InputError("an effect is a table of its parameters", file=file, field=where, value=entry)
+    known = {p.name: p for p in effect.parameters if p.knots == 1}
+    words, values, entities = {}, {}, None
+    for key, value in entry.items():
+        at = f"{where}.{key}"
+        if key in _WORDS:
+            if not isinstance(value, str):
+                raise InputError("not a word", file=file, field=at, value=value)
+            words[key] = value
+        elif key == "entities":
+            whole = isinstance(value, list) and all(type(v) is int and v >= 0 for v in value)
+            if not whole or not value:
+                raise InputError("entities are a list of numbers", file=file, field=at, value=value, allowed="[0, ...]")
+            entities = tuple(value)
+        elif key not in known:
+            raise InputError(
+                "the effect has no such parameter",
+                file=file,
+                field=at,
+                allowed=", ".join([*known, "entities", *_WORDS]),
+            )
+        else:
+            low, high = known[key].bounds
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+                raise InputError(
+                    "out of its bounds",
+                    file=file,
+                    field=at,
+                    value=value,
+                    allowed=f"{low:g} to {high:g} {known[key].unit}",
+                )
+            values[key] = float(value)
+    return Addition(name, values, entities, **words)
+
+
+def switched_on(
+    additions: Sequence[Addition], model: Model, parameters: Parameters, *, file: Path | None = None
+) -> tuple[Model, Parameters]:
+    """Model and parameters with these effects.
+
+    Raises:
+        InputError: an entity that the model does not have.
+    """
+    for a in additions:
+        count = model.count(get(a.effect).family)
+        if a.entities is not None and max(a.entities) >= count:
+            raise InputError(
+                "the model has no such entity",
+                file=file,
+                field=f"effects.{a.effect}.entities",
+                value=max(a.entities),
+                allowed=f"0 to {count - 1}",
+            )
+    new = [a for a in additions if a.effect not in model.effects]
+    richer = model.with_effects(*(a.effect for a in new))
+    numbers = [_numbers(a) for a in new]
+    missing = Hypothesis(tuple(Suspect(a.effect, a.site, "", n, a.entities) for a, n in zip(new, numbers, strict=True)))
+    out = apply(parameters, missing, [f.start for n in numbers for f in n], richer)
+    for a in additions:
+        if a.effect in model.effects:
+            for name, value in a.values.items():
+                out.set(a.effect, name, value, None if a.entities is None else np.array(a.entities))
+    return richer, out
+
+
+def _numbers(a: Addition) -> tuple[Free, ...]:
+    return tuple(
+        Free(a.effect, n, get(a.effect).parameter(n).unit, v, 1.0, entities=a.entities) for n, v in a.values.items()
+    )
+
+
+def patched(diagnosis: Diagnosis) -> Candidate | None:
+    """The explanation whose numbers are patched in; None where the diagnosis changes nothing."""
+    values = list(diagnosis.patch.values())
+    return next((c for c in diagnosis.candidates if values and [n.value for n in c.numbers] == values), None)
+
+
+def additions(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addition, ...]:
+    """The effects that the diagnosis found missing, one for each site."""
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for label, value in diagnosis.patch.items():
+        name, _, entities = label.partition("@")
+        if name not in settings:
+            effect, _, parameter = name.partition(".")
+            found.setdefault((effect, entities), {})[parameter] = value
+    best = patched(diagnosis)
+    sites = best.sites if best is not None else [""] * len(found)
+    source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
+    return tuple(
+        Addition(effect, values, tuple(map(int, entities.split(","))) if entities else None, site, source)
+        for ((effect, entities), values), site in zip(found.items(), sites, strict=True)
+    )
+
+
+def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, scene: str) -> Path:
+    """Writes the calibration with refitted settings, their new uncertainty, and the missing effects switched on.
+
+    Returns:
+        The file; `origami-sim run SCENE --calibration FILE` and `origami-sim diagnose ... --model FILE` read it.
+    """
+    best = patched(diagnosis)
+    numbers = {n.label: n for n in best.numbers} if best is not None else {}
+    lines = [
+        f"# {scene}, patched by a diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}.",
+        *textwrap.wrap(diagnosis.sentence, 118, initial_indent="# ", subsequent_indent="# "),
+        f"# Use: origami-sim run {scene} --calibration {Path(path).name}",
+        "",
+    ]
+    for s in settings.values():
+        value, source, uncertainty = s.value, s.source, s.uncertainty
+        number = numbers.get(s.name)
+        if number is not None and number.value != s.value:
+            value, uncertainty = number.value, (number.low, number.high)
+            source = f"refitted by a diagnosis (was {s.value:.6g}: {s.source})"
+        lines += [f"[{s.name}]", f"value = {_toml(value)}", f"unit = {_toml(s.unit)}"]
+        if s.range is not None:
+            lines.append(f"range = {_toml(list(s.range))}")
+        if s.choices:
+            lines.append(f"choices = {_toml(list(s.choices))}")
+        if uncertainty is not None:
+            lines.append(f"uncertainty = {_toml(list(uncertainty))}")
+        lines += [f"source = {_toml(source)}", f"meaning = {_toml(s.meaning)}", ""]
+    for a in (*settings.effects, *additions(diagnosis, settings)):
+        lines.append(f"[[effects.{a.effect}]]")
+        lines += [f"{word} = {_toml(getattr(a, word))}" for word in _WORDS if getattr(a, word)]
+        if a.entities is not None:
+            lines.append(f"entities = {_toml(list(a.entities))}")
+        for name, value in a.values.items():
+            p = get(a.effect).parameter(name)
+            lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")
+        lines.append("")
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text("\n".join(lines), encoding="utf-8")
+    part.replace(path)
+    return path
+
+
+def _toml(value) -> str:
+    """A TOML value; JSON's text is TOML for words, switches, finite numbers and lists of them."""
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,582 @@
+"""What a hypothesis predicts for quasi-static curves: one equilibrium for each load step, for many worlds at once."""
+
+import copy
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+import warp as wp
+
+from origami_sim.diagnose.articulation import Articulation
+from origami_sim.diagnose.diagnosis import Curve, Place
+from origami_sim.diagnose.forward import Block, Forward, angle_mask, component_names, continuous, drive_of, stacked
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect
+from origami_sim.diagnose.locate import BINS, PASSIVE, coordinates
+from origami_sim.diagnose.refit import Fit
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive
+from origami_sim.effects import DISTORTIONS, get
+from origami_sim.model import Model, Parameters, State
+from origami_sim.observe import Poses, read_channel
+from origami_sim.recording import Recording
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.statics import NULL_SHIFT, STENCIL, WEIGHTS, _Factor, _System, equilibrium
+
+PIECES = 6
+"""Blocks that a curve is cut into: contiguous stretches, each of which is held out in its turn."""
+
+HOLD = 1e6
+"""Time that a load step is given [s]: laws that relax have relaxed, laws of the rate are silent."""
+
+TIMED = ("clock_delay", "clock_rate", "exposure", "tracker_lag")
+"""Effects of the measurement that need a clock, which load steps do not have."""
+
+SITES = 4
+"""Creases that one channel may be asked to tell apart."""
+
+CONSTANTS = 4
+"""Time constants with which an effect that has one is suspected, evenly in their logarithm."""
+
+CLOSE = 1e-10
+"""A Newton step shorter than this part of the device ends the search for an equilibrium."""
+
+FAR = 0.1
+"""Longest Newton step, as a part of the device."""
+
+ROUNDS = 4
+ITERATIONS = 10
+"""Tangents of a load step, and Broyden's steps with each."""
+
+MOST_WORLDS = 4000
+"""Perturbed copies whose forces are found in one launch."""
+
+
+class CurveForward(Forward):
+    """What curves have in common: no starts to fit, all blocks of a recording in one pass.
+
+    Args:
+        subject: how to build the model. recordings: of one object. pieces: blocks of each curve.
+
+    Attributes:
+        blocks, components, local (0), start ("rest"): as in `Forward`.
+    """
+
+    def __init__(
+        self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
+    ):
+        self.subject, self.recordings, self.start, self.threads = subject, list(recordings), "rest", threads
+        self.values = {f.name: f.start for f in subject.nominals}
+        self.model, self.parameters, self.drive = subject.build(self.values)
+        self.articulation = Articulation(self.model)
+        silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
+        self._drives = [drive_of(self._driven(r), silent) for r in self.recordings]
+        self._built: dict[tuple, tuple[Model, Parameters]] = {}
+        self._arms = {self.model.position.tobytes(): self.articulation}
+        self.components = component_names(self.recordings[0])
+        self.local = 0
+        self.blocks: list[Block] = []
+        pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
+        for index, r in enumerate(self.recordings):
+            values, noise = stacked(r)
+            for part in np.array_split(np.arange(len(r.times)), min(pieces, len(r.times) // 2)):
+                times = r.times[part] - r.times[part[0]]
+                self.blocks.append(Block(index, int(part[0]), times, values[part], noise, pose, rates))
+
+    def _driven(self, recording: Recording) -> Recording:
+        """The recording with the drives that the simulator knows."""
+        return recording
+
+    def predict(
+        self,
+        hypothesis: Hypothesis | Sequence[Hypothesis],
+        theta: Sequence[np.ndarray] | np.ndarray,
+        local: np.ndarray | None = None,
+        blocks: Sequence[int] | None = None,
+    ) -> list[np.ndarray]:
+        """Predicted channels of each block, a list of [K, n, D]; nan from where a world has no equilibrium.
+
+        See `Forward.predict`; there is nothing local to a block.
+        """
+        wanted = range(len(self.blocks)) if blocks is None else blocks
+        each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
+        curves = {}
+        for r in sorted({self.blocks[b].recording for b in wanted}):
+            recording = self.recordings[r]
+            curve = self._curve(r, worlds)
+            first = np.repeat(stacked(recording)[0][0][:, None], len(worlds), axis=1)
+            continuous(curve, angle_mask(recording), first)
+            curves[r] = self._read(worlds, recording, curve)
+        out = []
+        for b in wanted:
+            block = self.blocks[b]
+            rows = slice(block.first, block.first + len(block.times))
+            out.append(np.moveaxis(curves[block.recording][rows], 2, 0))
+        return out
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """Curves have no time step; raises InputError where a number is out of bounds, as building the world does."""
+        self._world(hypothesis, theta, hypothesis.effects)
+        return 1.0
+
+    def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
+        """The suspects that curves can be asked about.
+
+        Load steps have no clock: what needs one is left out. In time, an effect with a time constant is suspected with
+        several, spread over the recording, because its signature changes with it altogether. Where there are many more
+        creases or panels than channels (a beam of cells), only all of them together are suspected.
+        """
+        for kind in ("crease", "panel"):
+            sites = {s.entities for s in every if s.kind == kind and s.entities is not None}
+            if len(sites) > SITES * len(self.components):
+                every = [s for s in every if s.kind != kind or s.entities is None]
+        if all(r.by_step for r in self.recordings):
+            return [s for s in every if not clocked(s.effect)]
+        spans = [r.times - r.times[0] for r in self.recordings]
+        low, high = min(float(t[2]) for t in spans), max(float(t[-1]) for t in spans)
+        out = []
+        for s in every:
+            slow = [n for n, f in enumerate(s.free) if n and f.unit == "s"]
+            if not slow or get(s.effect).family in DISTORTIONS:
+                out.append(s)
+                continue
+            for time in np.geomspace(low, high, CONSTANTS + 2)[1:-1]:
+                free = [replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)]
+                out.append(replace(s, free=tuple(free)))
+        return out
+
+    def _curve(self, r: int, worlds: list[tuple[Model, Parameters]]) -> np.ndarray:
+        """Undistorted channels [n, D, K] of a recording."""
+        raise NotImplementedError
+
+    def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
+        """The channels [n, D, K] as distorted measurements show them."""
+        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
+        names = [e for e in model.effects if get(e).family == "measurement" and not (recording.by_step and e in TIMED)]
+        out, row = curve.copy(), 0
+        at = np.repeat(recording.times[:, None], len(worlds), axis=1)
+        for channel in recording.channels.values():
+            part = slice(row, row + (1 if channel.values.ndim == 1 else channel.values.shape[1]))
+            row = part.stop
+            for name in names:
+                effect = get(name)
+                if effect.apply is None or (effect.channels and channel.kind not in effect.channels):
+                    continue
+                given = {n: np.broadcast_to(v[0], (len(worlds),)) for n, v in parameters.of(name).items()}
+                known = out[:, part].copy()
+                read = (lambda t, v=known: v) if recording.by_step else _interpolated(recording.times, known)
+                out[:, part] = effect.apply(read, at, **given)
+        return out
+
+    def _resting(self, r: int, k: int) -> Drive:
+        """The drive of a load step, held."""
+        return constant(self._drives[r], float(k))
+
+    def locate(self, fit: Fit) -> list[Place]:
+        """Residual moments by crease, most suspicious first; empty where they cannot be told."""
+        raise NotImplementedError
+
+    def menu(self) -> list[tuple[str, "CurveForward"]]:
+        """Experiments like those recorded that a user could make: what, and its predictions."""
+        out: list[tuple[str, CurveForward]] = [("repeat the same curve", self._other())]
+        if any(not s.is_zero for d in self._drives for s in d.signals.values()):
+            names = sorted({n.split("_")[0] for d in self._drives for n, s in d.signals.items() if not s.is_zero})
+            for gain, words in ((0.3, "at 0.3 times the level"), (2.0, "at twice the level"), (-1.0, "reversed")):
+                other = self._other()
+                other._drives = [_gained(d, gain) for d in self._drives]
+                out.append((f"{' and '.join(names)} {words}", other))
+        return out
+
+    def _other(self) -> "CurveForward":
+        out = copy.copy(self)
+        out.blocks, out._built = list(self.blocks), {}
+        out.__dict__.pop("predict", None)  # a remembered one is that of the recorded experiment
+        return out
+
+
+class Static(CurveForward):
+    """Predictions for curves by load step (`recording.by_step`): chains of equilibria.
+
+    Every world follows its own equilibria from step to step. A step begins where the world was, moved as the nominal
+    model moves there; Newton's tangent is taken once, at that guess, and improved by Broyden's updates. A world that
+    this does not bring to rest, or whose tangent is not positive definite, is left to `statics.equilibrium`. Memory
+    advances along the path, each step taking as long as nothing relaxes any more.
+    """
+
+    def __init__(
+        self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
+    ):
+        super().__init__(subject, recordings, pieces=pieces, threads=threads)
+        self._systems: dict[tuple[str, ...], _System] = {}
+        self._paths: dict[int, np.ndarray] = {}
+
+    def _other(self) -> CurveForward:
+        out = super()._other()
+        assert isinstance(out, Static)
+        out._paths = {}
+        return out
+
+    def _curve(self, r: int, worlds):
+        if r not in self._paths:
+            start = self._world(Hypothesis(), np.array([f.start for f in self.subject.nominals]), ())
+            self._paths[r] = self._chain(r, [start], None)[0][:, 0]
+        x, angles, alive = self._chain(r, worlds, self._paths[r])
+        recording = self.recordings[r]
+        steps = len(recording.times)
+        drives = [self._resting(r, k) for k in range(steps)]
+        columns = []
+        for w, (model, parameters) in enumerate(worlds):
+            own = [
+                held(distorted(model, parameters, d, 0.0)) if model.effects != model.laws else held(d) for d in drives
+            ]
+            state = State.at_rest(model, steps, position=np.moveaxis(x[:, w], 0, 1))
+            state.angles = angles[:, w].T.copy()
+            poses = Poses(model, parameters, x[:, w], angles[:, w], np.zeros(steps), state, joined(own))
+            values = [read_channel(poses, c).reshape(steps, -1) for c in recording.channels.values()]
+            columns.append(np.where(alive[:, w, None], np.concatenate(values, axis=1), np.nan))
+        return np.stack(columns, axis=2)
+
+    # --- equilibria
+
+    def _chain(self, r: int, worlds, path: np.ndarray | None):
+        """Positions [n, K, N, 3], hinge angles [n, K, H] and whether an equilibrium was found [n, K]."""
+        model = worlds[0][0]
+        steps, count = len(self.recordings[r].times), len(worlds)
+        state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1))
+        alive = np.ones(count, bool)
+        xs, all_angles, found = [], [], []
+        before = model.position
+        for k in range(steps):
+            guess = state.x.copy()
+            if path is not None:
+                guess += (path[k] - before)[:, None]
+                before = path[k]
+            search = _Step(self._system(model, worlds), worlds, self._resting(r, k), state, self.threads)
+            state, alive = search.settle(guess, alive)
+            xs.append(np.moveaxis(state.x, 1, 0))
+            all_angles.append(state.angles.T)
+            found.append(alive)
+        return np.stack(xs), np.stack(all_angles), np.stack(found)
+
+    def _system(self, model: Model, worlds) -> _System:
+        """Couplings and colours of a model, which depend on its effects only."""
+        if model.effects not in self._systems:
+            groups = np.zeros(len(self._drives[0].signals) - 14)
+            drive = Drive(voltage=list(groups))
+            self._systems[model.effects] = _System(model, worlds[0][1], drive, State.at_rest(model))
+        return self._systems[model.effects]
+
+    # --- where
+
+    def locate(self, fit: Fit) -> list[Place]:
+        """Equation error at the recorded angles: the moment that balances each crease beyond what the model gives."""
+        found = []
+        for r, recording in enumerate(self.recordings):
+            given = coordinates(self, r)
+            if given is None:
+                return []
+            q, noise = given
+            model, parameters = self._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
+            model = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
+            parameters = parameters.for_model(model)
+            drives = [held(distorted(model, parameters, self._resting(r, k), 0.0)) for k in range(q.shape[1])]
+            # the recorded angles, and each of them a little further, for the error of the moment
+            moves = np.concatenate([np.zeros((1, len(q))), 1e-5 * np.eye(len(q))])
+            moments = np.stack([self._moments(model, parameters, joined(drives), q + m[:, None]) for m in moves])
+            slope = (moments[1:] - moments[0]) / 1e-5
+            error = np.sqrt(np.einsum("jkn,j->kn", slope**2, noise**2))
+            levels = {n: np.array([at_once(d, n) for d in drives]) for n in drives[0].signals}
+            against = {n: v for n, v in levels.items() if np.ptp(v) > 0}
+            found.append((recording.times, q, moments[0], error, against))
+        return places(self.articulation.names(), found)
+
+    def _moments(self, model: Model, parameters: Parameters, drive: Drive, q: np.ndarray) -> np.ndarray:
+        """Missing moments [m, n] at held coordinates [m, n]."""
+        arm = self.articulation
+        pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
+        x = arm.positions(pose)
+        state = State.at_rest(model, q.shape[1], position=x)
+        force = Batch(model, parameters, drive, state, threads=self.threads).total_force(0.0)
+        return -np.einsum("mnwa,nwa->mw", arm.jacobian(pose, x), force)
+
+
+class _Step:
+    """Equilibria of all worlds in one load step, beginning with the state in which the last one left them."""
+
+    def __init__(self, system: _System, worlds, drive: Drive, state: State, threads: int | None):
+        self.system, self.worlds, self.state, self.threads = system, worlds, state, threads
+        self.model = worlds[0][0]
+        self.parameters = Parameters.join([p for _, p in worlds])
+        self.drive = held(distorted(self.model, self.parameters, drive, 0.0))
+        self.remembers = any(get(e).memory for e in self.model.laws)
+        # held nodes: the integrator moves them as it is told, and laws with memory advance
+        still = replace(self.model, free=np.zeros_like(self.model.free))
+        self.batch = Batch(still, self.parameters, self.drive, state, threads=threads)
+        self.free = system.free
+
+    def force(self, x: np.ndarray) -> np.ndarray:
+        """Forces on the free axes [F, W] at positions [N, W, 3], reached from the step's beginning."""
+        b, s = self.batch, self.state
+        if not self.remembers:
+            b.place(x, s.angles)
+        else:
+            moved(b, s, (x - s.x) / HOLD, HOLD)
+        f = b.total_force(0.0)
+        return np.moveaxis(f, 1, 2).reshape(-1, x.shape[1])[self.free]
+
+    def settle(self, x: np.ndarray, alive: np.ndarray) -> tuple[State, np.ndarray]:
+        """The state at the equilibria, and which worlds have one; x [N, W, 3] is the guess."""
+        x, done = self._newton(x, alive, ROUNDS)
+        lost = alive & ~done
+        if np.any(lost):
+            x, lost = self._searched(x, lost)
+            if self.remembers and np.any(lost):  # found with the memory of the step's beginning
+                x, again = self._newton(x, lost, ROUNDS)
+                lost &= again
+            done |= lost
+        alive = alive & done
+        self.force(np.where(alive[None, :, None], x, self.state.x))
+        out = self.batch.state()
+        out.v[:], out.a[:] = 0.0, 0.0
+        out.step, out.status = -1, np.full_like(out.status, -1)
+        return out, alive
+
+    def _newton(self, x: np.ndarray, wanted: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
+        """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
+        size, done = self.system.size, np.zeros(len(wanted), bool)
+        for _ in range(rounds):
+            factors = self._factors(x, wanted & ~done)
+            going = np.array([f is not None for f in factors])
+            if not np.any(going):
+                break
+            s = self._solved(factors, self.force(x), going)
+            past = [s]
+            for _ in range(ITERATIONS):
+                large = np.abs(s).max(axis=0, initial=0.0)
+                going &= np.isfinite(large)
+                far = going & (large > FAR * size)
+                if np.any(far):  # no further than this without a new tangent
+                    x = x + self._spread(np.where(far, s * _over(np.full_like(large, FAR * size), large), 0.0))
+                    going &= ~far
+                x = x + self._spread(np.where(going, s, 0.0))
+                done |= going & (large < CLOSE * size)
+                going &= ~done
+                if not np.any(going):
+                    break
+                z = self._solved(factors, self.force(x), going)
+                with np.errstate(all="ignore"):  # of worlds that go no further
+                    for a, b in zip(past[:-1], past[1:], strict=True):  # Broyden's first method (Kelley 1995, ch. 7)
+                        z = z + b * _over(np.sum(a * z, axis=0), np.sum(a * a, axis=0))
+                    last = past[-1]
+                    s = z / (1.0 - _over(np.sum(last * z, axis=0), np.sum(last * last, axis=0)))
+                past.append(s)
+        return x, done
+
+    def _searched(self, x: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Equilibria of these worlds by a search of their own, from where the last step left them; which have one."""
+        x, found = x.copy(), np.zeros_like(lost)
+        model = self.model.with_effects(without=tuple(e for e in self.model.effects if e not in self.model.laws))
+        for w in np.flatnonzero(lost):
+            drive = self.drive.replace(
+                **{n: float(np.broadcast_to(s.offset, lost.shape)[w]) for n, s in self.drive.signals.items()}
+            )
+            state = self.state.select(np.array([w]))
+            one = equilibrium(model, self.worlds[w][1].for_model(model), drive, state=state)
+            if one.converged:
+                x[:, w], found[w] = one.x, True
+        return x, found
+
+    def _solved(self, factors, f: np.ndarray, going: np.ndarray) -> np.ndarray:
+        out = np.zeros_like(f)
+        for w in np.flatnonzero(going):
+            out[:, w] = factors[w].solve(f[:, w])
+        return out
+
+    def _spread(self, s: np.ndarray) -> np.ndarray:
+        """Values on the free axes [F, W] as [N, W, 3]."""
+        out = np.zeros((self.model.position.size, s.shape[1]))
+        out[self.free] = s
+        return np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
+
+    def _factors(self, x: np.ndarray, alive: np.ndarray) -> list[_Factor | None]:
+        """Factors of the tangent of every world at its guess; None where it is not positive definite."""
+        y, n = self.system, len(x)
+        colours = int(y._colours.max(initial=0)) + 1
+        copies = colours * 3 * len(STENCIL)
+        moved_ = np.flatnonzero(y._colours >= 0)
+        moves = np.zeros((n, colours, 3, len(STENCIL), 3))
+        for axis in range(3):
+            moves[moved_, y._colours[moved_], axis, :, axis] = y._steps[moved_, None] * STENCIL
+        moves = moves.reshape(n, copies, 3)
+        of = np.flatnonzero(y._colours[y._columns] >= 0)
+        rows, columns = y._rows[of], y._columns[of]
+        out: list[_Factor | None] = [None] * x.shape[1]
+        wanted = np.flatnonzero(alive)
+        for part in np.array_split(wanted, max(1, -(-len(wanted) * copies // MOST_WORLDS))):
+            if not len(part):
+                continue
+            state = self.state.select(np.repeat(part, copies))
+            state.x = (x[:, part, None] + moves[:, None]).reshape(n, -1, 3)
+            given = Parameters.join([self.worlds[w][1] for w in part], repeat=copies)
+            drive = self.drive.replace(
+                **{
+                    m: np.repeat(np.broadcast_to(s.offset, (x.shape[1],))[part], copies)
+                    for m, s in self.drive.signals.items()
+                    if np.size(s.offset) > 1
+                }
+            )
+            f = Batch(self.model, given, drive, state, threads=self.threads).total_force(0.0)
+            f = f.reshape(n, len(part), colours, 3, len(STENCIL), 3)
+            slopes = -np.einsum("nwcasb,s->wncab", f, WEIGHTS)
+            for w, slope in zip(part, slopes, strict=True):
+                blocks = slope[rows, y._colours[columns]] / y._steps[columns, None, None]
+                i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
+                j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * blocks.astype(np.int64)
+                whole = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(3 * n, 3 * n))
+                k = sp.csc_array(whole[self.free][:, self.free])
+                if not np.all(np.isfinite(k.data)):
+                    continue
+                shift = NULL_SHIFT * float(np.abs(k.data).max(initial=1.0))
+                factor = _Factor(sp.csc_array(k + shift * sp.eye_array(k.shape[0], format="csc")))
+                out[w] = None if factor.singular or not factor.definite else factor
+        return out
+
+
+def clocked(effect: str) -> bool:
+    """Whether an effect depends on how fast things happen: a parameter's unit has seconds in it (but for s^2)."""
+    return effect in TIMED or any(re.search(r"(?<![A-Za-z])s(?![A-Za-z^])", p.unit) for p in get(effect).parameters)
+
+
+def moved(batch: Batch, start: State, velocity: np.ndarray, dt: float):
+    """Moves held nodes from a state at a velocity [N, W, 3] for dt [s]; memory advances, and they are then at rest."""
+    batch._x.assign(batch._upload(start.x, wp.vec3d))
+    batch._angles.assign(batch._upload(start.angles, wp.float64))
+    batch._memory.assign(batch._upload(start.memory, wp.float64))
+    onward(batch, velocity, dt)
+    batch._v.zero_()
+
+
+def onward(batch: Batch, velocity: np.ndarray, dt: float):
+    """One step of dt [s] of held nodes from where they are, at a velocity [N, W, 3]."""
+    batch._v.assign(batch._upload(velocity, wp.vec3d))
+    batch._a.zero_()
+    batch._status.fill_(-1)
+    batch.advance(1, dt, np.inf)
+
+
+def constant(drive: Drive, time: float) -> Drive:
+    """The drive held at its value at one instant."""
+    return drive.replace(**{n: np.squeeze(s(time)) for n, s in drive.signals.items()})
+
+
+def held(drive: Drive) -> Drive:
+    """The drive held at its value at time 0, one number for all worlds or for each."""
+    return drive.replace(**{n: np.atleast_1d(np.squeeze(s(0.0))) for n, s in drive.signals.items()})
+
+
+def joined(drives: Sequence[Drive]) -> Drive:
+    """Held drives of one world each as one drive of as many worlds."""
+    return drives[0].replace(**{n: np.array([at_once(d, n) for d in drives]) for n in drives[0].signals})
+
+
+def at_once(drive: Drive, name: str) -> float:
+    """A channel of one world at time 0."""
+    return float(np.ravel(drive[name](0.0))[0])
+
+
+def _gained(drive: Drive, gain: float) -> Drive:
+    return drive.replace(
+        **{
+            n: replace(s, offset=gain * np.asarray(s.offset), scale=gain * np.asarray(s.scale))
+            for n, s in drive.signals.items()
+        }
+    )
+
+
+def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a / b, 0 where b is 0."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+
+
+def _interpolated(grid: np.ndarray, values: np.ndarray):
+    """Values [n, d, W] as a function of times [m, W], linearly; the ends hold."""
+
+    def read(times: np.ndarray) -> np.ndarray:
+        out = np.empty((len(times), values.shape[1], values.shape[2]))
+        for w in range(values.shape[2]):
+            for d in range(values.shape[1]):
+                out[:, d, w] = np.interp(times[:, w], grid, values[:, d, w])
+        return out
+
+    return read
+
+
+def places(names: Sequence[str], found) -> list[Place]:
+    """Places, most suspicious first.
+
+    Args:
+        names: of the m coordinates. found: per recording times (n,), coordinates, missing moments and their errors
+            [m, n], and what else to show them against, (n,) by channel.
+    """
+    out = []
+    for k, name in enumerate(names):
+        z, power = [], []
+        for times, q, missing, error, _ in found:
+            width = max(1, len(times) // BINS)
+            cut = len(times) // width * width
+            z.append((missing[k, :cut].reshape(-1, width).mean(1)) / (error[k, :cut].reshape(-1, width).mean(1)) * np.sqrt(width))
+            power.append(missing[k] * np.gradient(q[k], times))
+        times, _, missing, error, _ = found[0]
+        score = float(np.sqrt(np.mean(np.concatenate(z) ** 2)))
+        out.append(
+            Place(
+                name,
+                score,
+                0.0,
+                float(np.mean(np.concatenate(power))),
+                float("nan"),
+                times.tolist(),
+                missing[k].tolist(),
+                error[k].tolist(),
+                _curves(found, k),
+            )
+        )
+    excess = np.array([max(p.score**2 - 1.0, 0.0) for p in out])
+    for p, e in zip(out, excess, strict=True):
+        p.share = float(e / excess.sum()) if excess.sum() > 0 else 1.0 / len(out)
+    return sorted(out, key=lambda p: -p.score)
+
+
+def _curves(found, k: int) -> list[Curve]:
+    """Residual moment of a coordinate against its angle and against every drive that varies."""
+    y = np.concatenate([f[2][k] for f in found])
+    error = np.concatenate([f[3][k] for f in found])
+    against = {("angle", "rad"): np.concatenate([f[1][k] for f in found])}
+    for n in sorted(set.intersection(*(set(f[4]) for f in found))):
+        unit = {"field": "T", "voltage": "V", "gradient": "T/m", "time": "s"}.get(n.split("_")[0], "")
+        against[n, unit] = np.concatenate([f[4][n] for f in found])
+    out = []
+    for (name, unit), x in against.items():
+        parts = [p for p in np.array_split(np.argsort(x, kind="stable"), BINS) if len(p)]
+        out.append(
+            Curve(
+                name,
+                unit,
+                [float(x[p].mean()) for p in parts],
+                [float(y[p].mean()) for p in parts],
+                [float(np.sqrt(np.mean(error[p] ** 2) / len(p))) for p in parts],
+                [len(p) for p in parts],
+            )
+        )
+    return out
+
+
+def sign_changes(curve: Curve) -> list[float]:
+    """Where the residual moment changes its sign, between means that are both beyond twice their error."""
+    x, y, e = (np.array(v) for v in (curve.x, curve.mean, curve.error))
+    sure = np.flatnonzero(np.abs(y) > 2 * e)
+    pairs = [(a, b) for a, b in zip(sure[:-1], sure[1:], strict=True) if y[a] * y[b] < 0]
+    return [float(x[a] + (x[b] - x[a]) * y[a] / (y[a] - y[b])) for a, b in pairs]

@@ -1,0 +1,110 @@
+"""What may be handed to `diagnose` as the model."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from origami_sim.diagnose.hypothesis import Free, Subject, factor
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters
+from origami_sim.scene import Setting, Settings, _parse, scene_module, scene_settings
+
+Source = (
+    Subject
+    | str
+    | ModuleType
+    | tuple[ModuleType, Settings]
+    | tuple[Model, Parameters]
+    | tuple[Model, Parameters, Drive]
+)
+"""A subject; the name or module of a scene, or this with settings; or a model with its parameters and its drive."""
+
+
+def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) -> Subject:
+    """The subject of a diagnosis.
+
+    Args:
+        source: see `Source`.
+        priors: standard deviations of what was known before. For a scene: by setting, see `spreads`. For a model with
+            parameters: by "effect.parameter", relative ("5 %" or 0.05), one factor for all entities.
+
+    Raises:
+        InputError: no such scene, setting or parameter; a prior that is not positive; what is no model.
+    """
+    if isinstance(source, Subject):
+        if priors:
+            raise InputError("a subject states its own priors", field="priors", value=", ".join(priors))
+        return source
+    if isinstance(source, str):
+        source = scene_module(source)
+    if isinstance(source, ModuleType):
+        source = (source, scene_settings(source))
+    match source:
+        case (ModuleType() as module, Settings() as settings):
+            return Subject.from_scene(module, settings, spreads=spreads(settings, priors or {}))
+        case (Model() as model, Parameters() as parameters) | (Model() as model, Parameters() as parameters, Drive()):
+            drive = source[2] if len(source) == 3 else None
+            nominals = [_factor(parameters, name, given) for name, given in (priors or {}).items()]
+            return Subject.from_model(model, parameters, drive, nominals)
+    raise InputError(
+        "this is no model",
+        field="model",
+        value=type(source).__name__,
+        allowed="a scene, (model, parameters), (model, parameters, drive), or a Subject",
+    )
+
+
+def _factor(parameters: Parameters, name: str, given: float | str) -> Free:
+    """A factor on a parameter, known to within "5 %" or 0.05."""
+    owner, _, parameter = name.partition(".")
+    if (owner, parameter) not in set(parameters):
+        known = sorted(".".join(key) for key in parameters)
+        raise InputError("there is no such parameter", field="priors", value=name, allowed=", ".join(known))
+    text = str(given).strip()
+    spread = _positive(name, text.removesuffix("%"), given, "0.05 or 5 %")
+    return factor(name, 0.01 * spread if text.endswith("%") else spread)
+
+
+def spreads(settings: Settings, priors: Mapping[str, float | str], *, source: object = None) -> dict[str, float]:
+    """Standard deviations [SI] of settings: numbers in the setting's unit, "5 %" of its value, or "0.5 mm".
+
+    Raises:
+        InputError: no such setting, a setting that is a word, a value that is no positive number.
+    """
+    out = {}
+    for name, given in priors.items():
+        s = settings.get(name)
+        if s is None or isinstance(s.value, (str, bool)):
+            numbers = [n for n, t in settings.items() if not isinstance(t.value, (str, bool))]
+            raise InputError(
+                "a prior is for a number of the model",
+                file=source,
+                field="priors",
+                value=name,
+                allowed=", ".join(numbers),
+            )
+        out[name] = _spread(s, given, settings, source)
+    return out
+
+
+def _spread(s: Setting, given: float | str, settings: Settings, source: object) -> float:
+    text = str(given).strip()
+    allowed = f"a standard deviation in {s.unit}, with a unit, or in % of {s.value:g}"
+    if text.endswith("%"):
+        if not s.value:
+            raise InputError("no share of zero", file=source, field=f"priors.{s.name}", value=given, allowed=s.unit)
+        return _positive(s.name, text[:-1], given, allowed, source) * 0.01 * abs(float(s.value))
+    return _positive(s.name, str(_parse(s, text, Path(str(source or settings.file)))), given, allowed, source)
+
+
+def _positive(name: str, text: str, given: object, allowed: str, source: object = None) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not (value > 0 and np.isfinite(value)):
+        raise InputError("not a standard deviation", file=source, field=f"priors.{name}", value=given, allowed=allowed)
+    return value

@@ -1,0 +1,372 @@
+"""The page of a diagnosis: complete, safe and equal to its data for every verdict; readable in a real browser."""
+
+import html.parser
+import json
+import math
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from origami_sim.build import Sheet
+from origami_sim.diagnose.diagnosis import (
+    VERDICTS,
+    Baseline,
+    Candidate,
+    Correlation,
+    Curve,
+    Diagnosis,
+    Experiment,
+    Number,
+    Place,
+    Suspected,
+    Trace,
+)
+from origami_sim.diagnose.report import SECTIONS, geometry_of, page, read_report, write_report
+from origami_sim.diagnose.report_markup import amount, element, interval, percent, plus_minus
+from origami_sim.diagnose.report_plots import POINTS, Plot, ticks
+from origami_sim.errors import InputError
+from origami_sim.pattern import grid
+
+NAN = math.nan
+CREASES = ("left crease", "middle <b> & crease", "right crease")
+GEOMETRY = {
+    "nodes": [[0.04 * k, 0.05 * j, 0.0] for k in range(5) for j in range(2)],
+    "triangles": [t for k in range(4) for t in ([2 * k, 2 * k + 2, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 1])],
+    "panels": [{"name": f"panel {k}", "triangles": [2 * k, 2 * k + 1]} for k in range(4)],
+    "creases": [{"name": n, "nodes": [2 * k + 2, 2 * k + 3]} for k, n in enumerate(CREASES)],
+    "held": [0, 1],
+}
+
+
+def ring_down(recording: str, component: int, frames: int, rng) -> Trace:
+    """A decaying angle: given too little damping, refitted to an average, and right."""
+    t = np.arange(frames) / 240.0
+    swing = 0.6 - 0.15 * component
+    true = swing * np.exp(-0.35 * t) * np.cos(5.0 * t + component)
+    noise = 4e-3
+    return Trace(
+        recording,
+        f"angle {component + 1}",
+        "rad",
+        noise,
+        t.tolist(),
+        (true + noise * rng.normal(size=frames)).tolist(),
+        (swing * np.exp(-0.1 * t) * np.cos(5.1 * t + component)).tolist(),
+        (swing * np.exp(-0.28 * t) * np.cos(5.02 * t + component)).tolist(),
+        (true + 5e-4 * np.sin(3 * t)).tolist(),
+        2 * noise,
+        [0, frames // 2],
+    )
+
+
+def white(traces: list[Trace], kind: str, lags: int = 60) -> list[float]:
+    """Autocorrelation of the residuals of traces."""
+    sums = np.zeros(lags)
+    for t in traces:
+        r = np.array(t.recorded) - np.array(getattr(t, kind))
+        r -= r.mean()
+        sums += [r[: len(r) - k] @ r[k:] for k in range(lags)]
+    return (sums / sums[0]).tolist()
+
+
+def place(site: str, share: float, rng) -> Place:
+    t = np.linspace(0, 5, 300)
+    rate = -2.0 * np.exp(-0.3 * t) * np.sin(5 * t)
+    x = np.linspace(-2, 2, 13)
+    curve = [Curve(a, u, x.tolist(), (-share * 2e-5 * x).tolist(), [1.5e-6] * 13, [23] * 13) for a, u in (
+        ("angle", "rad"), ("rate", "rad/s"), ("voltage", "V"))]  # fmt: skip
+    moment = -share * 2e-5 * rate + 2e-6 * rng.normal(size=300)
+    onset = 0.31 if share > 0.1 else NAN
+    return Place(site, 40 * share, share, -3.1e-5 * share, onset, t.tolist(), moment.tolist(), [2e-6] * 300, curve)
+
+
+def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
+    """Three creases, two recordings; a viscous middle crease (what is said about it differs by verdict)."""
+    rng = np.random.default_rng(3)
+    middle = CREASES[1]
+    best = f"crease_viscosity at {middle}"
+    second = f"crease_friction at {middle}"
+    traces = [ring_down(r, c, frames, rng) for r in ("first drop", "second <drop>") for c in range(3)]
+    number = Number("crease_viscosity.damping", "N m s/rad", 2.13e-5, 2.04e-5, 2.22e-5, NAN, NAN, False)
+    stiffness = Number("stiffness", "N m/rad", 1.312e-3, 1.29e-3, 1.33e-3, 1.25e-3, 5e-5, False)
+    friction = Number("crease_friction.moment", "N m", 8.1e-6, 6.4e-6, 9.8e-6, NAN, NAN, True)
+    rms = [4.1e-3, 4.0e-3, 4.2e-3]
+    candidates = [
+        Candidate(best, "mechanism", ["crease_viscosity"], [middle], [stiffness, number], 0.968, 412.3, 21.4, rms,
+                  [99.1, 98.7, 98.8], "predicts held-out data best"),
+        Candidate(second, "mechanism", ["crease_friction"], [middle], [stiffness, friction], 0.027, 371.0, 24.9,
+                  [5.2e-3, 5.5e-3, 5.1e-3], [97.0, 96.1, 96.8], "predicts held-out data worse by 41.3 +- 8.0",
+                  "crease_friction.moment lies on its bound (8.1e-06 N m)"),
+        Candidate("air_drag at panel 2", "mechanism", ["air_drag"], ["panel 2"],
+                  [Number("air_drag.drag_coefficient", "1", 3.1, 2.0, 4.2, 1.2, 0.4, False)], 0.003, 180.0, 33.0,
+                  [0.021, 0.019, 0.022], [82.0, 81.0, 80.2], "predicts held-out data worse by 232 +- 30",
+                  "air_drag.drag_coefficient left its prior by 4.7 sd"),
+        Candidate("nominal refitted", "nominal", [], [], [stiffness], 0.001, 0.0, 0.0, [0.043, 0.04, 0.045],
+                  [61.0, 62.0, 60.0], "misses the recordings"),
+        Candidate("layer_thinning at all creases", "mechanism", ["layer_thinning"], ["all creases"], [], NAN, NAN, NAN,
+                  [NAN] * 3, [NAN] * 3, failed="a world went unstable at 0.21 s <node 4>"),
+    ]  # fmt: skip
+    names = [best, second, "air_drag at panel 2", "crease_viscosity at all creases", "time_scale at the measurement"]
+    effects = ["crease_viscosity", "crease_friction", "air_drag", "crease_stiffening", "sensor_delay", "gravity_tilt"]
+    screening = [
+        Suspected(f"{e} at {s}", e, s, "crease", z, 2.2e-5 * z / 60, 4e-7, "N m s/rad", (z / 64) ** 2 * 0.97,
+                  "refitted" if z > 30 else "")
+        for z, (e, s) in zip(
+            np.geomspace(63.5, 0.4, 18), [(e, s) for e in effects for s in CREASES], strict=True)
+    ]  # fmt: skip
+    screening.append(Suspected("hum at the drive", "hum", "the drive", "drive", NAN, NAN, NAN, "V", NAN, "not excited"))
+    overlap = [[1.0, 0.93, 0.61, 0.99, 0.12], [0.93, 1, 0.55, 0.9, 0.1], [0.61, 0.55, 1, 0.58, 0.3],
+               [0.99, 0.9, 0.58, 1, 0.14], [0.12, 0.1, 0.3, 0.14, NAN]]  # fmt: skip
+    sentence = (
+        f"At {middle} the model lacks crease_viscosity (damping 21 µN m s/rad, 95 %: 20 to 22), p = 0.97; held-out "
+        "error falls from 10.7 to 1.02 times the noise floor (of what could be removed, 100 % is)."
+    )
+    correlations = []
+    for c in range(3):
+        row = Correlation(f"angle {c + 1}", (np.arange(60) / 240).tolist(), white(traces[c::3], "before"),
+                          white(traces[c::3], "after"), "rate")  # fmt: skip
+        row.cross_before = (0.6 * np.cos(np.arange(60) / 12)).tolist()
+        row.cross_after = (0.02 * rng.normal(size=60)).tolist()
+        correlations.append(row)
+    out = Diagnosis(
+        verdict=verdict,
+        sentence=sentence,
+        probability=0.968,
+        chosen=[best],
+        candidates=candidates,
+        screening=screening,
+        isolability_labels=names,
+        isolability=overlap,
+        places=[place(middle, 0.93, rng), place(CREASES[0], 0.05, rng), place(CREASES[2], 0.015, rng),
+                place("shift x", 0.005, rng)],
+        p_value=0.005,
+        onset=0.31,
+        traces=traces,
+        correlations=correlations,
+        experiments=[
+            Experiment("release from 40 deg instead of 20 deg", [best, second], 8.3, 1),
+            Experiment("record until rest, 20 s", [best, second, "air_drag at panel 2"], 3.1, 3),
+        ],
+        baselines=[Baseline("best parameter-only refit", [0.043, 0.04, 0.045]),
+                   Baseline("sparse regression (STLSQ)", [0.012, 0.011, 0.013], "rate: -3.1, rate |rate|: 0.2"),
+                   Baseline("Gaussian process", [NAN] * 3, "not run: <too few frames>")],
+        components=[f"angle {c + 1}" for c in range(3)],
+        units=["rad"] * 3,
+        noise=[4e-3] * 3,
+        error_before=[0.2, 0.15, 0.11],
+        error_refitted=[0.043, 0.04, 0.045],
+        error_after=rms,
+        notes=["second <drop>: 3 frames missing at 1.2 s & filled", "angle 2: quantised to 0.5 +- 0.1 mrad"],
+        settings={"command": "origami-sim diagnose model.toml first.csv second.csv", "seed": 0, "segment": None,
+                  "draws": 199, "start": "fit"},
+        seconds={"segments": 1.1, "nominal": 6.4, "screening": 9.1, "refit": 21.0, "report": NAN},
+        patch={"crease_viscosity.damping": 2.13e-5, "stiffness": 1.312e-3},
+        subject="three creases & <four panels>",
+        recordings=["first drop", "second <drop>"],
+    )  # fmt: skip
+    if verdict == "ADEQUATE":
+        out.chosen, out.onset, out.experiments, out.places, out.p_value, out.patch = [], NAN, [], [], 0.62, {}
+    elif verdict == "TIE":
+        out.chosen = [best, second]
+    elif verdict == "SEVERAL":
+        out.chosen, candidates[0].label = [best, "air_drag at panel 2"], f"{best} + air_drag at panel 2"
+    elif verdict == "UNTESTABLE":  # nothing could be done at all
+        out.probability = out.p_value = out.onset = NAN
+        out.candidates, out.screening, out.isolability_labels, out.isolability = [], [], [], []
+        out.places, out.traces, out.correlations, out.experiments, out.baselines = [], [], [], [], []
+        out.error_after = out.error_refitted = out.error_before = [NAN] * 3
+        out.noise, out.chosen, out.patch, out.notes, out.settings, out.seconds = [NAN] * 3, [], {}, [], {}, {}
+    return out
+
+
+class Read(html.parser.HTMLParser):
+    """What a browser would see: ids, links, headings, text; refuses unbalanced markup."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.ids, self.links, self.headings, self.words, self.open, self.tags = [], [], [], [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        a = dict(attrs)
+        self.ids += [a["id"]] if "id" in a else []
+        self.links += [a["href"]] if "href" in a else []
+        self.words += [a[k] for k in ("aria-label", "title", "style", "d", "viewbox") if a.get(k)]
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("style", "script"):
+            self.words.append(data)
+        if self.open and self.open[-1] == "h2":
+            self.headings.append(data)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_page_is_complete_for_every_verdict(verdict, tmp_path):
+    diagnosis = example(verdict)
+    path = write_report(diagnosis, tmp_path / "new" / "report.html", geometry=GEOMETRY)
+    text = path.read_text(encoding="utf-8")
+    seen = Read(text)
+    assert seen.headings == list(SECTIONS.values())
+    assert len(set(seen.ids)) == len(seen.ids)
+    internal = [link[1:] for link in seen.links if link.startswith("#")]
+    assert set(SECTIONS) <= set(internal) <= set(seen.ids)
+    assert not re.search(r"\b(nan|none|undefined|inf|null|NaN|None)\b", " ".join(seen.words))
+    outside = re.sub(r'href="data:[^"]*"', "", text)
+    assert not re.search(r"https?:|src=|@import|url\(", outside)
+    assert read_report(path) == {"diagnosis": diagnosis.to_dict(), "geometry": GEOMETRY}
+    assert verdict in " ".join(seen.words)
+    assert [p.name for p in path.parent.iterdir()] == ["report.html"]
+    assert len(text) < 3e6
+
+
+def test_names_are_escaped():
+    seen = Read(page(example(), GEOMETRY))
+    assert "b" in seen.tags  # of the page itself
+    text = "".join(seen.words)
+    for name in ("middle <b> & crease", "second <drop>", "three creases & <four panels>", "not run: <too few frames>"):
+        assert name in text
+    assert not {"drop", "node", "too", "four"} & set(seen.tags)
+
+
+def test_numbers_on_the_page_follow_from_the_data():
+    d = example()
+    text = "".join(Read(page(d, GEOMETRY)).words)
+    noise = np.array(d.noise)
+    before, after = (float(np.sqrt(np.mean((np.array(e) / noise) ** 2))) for e in (d.error_before, d.error_after))
+    assert f"{before:.0f} × → {after:.1f} ×" in text
+    t = d.traces[0]
+    y, f = np.array(t.recorded), np.array(t.after)
+    fit = 100 * (1 - np.sqrt(np.mean((y - f) ** 2)) / y.std())
+    assert f"now {fit:.1f} %" in text
+    assert "21.30 µN m s/rad (20.40 to 22.20)" in text  # 2.13e-5, half-width 0.09e-5
+    assert "+412 ± 21" in text
+    assert "1.2 sd away" in text  # (1.312 - 1.25) / 0.05
+
+
+def test_chosen_rows_stand_out():
+    for verdict, rows in (("MECHANISM", 1), ("TIE", 2), ("SEVERAL", 1), ("ADEQUATE", 0)):
+        assert page(example(verdict)).count('<tr class="chosen">') == rows, verdict
+
+
+def test_geometry_of_a_model():
+    sheet = Sheet(grid(3, 2, 0.01, 0.02), thickness=1e-3, triangulation="center").crease(stiffness=1e-3)
+    model, _ = sheet.build()
+    g = geometry_of(model)
+    text = page(example("ADEQUATE"), g)
+    assert len(g["creases"]) == len(model.creases)
+    assert text.count('class="crease"') == len(model.creases) == 7
+    assert sorted(t for p in g["panels"] for t in p["triangles"]) == list(range(len(model.triangles)))
+
+
+@pytest.mark.parametrize("break_it, field", [
+    (lambda g: g.pop("creases"), "creases"),
+    (lambda g: g["creases"][1].update(nodes=[2, 99]), "creases.middle <b> & crease.nodes"),
+    (lambda g: g["nodes"][0].__setitem__(1, None), "nodes"),
+])  # fmt: skip
+def test_a_broken_geometry_is_named(break_it, field, tmp_path):
+    broken = json.loads(json.dumps(GEOMETRY))
+    break_it(broken)
+    with pytest.raises(InputError, match=re.escape(f"'{field}'")):
+        write_report(example(), tmp_path / "report.html", geometry=broken)
+    assert not list(tmp_path.iterdir())
+
+
+def test_long_traces_are_thinned_but_keep_their_peaks():
+    x = np.linspace(0, 10, 50_000)
+    y = np.sin(40 * x)
+    y[31_234] = 3.0
+    drawn = Plot("long", (0, 10), (-1.1, 3.1)).line(x, y, "after").html()
+    path = re.search(r' d="(M[^"]*)" class="after"', drawn)[1]
+    start, steps = path[1:].split("l")
+    numbers = np.array(re.findall(r"-?\d+", steps), int).reshape(-1, 2)
+    heights = int(start.split()[1]) + np.cumsum(numbers[:, 1])
+    assert 500 < len(numbers) + 1 <= POINTS
+    assert heights.min() == round(1000 * (3.1 - 3.0) / 4.2)
+    assert abs(heights.max() - round(1000 * (3.1 + 1.0) / 4.2)) <= 1
+
+
+def test_large_page_stays_small():
+    rng = np.random.default_rng(0)
+    d = example()
+    d.traces = [ring_down(f"drop {r}", c, 2400, rng) for r in range(4) for c in range(3)]
+    assert len(page(d, GEOMETRY)) < 3e6
+
+
+def test_lines_break_where_segments_begin_and_values_are_missing():
+    plot = Plot("gaps", (0, 9), (0, 1)).line(range(10), [0, 0, 0, NAN, 0, 0, 0, 0, 0, 0], "after", breaks=[6]).html()
+    assert re.search(r' d="([^"]*)" class="after"', plot)[1].count("M") == 3
+
+
+def test_numbers_are_rounded_to_their_uncertainty():
+    assert interval(1.23456e-3, 1.18e-3, 1.29e-3, "N m") == "1.235 mN m (1.180 to 1.290)"
+    assert interval(0.0123, NAN, 0.02, "kg") == "12.3 g"
+    assert plus_minus(412.3, 21.4, sign=True) == "+412 ± 21"
+    assert plus_minus(-0.01234, 0.0011, "m") == "−12.3 ± 1.1 mm"
+    assert amount(3.2e-6, "kg m^2") == "3.2×10⁻⁶ kg m²"
+    assert amount(NAN, "N") == "–"
+    assert [percent(p) for p in (0.9996, 0.968, 0.001, NAN)] == ["> 99 %", "97 %", "< 1 %", "–"]
+    assert ticks(-0.9, 1.1) == pytest.approx([-0.5, 0.0, 0.5, 1.0])
+    assert element("a", "<&>", href='"x"') == '<a href="&quot;x&quot;">&lt;&amp;&gt;</a>'
+
+
+PROBE = """<!doctype html><body><script>
+const found = {}; let left = 0;
+function probe(name, width, text) {
+  left += 1;
+  const frame = document.createElement("iframe");
+  frame.style.cssText = `width:${width}px;height:900px;border:0`;
+  const watch = "<script>window.wrong = []; onerror = m => { wrong.push(String(m)); };" +
+    "addEventListener('securitypolicyviolation', e => wrong.push(e.blockedURI));<\\/script>";
+  frame.srcdoc = text.replace("<head>", "<head>" + watch);
+  frame.onload = () => {
+    const page = frame.contentDocument, view = frame.contentWindow;
+    page.querySelectorAll("details").forEach(d => { d.open = true; });
+    const sizes = [...page.querySelectorAll("svg")].map(s => s.getBoundingClientRect());
+    const hidden = [...page.querySelectorAll("a, summary")].filter(a => a.getClientRects().length === 0).length;
+    found[name] = { wrong: view.wrong, inner: view.innerWidth, scroll: page.documentElement.scrollWidth,
+      svg: sizes.length, empty: sizes.filter(r => r.width < 20 || r.height < 20).length, hidden,
+      paths: page.querySelectorAll("svg path").length, text: page.body.innerText.length };
+    left -= 1;
+    if (!left) { document.body.textContent = "FOUND" + JSON.stringify(found) + "END"; }
+  };
+  document.body.append(frame);
+}
+const pages = PAGES;
+for (const [name, text] of Object.entries(pages)) for (const w of [1280, 390]) probe(`${name} ${w}`, w, text);
+</script></body>"""
+
+
+def test_in_a_real_browser(tmp_path):
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+    if browser is None:
+        pytest.skip("no chromium or chrome here: the page's layout is not measured")
+    pages = {v: page(example(v), GEOMETRY) for v in ("MECHANISM", "TIE", "UNTESTABLE")}
+    probe = tmp_path / "probe.html"
+    probe.write_text(PROBE.replace("PAGES", json.dumps(pages).replace("</", "<\\/")), encoding="utf-8")
+    options = ("--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync "
+               "--disable-component-update --virtual-time-budget=8000 --dump-dom").split()  # fmt: skip
+    command = [browser, *options, f"--user-data-dir={tmp_path / 'profile'}", probe.as_uri()]
+    shown = subprocess.run(command, capture_output=True, text=True, timeout=100).stdout
+    found = re.search(r"FOUND(\{.*\})END", shown)
+    assert found, f"the browser did not finish: {shown[-500:]}"
+    seen = json.loads(found[1])
+    assert len(seen) == 6
+    for name, facts in seen.items():
+        verdict, width = name.split()
+        assert facts["wrong"] == [], name
+        assert facts["inner"] == int(width), name
+        assert facts["scroll"] <= facts["inner"], name
+        assert facts["svg"] == pages[verdict].count("<svg"), name
+        assert facts["empty"] == 0, name
+        assert facts["paths"] == pages[verdict].count("<path"), name
+        assert facts["hidden"] == 0, name
+        assert facts["text"] > 500, name
