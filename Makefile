@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all bench lint setup clean
+.PHONY: demo test test-all bench prove lint setup clean
 
 setup: .venv/ready
 
@@ -23,6 +23,12 @@ test-all: setup
 
 bench: setup
 	$(BIN)/python benchmarks/run.py
+
+CASES ?= 12
+SEED ?= 1
+prove: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[proof]'
+	$(BIN)/origami-sim prove --cases $(CASES) --seed $(SEED)
 
 lint: setup
 	$(BIN)/ruff check .

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from origami_sim.build import Sheet
+    from origami_sim.diagnose import Diagnosis, Subject, diagnose
     from origami_sim.drive import Drive, Signal, ramp, series, sine
     from origami_sim.effects import CATALOGUE
     from origami_sim.errors import InputError
@@ -41,6 +42,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "build": "Sheet",
+    "diagnose": "Diagnosis Subject diagnose",
     "drive": "Drive Signal ramp series sine",
     "effects": "CATALOGUE",
     "errors": "InputError",
@@ -71,6 +73,8 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     "save_run", "load_run", "format_table", "write_replay", "open_replay", "screenshot",
     # recordings and scenes
     "Recording", "read_recording", "read_calibration", "scene_module",
+    # what a model lacks
+    "diagnose", "Diagnosis", "Subject",
     "InputError",
 ]  # fmt: skip
 
@@ -78,7 +82,8 @@ __all__ = [  # noqa: RUF022  (by what they are for)
 def __getattr__(name: str):
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    module = import_module(f"{__name__}.{_MODULES[name]}")
+    value = module if name == "diagnose" else getattr(module, name)  # a package that can be called
     globals()[name] = value
     return value
 

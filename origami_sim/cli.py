@@ -1,7 +1,7 @@
-"""`origami-sim`: run scenes, replay runs, compare recordings, list effects, check strides.
+"""`origami-sim`: run scenes, replay runs, compare and diagnose recordings, list effects, check strides.
 
 Exit codes: 0 done; 1 done, but the answer is no (a regression changed); 2 bad input, nothing written over; 3 a world
-went unstable; 130 interrupted, earlier results untouched.
+went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier results untouched.
 """
 
 import argparse
@@ -49,6 +49,19 @@ class _Bar:
             if fraction >= 1:
                 sys.stderr.write(f" in {time.perf_counter() - self.began:.1f} s\n")
             sys.stderr.flush()
+
+
+_DIAGNOSE_HELP = """\
+writes report.html, diagnosis.json, patched.toml (for run --calibration, and for --model) and a replay. Interrupted, the
+same command goes on where it stopped.
+
+exit codes: 10 ADEQUATE (what is left is noise), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
+makes the difference), 13 MECHANISM (an effect is missing), 14 TIE (several explain it alike), 15 SEVERAL (more than one
+is missing), 16 UNKNOWN (none of the catalogue), 17 UNTESTABLE (these recordings cannot tell); 2 bad input, 130
+interrupted
+
+how well settings are known, so that refitting them is no free lunch: --prior, else [priors] of the sidecar, else the
+`uncertainty` of the calibration; all other settings are taken as exact"""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -101,6 +114,32 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/compare)")
 
     p = command(
+        "diagnose",
+        _diagnose,
+        "Find what makes a model and recordings of the real object differ",
+        "origami-sim diagnose double.csv --model pendulum_chain --prior mass_1=1% --prior viscosity_1=20%",
+    )
+    p.epilog = f"{p.epilog}\n\n{_DIAGNOSE_HELP}"
+    p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
+    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, or a calibration of one (TOML)")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument(
+        "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
+    )
+    p.add_argument(
+        "--prior", action="append", default=[], metavar="NAME=SD", help="how well a setting is known: 0.5mm, 5%%, or SI"
+    )
+    p.add_argument("--suspects", metavar="A,B", help="suspect only these effects (default: all that can act)")
+    p.add_argument(
+        "--thorough", action="store_true", help="more frames, suspects and combinations; several times as long"
+    )
+    p.add_argument(
+        "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
+    )
+    p.add_argument("--seed", type=int, default=0, help="of the draws under the null hypothesis (default 0)")
+    p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
+
+    p = command(
         "study",
         _study,
         "Batch studies: stride maps of the crawler, all combinations of the bi-fold",
@@ -119,6 +158,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.set_defaults(action=_calibrate)
     register(p)
+
+    from origami_sim import prove
+
+    p = command(
+        "prove",
+        _prove,
+        "Conceal effects at random in another simulator, diagnose them blindly, and score",
+        "origami-sim prove --cases 12 --seed 1",
+    )
+    prove.register(p)
 
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
@@ -236,6 +285,12 @@ def _compare(args) -> int:
     return _soundness(motion)
 
 
+def _diagnose(args) -> int:
+    from origami_sim.diagnose import command
+
+    return command.run(args)
+
+
 def _calibrate(args) -> int:
     from origami_sim.calibrate import command
 
@@ -246,6 +301,12 @@ def _study(args) -> int:
     from origami_sim import study
 
     return study.main(args.rest)
+
+
+def _prove(args) -> int:
+    from origami_sim import prove
+
+    return prove.run(args)
 
 
 def _effects(args) -> int:

@@ -10,6 +10,7 @@ What a replay holds, on the timeline `sim_time` [s]; geometry is in metres, z up
     contacts               contact forces
     ground, scale          the ground plane (if there are contacts) and a scale bar
     markers/...            markers of a recording
+    before/..., after/..., channels/...   of a diagnosis: simulations over the recorded outlines; components
     angles/..., energy/..., work/..., tip/..., centre/..., drive/..., measured/...   scalar series, unit in the name
 """
 
@@ -22,7 +23,8 @@ import subprocess
 import sys
 import tempfile
 import time as clock
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -38,6 +40,7 @@ from scipy.sparse.linalg import lsqr
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError
+from origami_sim.model import Model
 from origami_sim.recording import Recording
 from origami_sim.solve.dynamics import Trajectory
 
@@ -115,6 +118,14 @@ def write_replay(
     """
     trajectory = source if isinstance(source, Trajectory) else source.trajectory
     scene = _Scene(trajectory, world, magnets, arms, tip, title)
+    with _writing(path, scene.application, scene.identity) as stream:
+        stream.send_blueprint(_blueprint(scene, _write(scene, stream, recording)))
+    return Path(path).expanduser().absolute()
+
+
+@contextmanager
+def _writing(path: str | Path, application: str, identity: str) -> Iterator[rr.RecordingStream]:
+    """A stream into a file that appears complete or not at all."""
     file = Path(path).expanduser().absolute()
     if file.is_dir():
         raise InputError("is a folder; a replay is a file", file=file, allowed="a file name ending in .rrd")
@@ -122,9 +133,9 @@ def write_replay(
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         work.touch()  # rerun reports a file that cannot be made only as a log line
-        with rr.RecordingStream(scene.application, recording_id=scene.identity, send_properties=False) as stream:
+        with rr.RecordingStream(application, recording_id=identity, send_properties=False) as stream:
             stream.save(work)
-            stream.send_blueprint(_blueprint(scene, _write(scene, stream, recording)))
+            yield stream
             stream.flush()
             stream.disconnect()
         os.replace(work, file)
@@ -132,7 +143,6 @@ def write_replay(
         raise InputError(f"cannot be written ({e.strerror or e})", file=file, allowed="a writable folder") from None
     finally:
         work.unlink(missing_ok=True) if work.parent.is_dir() else None
-    return file
 
 
 def open_replay(path: str | Path) -> subprocess.Popen:
@@ -439,15 +449,7 @@ class _Scene:
 
     def outlines(self) -> np.ndarray:
         """[E, 2] nodes of the panels' edges that are no creases."""
-        count: dict[tuple[int, int], dict[int, int]] = {}
-        for panel, nodes in zip(self.model.triangle_panel.tolist(), self.model.triangles.tolist(), strict=True):
-            for a, b in ((0, 1), (1, 2), (2, 0)):
-                edge = (min(nodes[a], nodes[b]), max(nodes[a], nodes[b]))
-                sides = count.setdefault(edge, {})
-                sides[panel] = sides.get(panel, 0) + 1
-        creases = {(min(j, k), max(j, k)) for _, j, k, _ in self.model.creases.tolist()}
-        edges = [e for e, sides in count.items() if 1 in sides.values() and e not in creases]
-        return np.array(edges, int).reshape(-1, 2)
+        return _outlines(self.model)
 
     def arrows(self) -> tuple[np.ndarray, np.ndarray, list[str]]:
         """Origins and vectors [F, 2P, 3] [m] of the poling on both faces of P magnetised panels, and names."""
@@ -525,6 +527,19 @@ class _Scene:
                 solved = lsqr(matrix.tocsr(), forces[f].ravel(), atol=1e-8, btol=1e-8)[0]
             out[f, active] = solved.reshape(-1, 3)
         return points, out
+
+
+def _outlines(model: Model) -> np.ndarray:
+    """[E, 2] nodes of the panels' edges that are no creases."""
+    count: dict[tuple[int, int], dict[int, int]] = {}
+    for panel, nodes in zip(model.triangle_panel.tolist(), model.triangles.tolist(), strict=True):
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            edge = (min(nodes[a], nodes[b]), max(nodes[a], nodes[b]))
+            sides = count.setdefault(edge, {})
+            sides[panel] = sides.get(panel, 0) + 1
+    creases = {(min(j, k), max(j, k)) for _, j, k, _ in model.creases.tolist()}
+    edges = [e for e, sides in count.items() if 1 in sides.values() and e not in creases]
+    return np.array(edges, int).reshape(-1, 2)
 
 
 def _unit(v: np.ndarray) -> np.ndarray:
@@ -1031,3 +1046,179 @@ def _blueprint(scene: _Scene, out: _Writer) -> rrb.Blueprint:
     )
     root = rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[11, 9]) if plots else left
     return rrb.Blueprint(root, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time)
+
+
+# overlays of a diagnosis ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """A recorded object and simulations of it, frame by frame.
+
+    Attributes:
+        model: topology. times: [F] [s]. recorded: [F, N, 3] node positions that the channels tell [m].
+        films: "before" and "after": [F, N, 3] simulated [m].
+        creases: the same names: [F, C] what parts the fold angles from the recorded [rad].
+        panels: [F, P] rms distance of the panels' nodes from where they were recorded [m].
+        note: a sentence on the simulations.
+    """
+
+    model: Model
+    times: np.ndarray
+    recorded: np.ndarray
+    films: Mapping[str, np.ndarray]
+    creases: Mapping[str, np.ndarray]
+    panels: Mapping[str, np.ndarray]
+    note: str = ""
+
+
+class Compared(Protocol):
+    """A component of a recording with predictions, as a diagnosis holds it."""
+
+    component: str
+    unit: str
+    times: list[float]
+    recorded: list[float]
+    before: list[float]
+    after: list[float]
+
+
+RIGHT, WRONG = (172, 196, 216), (206, 44, 44)
+"""Colours of what agrees with the recording, and of what is furthest from it."""
+
+
+def write_overlay(path: str | Path, overlay: Overlay, series: Sequence[Compared], *, title: str) -> Path:
+    """Writes a replay of two views, before and after, each with the recorded object as outlines on top.
+
+    Creases and panels are coloured by what parts them from the recording, on one scale for both views.
+
+    Args:
+        path: the .rrd file. overlay: the frames. series: components to be plotted. title: shown in the viewer.
+
+    Raises:
+        InputError: a file that cannot be written.
+    """
+    digest = hashlib.sha256(repr((title, overlay.model.hash)).encode() + overlay.recorded.tobytes())
+    with _writing(path, "origami_sim diagnosis", digest.hexdigest()[:32]) as stream:
+        out = _Writer(stream)
+        stream.send_recording_name(title)
+        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        widest = [
+            float(np.percentile(g["before"], 98)) if g["before"].size else 0.0
+            for g in (overlay.creases, overlay.panels)
+        ]
+        for name, x in overlay.films.items():
+            _write_film(overlay, name, x, widest, out)
+        _write_series(series, out)
+        unit, factor = _scaled("m", widest[1], "m")
+        text = (
+            f"# {title}\n\nPink: the recorded object, as its channels tell. Solid: the simulation, as given (before) "
+            "and with the best explanation (after).\n\nColours say what parts them, blue: nothing. Full red are "
+            f"{np.degrees(widest[0]):.2g} deg at a crease, {factor * widest[1]:.2g} {unit} at a panel, in both views."
+            f"\n\n{overlay.note}"
+        )
+        stream.log("notes", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        stream.send_blueprint(_overlay_blueprint(overlay, out))
+    return Path(path).expanduser().absolute()
+
+
+def _write_film(overlay: Overlay, name: str, x: np.ndarray, widest: Sequence[float], out: _Writer):
+    model, times = overlay.model, overlay.times
+    corners = x[:, model.triangles]
+    normal = _unit(np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]))
+    brightness = 0.58 + 0.42 * np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT)))
+    faces = _mixed(overlay.panels[name][:, model.triangle_panel], widest[1]) * brightness[:, :, None]
+    out.moving(
+        f"{name}/faces",
+        times,
+        rr.Mesh3D,
+        static={"triangle_indices": np.arange(3 * len(model.triangles), dtype=np.uint32).reshape(-1, 3)},
+        vertex_positions=corners.reshape(len(x), -1, 3),
+        vertex_colors=np.repeat(faces.round().astype(np.uint8), 3, axis=1),
+    )
+    out.moving(
+        f"{name}/creases",
+        times,
+        rr.LineStrips3D,
+        static={"radii": [rr.Radius.ui_points(4.0)]},
+        strips=x[:, model.creases[:, 1:3]],
+        colors=_mixed(overlay.creases[name], widest[0]).round().astype(np.uint8),
+    )
+    edges = np.concatenate([_outlines(model), model.creases[:, 1:3]])
+    for who, positions, colour, width in (
+        ("outlines", x, COLOURS["outline"], 0.8),
+        ("recorded", overlay.recorded, COLOURS["marker"], 1.8),
+    ):
+        out.moving(
+            f"{name}/{who}",
+            times,
+            rr.LineStrips3D,
+            static={"radii": [rr.Radius.ui_points(width)], "colors": [colour]},
+            strips=positions[:, edges],
+        )
+
+
+def _mixed(gap: np.ndarray, widest: float) -> np.ndarray:
+    """Colours [..., 3] between RIGHT and WRONG."""
+    share = np.clip(gap / widest, 0.0, 1.0)[..., None] if widest > 0 else np.zeros((*gap.shape, 1))
+    return np.array(RIGHT) + share * (np.array(WRONG, float) - RIGHT)
+
+
+def _write_series(series: Sequence[Compared], out: _Writer):
+    """Recorded and simulated components, and what is left; plots for the two that are most wrong before."""
+    wrong = [float(np.nanstd(np.subtract(t.recorded, t.before)) / (np.nanstd(t.recorded) or 1.0)) for t in series]
+    shown = np.argsort(wrong)[::-1][:2]
+    for n, t in enumerate(series):
+        usual = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "N": ("mN", 1e3)}
+        unit, factor = usual.get(t.unit, (t.unit, 1.0))
+        times, every = np.asarray(t.times, float), slice(None, None, max(1, len(t.times) // 3000))
+        recorded = factor * np.asarray(t.recorded, float)
+        plots = _Plot(f"{t.component} ({unit})"), _Plot(f"{t.component}: recorded less simulated ({unit})")
+        for who, colour in (("recorded", COLOURS["marker"]), ("before", SERIES[1]), ("after", SERIES[0])):
+            values = recorded if who == "recorded" else factor * np.asarray(getattr(t, who), float)
+            kinds = [("", values, plots[0])] + [("left_", recorded - values, plots[1])] * (who != "recorded")
+            for kind, y, plot in kinds:
+                seen = np.isfinite(y)
+                path = f"/channels/{_slug(t.component)}/{kind}{who}"
+                label = f"{who} ({unit})"
+                out.series(path, label, times[seen][every], y[seen][every], colour, points=who == "recorded")
+                plot.paths.append(path)
+        if n in shown:
+            out.plots += plots
+
+
+def _overlay_blueprint(overlay: Overlay, out: _Writer) -> rrb.Blueprint:
+    every = np.concatenate([overlay.recorded, *overlay.films.values()])
+    low, high = every.min(axis=(0, 1)), every.max(axis=(0, 1))
+    across = 0 if high[0] - low[0] >= 0.8 * (high[1] - low[1]) else 1
+    towards = _unit(np.array([0.45, -1.0, 0.35]) if across == 0 else np.array([1.0, 0.45, 0.35]))
+    target, radius = (low + high) / 2, 0.5 * float(np.linalg.norm(high - low))
+    controls = rrb.EyeControls3D(position=target + 2.0 * radius * towards, look_target=target, eye_up=(0.0, 0.0, 1.0))
+    views = [
+        rrb.Spatial3DView(
+            origin="/",
+            name={"before": "Before: as given", "after": "After: best explanation"}.get(name, name) + " (m)",
+            background=_BACKGROUND,
+            line_grid=False,
+            contents=[f"+ /{name}/**"],
+            eye_controls=controls,
+        )
+        for name in overlay.films
+    ]
+    plots = [
+        rrb.TimeSeriesView(
+            origin="/",
+            name=p.name,
+            contents=[f"+ {path}" for path in p.paths],
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        )
+        for p in out.plots
+    ]
+    about = rrb.TextDocumentView(origin="/notes", name="About")
+    below = rrb.Horizontal(*plots, about)
+    return rrb.Blueprint(
+        rrb.Vertical(rrb.Horizontal(*views), below, row_shares=[5, 3]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="Playing", loop_mode="All"),
+    )

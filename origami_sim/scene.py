@@ -1,5 +1,6 @@
 """Scenes: a device with its calibration, what it computes and the table that it prints."""
 
+import functools
 import importlib
 import os
 import re
@@ -9,6 +10,7 @@ from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +20,9 @@ from origami_sim.model import Model, Parameters
 from origami_sim.recording.units import UNITS
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.statics import equilibrium
+
+if TYPE_CHECKING:
+    from origami_sim.diagnose.patch import Addition
 
 NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
@@ -46,9 +51,11 @@ class Setting:
 class Settings(Mapping[str, Setting]):
     """The settings of a calibration; values are attributes: settings.gap."""
 
-    def __init__(self, settings: Sequence[Setting], file: Path):
+    def __init__(self, settings: Sequence[Setting], file: Path, effects: "Sequence[Addition]" = ()):
         self._settings = {s.name: s for s in settings}
         self.file = file
+        self.effects = tuple(effects)
+        """Effects that the calibration adds to those of the scene."""
 
     def __getitem__(self, name: str) -> Setting:
         return self._settings[name]
@@ -74,7 +81,7 @@ class Settings(Mapping[str, Setting]):
             )
         for name in values:
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
-        return Settings(out, self.file)
+        return Settings(out, self.file, self.effects)
 
     def override(self, assignments: Sequence[str]) -> "Settings":
         """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI."""
@@ -139,10 +146,11 @@ def read_calibration(source: str | Path) -> Settings:
     """Reads a calibration: a TOML file, or the name of one that ships with the package.
 
     Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
-    `choices` and `uncertainty`.
+    `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`).
 
     Raises:
-        InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range.
+        InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range, an effect or a
+            parameter that is not in the catalogue.
     """
     path = Path(source)
     if path.suffix != ".toml":
@@ -155,7 +163,12 @@ def read_calibration(source: str | Path) -> Settings:
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
         raise InputError(f"is not valid TOML ({e})", file=path) from None
-    return Settings([_setting(name, table, path) for name, table in data.items()], path)
+    additions: Sequence[Addition] = ()
+    if "effects" in data:
+        from origami_sim.diagnose.patch import read_additions
+
+        additions = read_additions(data.pop("effects"), path)
+    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions)
 
 
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
@@ -282,10 +295,28 @@ def follow(
 
 
 def scene_module(name: str) -> ModuleType:
-    """The module of a shipped scene; raises InputError naming them."""
+    """The module of a shipped scene, of which `build` adds the effects of its calibration; InputError naming them."""
     if name not in NAMES:
         raise InputError("there is no such scene", field="scene", value=name, allowed=", ".join(NAMES))
-    return importlib.import_module(f"origami_sim.scenes.{name}")
+    module = importlib.import_module(f"origami_sim.scenes.{name}")
+    if not hasattr(module.build, "__wrapped__"):
+        module.build = _extended(module.build)
+    return module
+
+
+def _extended(build: Callable) -> Callable:
+    """A scene's `build` that switches on what the calibration adds."""
+
+    @functools.wraps(build)
+    def extended(s: Settings, **options):
+        built = build(s, **options)
+        if not s.effects:
+            return built
+        from origami_sim.diagnose.patch import switched_on
+
+        return (*switched_on(s.effects, *built[:2], file=s.file), *built[2:])
+
+    return extended
 
 
 def recordings_folder() -> Path | None:

@@ -95,7 +95,7 @@ def _samples(forward: Forward, motions, k: int, held: list[int]):
 
 def _range(x: np.ndarray) -> tuple[float, float]:
     low, high = np.quantile(x, [0.002, 0.998])
-    return float(min(low, -1e-6)), float(max(high, 1e-6))
+    return float(min(low, -0.02)), float(max(high, 0.02))  # a table needs some width
 
 
 def _sparse(a, w, y, grid_a, grid_w):

@@ -16,7 +16,7 @@ from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
-from origami_sim.diagnose.patch import write_patch
+from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.diagnose.subject import spreads
 from origami_sim.effects import get
@@ -242,7 +242,7 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
             continue
         mark = f"   {c.distrust}" if c.distrust else ""
         lines.append(f"{c.label:48s} {c.probability:11.3f} {c.gain:9.1f} +- {c.error:5.1f}{mark}")
-    best = next((c for c in d.candidates if c.label in d.chosen or not d.chosen), None)
+    best = patched(d)
     for n in best.numbers if best is not None else []:
         bound = ", at its bound" if n.at_bound else ""
         lines.append(f"  {n.label} = {n.value:.4g} {n.unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")

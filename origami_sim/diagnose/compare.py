@@ -16,7 +16,7 @@ from origami_sim.diagnose.refit import Fit, Weights, whitened
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
 
-TEMPERATURE = 2.0
+TEMPERATURE = 3.0
 """By which log evidence is divided before it becomes a probability; larger is more careful."""
 
 
@@ -123,7 +123,8 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
     extra = len(fit.hypothesis.free)
     n = max(effective_samples(forward, fit, weights), 2.0)
     cost = float(sum(r @ r for r in residual)) + fit.penalty
-    return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n))
+    sites = float(sum(np.log(s.sites) for s in fit.hypothesis.suspects))  # an effect is as likely at few sites as at many
+    return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n) - sites)
 
 
 def probabilities(scores: Sequence[float], temperature: float = TEMPERATURE) -> np.ndarray:
@@ -142,18 +143,18 @@ def reproducible(a: Score, b: Score) -> bool:
     """
     d = a.held_out - b.held_out
     enough = np.count_nonzero(d > 1.0) >= min(2, len(d))
-    return bool(d.sum() > 4.0 and enough and -d[d < 0].sum() < 0.2 * d[d > 0].sum())
+    return bool(d.sum() > 4.0 and enough and -d[d < 0].sum() < 0.5 * d[d > 0].sum())
 
 
 def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:
-    """Evidence of each fit; one that is no reproducible gain over a simpler one that it contains falls below that."""
+    """Evidence of each fit; several effects that are no reproducible gain over fewer of them fall below those."""
     out = []
     for f in fits:
         evidence = scores[id(f)].evidence
         mine = {s.label for s in f.hypothesis.suspects}
         for g in fits:
             inner = {s.label for s in g.hypothesis.suspects}
-            if inner < mine:
+            if inner and inner < mine:
                 a, b = scores[id(f)], scores[id(g)]
                 if not (reproducible(a, b) and a.evidence > b.evidence + 3.0):
                     evidence = min(evidence, b.evidence - 5.0)

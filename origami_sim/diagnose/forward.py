@@ -1,7 +1,7 @@
 """What a hypothesis predicts for the recordings: batches of rollouts that all start where the recordings do."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -19,7 +19,17 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import _index
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.timestep import stable_step
+from origami_sim.solve.timestep import gradient_norms, stable_step
+
+CALM = 0.04
+"""Time at the start of a segment in which panels are damped [s].
+
+A segment starts with flat panels, because markers do not show how they bend. Real panels bend under their load; without
+the damping they would begin to ring. What is measured in that time is not compared.
+"""
+
+RATIO = 0.3
+"""Damping of panels in that time, as a ratio of critical for each bar and bending line."""
 
 LEAD = 1500
 """Frames before a segment along which laws with memory are taken, at most; the motion there is as recorded."""
@@ -37,6 +47,7 @@ class Block:
         values: (n, D) all components of all channels [SI]; nan where missing.
         noise: (D,) their standard deviations.
         pose, rates: what the recording says about the start: coordinates and their rates [m].
+        begin: (D,) what was measured at the first frame, which tells the turn of angles.
     """
 
     recording: int
@@ -46,6 +57,7 @@ class Block:
     noise: np.ndarray
     pose: Pose
     rates: np.ndarray
+    begin: np.ndarray | None = None
 
 
 class Forward:
@@ -78,6 +90,8 @@ class Forward:
         self.model, self.parameters, self.drive = subject.build(self.values)
         self.articulation = Articulation(self.model)
         self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
+        self._calm: dict[int, int] = {}
         self._paths: dict[int, np.ndarray | None] = {}
         self._built: dict[tuple, tuple[Model, Parameters]] = {}
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
@@ -94,7 +108,8 @@ class Forward:
         values, noise = stacked(recording)
         step = float(np.median(np.diff(recording.times)))
         frames = len(recording.times) if segment is None else max(8, round(segment / step) + 1)
-        firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1))
+        calm = self._calm[index] = min(int(np.ceil(CALM / step)), frames // 4) if self._settles else 0
+        firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1 - calm))
         if most is not None and len(firsts) > most:
             firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
         blocks = []
@@ -104,7 +119,9 @@ class Forward:
             if self.start == "fit":
                 pose, rates = self._initial(recording, values, noise, int(first))
             times = recording.times[part] - recording.times[first]
-            blocks.append(Block(index, int(first), times, values[part], noise, pose, rates))
+            compared = values[part].copy()
+            compared[:calm] = np.nan
+            blocks.append(Block(index, int(first), times, compared, noise, pose, rates, seen_first(values[part])))
         return blocks
 
     def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray]:
@@ -232,17 +249,27 @@ class Forward:
         state.memory[:] = self._memory(r, model, parameters, blocks, k)
         chosen = stable_step(model, parameters)
         substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
-        batch = Batch(model, parameters, drive, state, threads=self.threads)
         lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
-        limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
-        raw = []
-        for n in range(frames):
-            batch.advance(substeps if n else 0, step / substeps, limit)
+        reach = 0.5 * lengths.min(initial=np.inf)
+        raw: list[np.ndarray] = []
+        calm = min(self._calm[r], frames - 1)
+        if calm:
+            quiet, damped = calmed(model, parameters)
+            finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
+            batch = Batch(quiet, damped, drive, _with_effects(state, quiet), threads=self.threads)
+            for n in range(calm + 1):
+                batch.advance(finer if n else 0, step / finer, reach * finer / step)
+                x, angles = batch.motion()
+                raw.append(channel_values(model, recording, x[None], angles[None])[0])
+            state = _with_effects(batch.state(), model, step=calm * substeps)
+        batch = Batch(model, parameters, drive, state, threads=self.threads)
+        for n in range(len(raw), frames):
+            batch.advance(substeps if n else 0, step / substeps, reach * substeps / step)
             x, angles = batch.motion()
             raw.append(channel_values(model, recording, x[None], angles[None])[0])
         channels = np.stack(raw)  # [frames, D, W]
         channels[:, :, batch.state().status[0] >= 0] = np.nan
-        continuous(channels, angle_mask(recording), np.tile(np.stack([b.values[0] for b in blocks]), (k, 1)).T)
+        continuous(channels, angle_mask(recording), np.tile(np.stack([_begin(b) for b in blocks]), (k, 1)).T)
         grid = np.arange(frames) * step
         distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
@@ -347,6 +374,36 @@ class Forward:
         return np.concatenate(parts, axis=1)
 
 
+def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
+    """The same model with damped panels; folding is not damped."""
+    added = [e for e, of in (("bar_viscosity", "bars"), ("panel_viscosity", "panel_bending")) if of in model.effects]
+    quiet = model.with_effects(*added)
+    out = parameters.for_model(quiet)
+    with np.errstate(divide="ignore"):
+        mobility = np.any(model.free, axis=1)[:, None] / parameters["inertia", "mass"]
+        if "bars" in model.effects:
+            lighter = 1.0 / np.maximum(mobility[model.bars].sum(axis=1), 1e-300)
+            dashpot = 2 * RATIO * np.sqrt(parameters["bars", "stiffness"] * np.minimum(lighter, 1e300))
+            out.set("bar_viscosity", "viscosity", out["bar_viscosity", "viscosity"] + dashpot)
+        if "panel_bending" in model.effects:
+            nodes, slopes = gradient_norms(model, "bend")
+            inertia = 1.0 / np.maximum((mobility[nodes] * slopes[:, :, None] ** 2).sum(axis=1), 1e-300)
+            dashpot = 2 * RATIO * np.sqrt(parameters["panel_bending", "stiffness"] * np.minimum(inertia, 1e300))
+            out.set("panel_viscosity", "viscosity", out["panel_viscosity", "viscosity"] + dashpot)
+    return quiet, out
+
+
+def _with_effects(state: State, model: Model, step: int | None = None) -> State:
+    """A state for a model whose further effects have no memory; work is counted anew."""
+    count = len(model.laws)
+    return replace(
+        state.copy(),
+        work=np.zeros((count, state.worlds)),
+        power=np.zeros((count, state.worlds)),
+        step=state.step if step is None else step,
+    )
+
+
 def _acts(hypothesis: Hypothesis, effect: str, channel: int) -> bool:
     """Whether a hypothesis distorts the measurement of a channel by an effect."""
     return any(s.effect == effect and (s.entities is None or channel in s.entities) for s in hypothesis.suspects)
@@ -377,6 +434,16 @@ def spline(grid: np.ndarray, values: np.ndarray):
     bad = ~np.all(np.isfinite(values), axis=0)
     curve = CubicSpline(grid, np.where(bad, 0.0, values), axis=0)
     return lambda t: np.where(bad, np.nan, curve(t))
+
+
+def seen_first(values: np.ndarray) -> np.ndarray:
+    """(D,) the first of the values (n, D) that is not missing; nan if all are."""
+    seen = np.isfinite(values)
+    return values[np.argmax(seen, axis=0), np.arange(values.shape[1])]
+
+
+def _begin(block: Block) -> np.ndarray:
+    return block.values[0] if block.begin is None else block.begin
 
 
 def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:

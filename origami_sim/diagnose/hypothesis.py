@@ -48,7 +48,7 @@ class Suspect:
     Attributes:
         effect: name in the catalogue. site: where, in words. kind: crease, panel, body, ground, drive or measurement.
         free: numbers to fit, the strength first.
-        entities: entities of the family; None for all.
+        entities: entities of the family; None for all. sites: at how many sites the effect is suspected in all.
     """
 
     effect: str
@@ -56,6 +56,7 @@ class Suspect:
     kind: str
     free: tuple[Free, ...]
     entities: tuple[int, ...] | None = None
+    sites: int = 1
 
     @property
     def label(self) -> str:
@@ -158,6 +159,8 @@ def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float
     given = [n for n in model.effects if any(owner == n for owner, _ in parameters)]
     for s in hypothesis.suspects:
         effect = get(s.effect)
+        if s.effect in given:
+            continue
         fitted = {f.name for f in s.free}
         for p in effect.parameters:
             if p.name in fitted:
@@ -182,6 +185,11 @@ def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float
     for s in hypothesis.suspects:
         for f in s.free:
             value = float(np.clip(values[index], *get(s.effect).parameter(f.name).bounds))
+            if s.effect in given:  # more of what the model has
+                mine = slice(None) if s.entities is None else np.array(s.entities)
+                out.set(s.effect, f.name, parameters[s.effect, f.name][mine] + value, s.entities)
+                index += 1
+                continue
             everywhere = s.entities is None or s.kind == "measurement"  # channels are told apart where they are read
             out.set(s.effect, f.name, value, None if everywhere else np.array(s.entities))
             index += 1
@@ -219,8 +227,21 @@ def suspects(
             sites = _channel_sites(recordings[0], effect.channels)
         for site, kind, entities in sites:
             free = tuple(_free(name, p, entities) for p in effect.fitted)
-            found.append(Suspect(name, site, kind, free, entities))
+            found.append(Suspect(name, site, kind, free, entities, len(sites)))
     return found
+
+
+def _more_of(model: Model, name: str) -> list[Suspect]:
+    """An effect that the model has, stronger or weaker at one crease or panel than was thought."""
+    effect = get(name)
+    each = [s for s in _sites(model, effect.family) if s[2] is not None]
+    if effect.family not in ("crease", "triangle") or len(each) < 2:
+        return []
+    out = []
+    for site, kind, entities in each:
+        strength = _free(name, effect.fitted[0], entities)
+        out.append(Suspect(name, site, kind, (strength,), entities, len(each)))
+    return out
 
 
 def _off(parameters: Parameters, name: str) -> bool:

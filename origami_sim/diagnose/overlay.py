@@ -1,24 +1,29 @@
 """The replay of a diagnosis: the recorded object beside the model as given and beside the best explanation."""
 
+import copy
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.forward import Block, Forward, _by_length, shifted, stacked
+from origami_sim.diagnose.forward import Block, Forward, stacked
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.static import CurveForward, Static
 from origami_sim.model import Model, dihedral_angles
+from origami_sim.recording import Channel
 from origami_sim.replay import Overlay, write_overlay
-from origami_sim.solve.dynamics import simulate
 
 FRAMES, RATE = 600, 60.0
 """A replay has at most so many frames, and at most so many per second."""
 
 SHOWN = ("before", "after")
 """Fits that are shown: the model as given, and the best explanation."""
+
+STEPS = "Seconds are load steps."
+SEGMENTS = "Every segment of the recording is simulated from a start of its own: there both meet again."
 
 MOST = 6
 """Recordings that get a replay, the first ones."""
@@ -36,6 +41,8 @@ def write_overlays(folder: str | Path, keep: Keep, diagnosis: Diagnosis) -> list
     assert forward is not None and keep.fits
     if isinstance(forward, CurveForward) and not isinstance(forward, Static):
         return []
+    if not len(forward.model.triangles):
+        return []  # a body of one node has nothing to draw
     out = []
     for r, recording in enumerate(forward.recordings[:MOST]):
         name = "" if len(forward.recordings) == 1 else "_" + re.sub(r"\W+", "_", recording.name)
@@ -48,78 +55,55 @@ def write_overlays(folder: str | Path, keep: Keep, diagnosis: Diagnosis) -> list
 
 def film(forward: Forward, fits: dict[str, Fit], r: int) -> Overlay:
     """Frames of one recording: the pose that its channels tell, and what the fits "before" and "after" make of it."""
-    if isinstance(forward, Static):
-        times, recorded, films = _steps(forward, fits, r)
-    else:
-        times, recorded, films = _motion(forward, fits, r)
-    model = forward.model
+    recording, model = forward.recordings[r], forward.model
+    mine = [b for b in fits["after"].blocks if forward.blocks[b].recording == r]
+    step = float(np.median(np.diff(recording.times)))
+    total = sum(len(forward.blocks[b].times) for b in mine)
+    every = 1 if recording.by_step else max(1, int(np.ceil(total / FRAMES)), round(1.0 / (RATE * step)))
+    frames = {b: np.arange(0, len(forward.blocks[b].times), every) for b in mine}
+    times = np.concatenate([recording.times[forward.blocks[b].first + frames[b]] for b in mine])
+    order = np.argsort(times, kind="stable")
+    keep = order[np.append(np.diff(times[order]) > 1e-9, True)]  # where segments meet, the later one
+    recorded = np.concatenate([_recorded(forward, forward.blocks[b], frames[b]) for b in mine])[keep]
+    films = {}
+    for name in SHOWN:
+        x = _positions(forward, fits[name], r, mine)
+        films[name] = np.concatenate([x[b][frames[b]] for b in mine])[keep]
     return Overlay(
         model,
-        times,
+        times[keep],
         recorded,
         films,
         {n: _crease_gaps(model, x, recorded) for n, x in films.items()},
         {n: _panel_gaps(model, x, recorded) for n, x in films.items()},
+        STEPS if recording.by_step else SEGMENTS,
     )
 
 
-Films = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
-"""Times [F] [s], recorded [F, N, 3] and simulated [F, N, 3] positions [m]."""
+def _positions(forward: Forward, fit: Fit, r: int, mine: list[int]) -> dict[int, np.ndarray]:
+    """Node positions [n, N, 3] of each block: what markers on all nodes would have read."""
+    recording, count = forward.recordings[r], len(forward.model.position)
+    if not isinstance(forward, CurveForward):
+        forward._path(r)  # the recorded motion, which the copy below could not tell any more
+    nowhere = np.zeros((len(recording.times), 3))
+    markers = {f"node {i}": Channel(f"node {i}", "marker", nowhere, "m", 1.0, {"node": i}) for i in range(count)}
+    other = copy.copy(forward)
+    other.recordings = list(forward.recordings)
+    other.recordings[r] = replace(recording, channels=markers)
+    other.blocks = [
+        replace(b, values=np.zeros((len(b.times), 3 * count)), begin=None) if n in mine else b
+        for n, b in enumerate(forward.blocks)
+    ]
+    predicted = other.predict(fit.hypothesis, fit.theta[None], fit.local[None], mine)
+    return {b: p[0].reshape(-1, count, 3) for b, p in zip(mine, predicted, strict=True)}
 
 
-def _steps(forward: Static, fits: dict[str, Fit], r: int) -> Films:
-    """The equilibria of a quasi-static curve; its load steps are the times."""
-    recording = forward.recordings[r]
-    films = {}
-    for name in SHOWN:
-        world = forward._world(fits[name].hypothesis, fits[name].theta, fits[name].hypothesis.effects)
-        films[name] = forward._chain(r, [world], None)[0][:, 0]
-    block = next(b for b in forward.blocks if b.recording == r)
-    return recording.times, _recorded(forward, block, recording.times - recording.times[0]), films
-
-
-def _motion(forward: Forward, fits: dict[str, Fit], r: int) -> Films:
-    """Rollouts of all segments, each from its fitted start."""
-    recording = forward.recordings[r]
-    mine = [b for b in fits["after"].blocks if forward.blocks[b].recording == r]
-    length = sum(forward.blocks[b].times[-1] for b in mine)
-    rate = min(1.0 / float(np.median(np.diff(recording.times))), RATE, FRAMES / length)
-    counts = {b: max(1, int(forward.blocks[b].times[-1] * rate + 1e-9)) for b in mine}
-    offsets = {b: np.arange(counts[b] + 1) / rate for b in mine}
-    times = np.concatenate([recording.times[forward.blocks[b].first] + offsets[b] for b in mine])
-    order = np.argsort(times, kind="stable")
-    keep = order[np.append(np.diff(times[order]) > 1e-9, True)]  # where segments meet, the later one
-    recorded = np.concatenate([_recorded(forward, forward.blocks[b], offsets[b]) for b in mine])
-    films = {}
-    for name in SHOWN:
-        frames = _simulated(forward, fits[name], r, mine, counts, rate)
-        films[name] = np.concatenate([frames[b] for b in mine])[keep]
-    return times[keep], recorded[keep], films
-
-
-def _simulated(forward: Forward, fit: Fit, r: int, mine: list[int], counts, rate: float) -> dict[int, np.ndarray]:
-    """Node positions [F, N, 3] of each block, from its fitted start."""
-    model, parameters = forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
-    recording, out = forward.recordings[r], {}
-    for group in _by_length(forward.blocks, mine):
-        blocks = [forward.blocks[b] for b in group]
-        duration = counts[group[0]] / rate
-        state = forward._state(model, [(model, parameters)], blocks, fit.local[None][:, group])
-        state.memory[:] = forward._memory(r, model, parameters, blocks, 1)
-        starts = recording.times[[b.first for b in blocks]] - recording.times[0]
-        drive = shifted(forward._drives[r], starts, duration, 1)
-        motion = simulate(model, parameters, drive, duration=duration, rate=rate, state=state, threads=forward.threads)
-        out |= {b: motion.x[:, :, w] for w, b in enumerate(group)}
-    return out
-
-
-def _recorded(forward: Forward, block: Block, offsets: np.ndarray) -> np.ndarray:
+def _recorded(forward: Forward, block: Block, frames: np.ndarray) -> np.ndarray:
     """Positions [F, N, 3] of the rigid-panel pose that fits the channels best, each from the one before."""
     recording, arm = forward.recordings[block.recording], forward.articulation
     values, noise = stacked(recording)
     pose, out = block.pose, []
-    times = recording.times[block.first] + offsets
-    for frame in np.clip(np.searchsorted(recording.times, times - 1e-9), 0, len(recording.times) - 1):
+    for frame in block.first + frames:
         level = values[frame]
         seen = np.isfinite(level)
         for _ in range(10 if arm.size else 0):

@@ -13,7 +13,6 @@ from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.static import HOLD, PIECES, CurveForward, Static, held, onward, places
 from origami_sim.distort import distorted
-from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, State
 from origami_sim.observe import _index
@@ -21,7 +20,7 @@ from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 
 PATH = "crease_angle"
-"""Drive channel that prescribes the fold angles [rad], one column for each crease of the tree, from the root outwards."""
+"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
 
 KIND = "moment"
 """Kind of the channels that are predicted: the moment applied to a crease, positive towards valley."""
@@ -79,7 +78,7 @@ class Prescribed(CurveForward):
         recording, q = self.recordings[r], self._q[r]
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
         frames, count = q.shape[1], len(worlds)
-        x, jacobian = self._path(worlds, q)
+        x, jacobian = self._along(worlds, q)
         times = recording.times - recording.times[0]
         rate = np.zeros_like(q) if recording.by_step else np.gradient(q, times, axis=1)
         drive = distorted(model, parameters, self._drives[r], float(times[-1]))
@@ -100,7 +99,7 @@ class Prescribed(CurveForward):
         rows = [self._row(c) for c in recording.channels.values()]
         return moments[rows].swapaxes(0, 1)
 
-    def _path(self, worlds, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _along(self, worlds, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions [N, n, K, 3] and their derivatives by the angles [m, N, n, K, 3]."""
         known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
         for model, _ in worlds:

@@ -147,9 +147,13 @@ def linearise(
 
 
 def start_steps(forward) -> np.ndarray:
-    """Steps for derivatives by the starts: shifts [m or rad], then rates."""
+    """Steps for derivatives by the starts: shifts [m or rad], then rates.
+
+    A contact begins with a step of the solver, so that smaller changes of a start than a step's way do not move it.
+    """
     m = forward.local // 2
-    return np.concatenate([np.full(m, 1e-6), np.full(m, 1e-5)]) if forward.local else np.zeros(0)
+    shift, rate = (1e-4, 1e-2) if len(forward.model.contacts) else (1e-6, 1e-5)
+    return np.concatenate([np.full(m, shift), np.full(m, rate)]) if forward.local else np.zeros(0)
 
 
 def _step(f: Free, value: float) -> float:

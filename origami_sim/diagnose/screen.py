@@ -177,7 +177,7 @@ def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fi
         shape = project(parts)
         norm = float(np.linalg.norm(shape))
         s = scaled(s, abs(size))
-        # sizes make the raw change as large as the residual; where starts take most of that, plausible strengths still show
+        # sizes make the raw change as large as the residual; if starts take most of it, larger strengths still show
         reach = max(1.0, _admissible(s, 10 * np.sign(size) * _typical(s)) / size)
         if norm * reach < SILENT or norm < 1e-3 * raw:
             why = "these recordings do not excite it" if raw < SILENT else "nominal parameters can take its place"

@@ -4,6 +4,7 @@ import copy
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,8 +46,8 @@ CLOSE = 1e-10
 FAR = 0.1
 """Longest Newton step, as a part of the device."""
 
-ROUNDS = 4
-ITERATIONS = 10
+ROUNDS = 12
+ITERATIONS = 6
 """Tangents of a load step, and Broyden's steps with each."""
 
 MOST_WORLDS = 4000
@@ -76,6 +77,7 @@ class CurveForward(Forward):
         self._arms = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
         self.local = 0
+        self._rested: dict[tuple[int, int], Drive] = {}
         self.blocks: list[Block] = []
         pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
         for index, r in enumerate(self.recordings):
@@ -144,7 +146,9 @@ class CurveForward(Forward):
                 out.append(s)
                 continue
             for time in np.geomspace(low, high, CONSTANTS + 2)[1:-1]:
-                free = [replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)]
+                free = [
+                    replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)
+                ]
                 out.append(replace(s, free=tuple(free)))
         return out
 
@@ -173,7 +177,10 @@ class CurveForward(Forward):
 
     def _resting(self, r: int, k: int) -> Drive:
         """The drive of a load step, held."""
-        return constant(self._drives[r], float(k))
+        key = id(self._drives[r]), k
+        if key not in self._rested:
+            self._rested[key] = held(self._drives[r], float(k))
+        return self._rested[key]
 
     def locate(self, fit: Fit) -> list[Place]:
         """Residual moments by crease, most suspicious first; empty where they cannot be told."""
@@ -201,9 +208,9 @@ class Static(CurveForward):
     """Predictions for curves by load step (`recording.by_step`): chains of equilibria.
 
     Every world follows its own equilibria from step to step. A step begins where the world was, moved as the nominal
-    model moves there; Newton's tangent is taken once, at that guess, and improved by Broyden's updates. A world that
-    this does not bring to rest, or whose tangent is not positive definite, is left to `statics.equilibrium`. Memory
-    advances along the path, each step taking as long as nothing relaxes any more.
+    model moves there; a tangent is improved by Broyden's updates as long as each step halves the one before, and then
+    taken anew. A world that this does not bring to a stable rest is left to `statics.equilibrium`. Memory advances along
+    the path, each step taking as long as nothing relaxes any more.
     """
 
     def __init__(
@@ -211,30 +218,29 @@ class Static(CurveForward):
     ):
         super().__init__(subject, recordings, pieces=pieces, threads=threads)
         self._systems: dict[tuple[str, ...], _System] = {}
-        self._paths: dict[int, np.ndarray] = {}
+        self._nominal: dict[int, np.ndarray] = {}
 
     def _other(self) -> CurveForward:
         out = super()._other()
         assert isinstance(out, Static)
-        out._paths = {}
+        out._nominal = {}
         return out
 
     def _curve(self, r: int, worlds):
-        if r not in self._paths:
+        if r not in self._nominal:
             start = self._world(Hypothesis(), np.array([f.start for f in self.subject.nominals]), ())
-            self._paths[r] = self._chain(r, [start], None)[0][:, 0]
-        x, angles, alive = self._chain(r, worlds, self._paths[r])
+            self._nominal[r] = self._chain(r, [start], None)[0][:, 0]
+        x, angles, alive = self._chain(r, worlds, self._nominal[r])
         recording = self.recordings[r]
         steps = len(recording.times)
-        drives = [self._resting(r, k) for k in range(steps)]
         columns = []
         for w, (model, parameters) in enumerate(worlds):
-            own = [
-                held(distorted(model, parameters, d, 0.0)) if model.effects != model.laws else held(d) for d in drives
-            ]
-            state = State.at_rest(model, steps, position=np.moveaxis(x[:, w], 0, 1))
-            state.angles = angles[:, w].T.copy()
-            poses = Poses(model, parameters, x[:, w], angles[:, w], np.zeros(steps), state, joined(own))
+            state = drive = None
+            if any(c.kind == "force" for c in recording.channels.values()):
+                drive = joined([held(distorted(model, parameters, self._resting(r, k), 0.0)) for k in range(steps)])
+                state = State.at_rest(model, steps, position=np.moveaxis(x[:, w], 0, 1))
+                state.angles = angles[:, w].T.copy()
+            poses = Poses(model, parameters, x[:, w], angles[:, w], np.zeros(steps), state, drive)
             values = [read_channel(poses, c).reshape(steps, -1) for c in recording.channels.values()]
             columns.append(np.where(alive[:, w, None], np.concatenate(values, axis=1), np.nan))
         return np.stack(columns, axis=2)
@@ -310,11 +316,12 @@ class _Step:
         self.system, self.worlds, self.state, self.threads = system, worlds, state, threads
         self.model = worlds[0][0]
         self.parameters = Parameters.join([p for _, p in worlds])
-        self.drive = held(distorted(self.model, self.parameters, drive, 0.0))
+        changed = distorted(self.model, self.parameters, drive, 0.0)
+        self.drive = drive if changed is drive else held(changed)
         self.remembers = any(get(e).memory for e in self.model.laws)
         # held nodes: the integrator moves them as it is told, and laws with memory advance
         still = replace(self.model, free=np.zeros_like(self.model.free))
-        self.batch = Batch(still, self.parameters, self.drive, state, threads=threads)
+        self.batch = Batch(still, self.parameters, self.drive, state, threads=1 if state.worlds < 64 else threads)
         self.free = system.free
 
     def force(self, x: np.ndarray) -> np.ndarray:
@@ -348,27 +355,29 @@ class _Step:
         """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
         size, done = self.system.size, np.zeros(len(wanted), bool)
         for _ in range(rounds):
-            factors = self._factors(x, wanted & ~done)
+            factors, stable = self._factors(x, wanted & ~done)
             going = np.array([f is not None for f in factors])
             if not np.any(going):
                 break
             s = self._solved(factors, self.force(x), going)
-            past = [s]
+            past, before = [s], np.full(len(wanted), np.inf)
             for _ in range(ITERATIONS):
                 large = np.abs(s).max(axis=0, initial=0.0)
-                going &= np.isfinite(large)
+                going &= large < 0.5 * before  # else a new tangent serves better; false for nan
+                before = large
                 far = going & (large > FAR * size)
                 if np.any(far):  # no further than this without a new tangent
                     x = x + self._spread(np.where(far, s * _over(np.full_like(large, FAR * size), large), 0.0))
                     going &= ~far
                 x = x + self._spread(np.where(going, s, 0.0))
-                done |= going & (large < CLOSE * size)
-                going &= ~done
+                close = going & (large < CLOSE * size)
+                done |= close & stable
+                going &= ~close
                 if not np.any(going):
                     break
                 z = self._solved(factors, self.force(x), going)
                 with np.errstate(all="ignore"):  # of worlds that go no further
-                    for a, b in zip(past[:-1], past[1:], strict=True):  # Broyden's first method (Kelley 1995, ch. 7)
+                    for a, b in pairwise(past):  # Broyden's first method (Kelley 1995, ch. 7)
                         z = z + b * _over(np.sum(a * z, axis=0), np.sum(a * a, axis=0))
                     last = past[-1]
                     s = z / (1.0 - _over(np.sum(last * z, axis=0), np.sum(last * last, axis=0)))
@@ -401,8 +410,8 @@ class _Step:
         out[self.free] = s
         return np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
 
-    def _factors(self, x: np.ndarray, alive: np.ndarray) -> list[_Factor | None]:
-        """Factors of the tangent of every world at its guess; None where it is not positive definite."""
+    def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[_Factor | None], np.ndarray]:
+        """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
         y, n = self.system, len(x)
         colours = int(y._colours.max(initial=0)) + 1
         copies = colours * 3 * len(STENCIL)
@@ -414,6 +423,7 @@ class _Step:
         of = np.flatnonzero(y._colours[y._columns] >= 0)
         rows, columns = y._rows[of], y._columns[of]
         out: list[_Factor | None] = [None] * x.shape[1]
+        stable = np.zeros(x.shape[1], bool)
         wanted = np.flatnonzero(alive)
         for part in np.array_split(wanted, max(1, -(-len(wanted) * copies // MOST_WORLDS))):
             if not len(part):
@@ -428,7 +438,8 @@ class _Step:
                     if np.size(s.offset) > 1
                 }
             )
-            f = Batch(self.model, given, drive, state, threads=self.threads).total_force(0.0)
+            threads = 1 if state.worlds * n < 20000 else self.threads  # starting a thread takes as long
+            f = Batch(self.model, given, drive, state, threads=threads).total_force(0.0)
             f = f.reshape(n, len(part), colours, 3, len(STENCIL), 3)
             slopes = -np.einsum("nwcasb,s->wncab", f, WEIGHTS)
             for w, slope in zip(part, slopes, strict=True):
@@ -439,10 +450,10 @@ class _Step:
                 k = sp.csc_array(whole[self.free][:, self.free])
                 if not np.all(np.isfinite(k.data)):
                     continue
-                shift = NULL_SHIFT * float(np.abs(k.data).max(initial=1.0))
-                factor = _Factor(sp.csc_array(k + shift * sp.eye_array(k.shape[0], format="csc")))
-                out[w] = None if factor.singular or not factor.definite else factor
-        return out
+                largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
+                out[w], shift = _System._definite(k, largest, 0.0)
+                stable[w] = shift <= NULL_SHIFT * largest * (1 + 1e-9)
+        return out, stable
 
 
 def clocked(effect: str) -> bool:
@@ -467,14 +478,9 @@ def onward(batch: Batch, velocity: np.ndarray, dt: float):
     batch.advance(1, dt, np.inf)
 
 
-def constant(drive: Drive, time: float) -> Drive:
-    """The drive held at its value at one instant."""
-    return drive.replace(**{n: np.squeeze(s(time)) for n, s in drive.signals.items()})
-
-
-def held(drive: Drive) -> Drive:
-    """The drive held at its value at time 0, one number for all worlds or for each."""
-    return drive.replace(**{n: np.atleast_1d(np.squeeze(s(0.0))) for n, s in drive.signals.items()})
+def held(drive: Drive, time: float = 0.0) -> Drive:
+    """The drive held at its value at one instant, one number for all worlds or for each."""
+    return drive.replace(**{n: np.atleast_1d(np.squeeze(s(time))) for n, s in drive.signals.items()})
 
 
 def joined(drives: Sequence[Drive]) -> Drive:
@@ -527,7 +533,8 @@ def places(names: Sequence[str], found) -> list[Place]:
         for times, q, missing, error, _ in found:
             width = max(1, len(times) // BINS)
             cut = len(times) // width * width
-            z.append((missing[k, :cut].reshape(-1, width).mean(1)) / (error[k, :cut].reshape(-1, width).mean(1)) * np.sqrt(width))
+            mean, deviation = (v[k, :cut].reshape(-1, width).mean(1) for v in (missing, error))
+            z.append(mean / deviation * np.sqrt(width))
             power.append(missing[k] * np.gradient(q[k], times))
         times, _, missing, error, _ = found[0]
         score = float(np.sqrt(np.mean(np.concatenate(z) ** 2)))
@@ -578,5 +585,5 @@ def sign_changes(curve: Curve) -> list[float]:
     """Where the residual moment changes its sign, between means that are both beyond twice their error."""
     x, y, e = (np.array(v) for v in (curve.x, curve.mean, curve.error))
     sure = np.flatnonzero(np.abs(y) > 2 * e)
-    pairs = [(a, b) for a, b in zip(sure[:-1], sure[1:], strict=True) if y[a] * y[b] < 0]
+    pairs = [(a, b) for a, b in pairwise(sure) if y[a] * y[b] < 0]
     return [float(x[a] + (x[b] - x[a]) * y[a] / (y[a] - y[b])) for a, b in pairs]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from origami_sim.diagnose.compare import Score, Weights, difference, memory, probabilities, reproducible, supported
+from origami_sim.diagnose.compare import Score, Weights, difference, probabilities, reproducible, supported
 from origami_sim.diagnose.refit import Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.effects import get
@@ -15,8 +15,8 @@ from origami_sim.recording.units import quantity
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-REMOVED = 0.5
-"""Part of the removable squared error that named physics must remove on held-out data; with less it is UNKNOWN."""
+REMOVED = 0.6
+"""Part of the slow structure of the residual that named physics must remove; with less it is UNKNOWN."""
 
 
 @dataclass
@@ -62,15 +62,18 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             verdict, sentence, float(probability), list(chosen), fit, list(tied), removed, left, onset, notes, others
         )
 
+    kept, total = credible(rows, p, order, scores)
     gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
-    holds = best is not base and reproducible(scores[id(best)], scores[id(base)])
+    holds = best is not base and any(reproducible(scores[id(f)], scores[id(base)]) for f in kept if f is not base)
     if best is base or p_value > o.significance or not holds:
         if not screening.signatures and over > FLOOR:
             return result(
                 "UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base
             )
-        if over <= FLOOR or (p_value > o.significance and not structured(forward, base, sigma)):
-            return _adequate_or_parameter(forward, given, base, weights, result, over, p[rows.index(base)])
+        slow, chance = structure(base, base)
+        if slow < 8.0 * chance or over < 1.05:
+            probability = max(float(p[rows.index(base)]), chance_of_null(p_value))
+            return _adequate_or_parameter(forward, given, base, weights, result, over, probability)
         if p_value <= o.significance and best is not base and p[rows.index(base)] < 0.5:
             names = _distinct([rows[i] for i in order])[:2]
             return result(
@@ -89,20 +92,16 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             [],
             base,
         )
-    tied = [rows[i] for i in order if p[i] > 0.0]
-    total, kept = 0.0, []
-    for f in tied:
-        kept.append(f)
-        total += p[rows.index(f)]
-        if total >= 0.95:
-            break
     same = [f for f in rows if _effects(f) == _effects(best)]
     mechanism_p = float(sum(p[rows.index(f)] for f in same))
-    fall = (
-        f"held-out error falls from {over:.1f} to {left:.1f} times the noise floor "
-        f"(of what could be removed, {max(removed, 0.0):.0%} is)"
-    )
-    if removed < REMOVED and left > 1.5:
+    fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
+    if over > 1.1:
+        fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
+    slow_before, chance = structure(base, best)
+    slow_after, _ = structure(best, best)
+    explained = 1.0 - slow_after / slow_before if slow_before > 5.0 * chance else 1.0
+    if explained < REMOVED and slow_after > 5.0 * chance:
+        removed = min(removed, explained)
         return result(
             "UNKNOWN",
             f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, removes only "
@@ -111,7 +110,18 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             [best.hypothesis.label],
         )
     rivals = [f for f in kept if _effects(f) != _effects(best)]
-    if mechanism_p < o.clear and rivals:
+    if rivals and all(kind(f) == "measurement" for f in kept):
+        names = _distinct(kept)
+        return result(
+            "MEASUREMENT",
+            f"The measurement, not the device, explains the mismatch, and these recordings do not tell which of {_join(names)}: "
+            f"the best is {_say(best)}; {fall}.",
+            total,
+            names,
+            best,
+            kept,
+        )
+    if rivals:
         names = _distinct(kept)
         return result(
             "TIE",
@@ -136,6 +146,30 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
         where = "" if len(same) == 1 or p[rows.index(best)] > 0.9 * mechanism_p else " (the site is less certain)"
         text = f"At {s.site} the model lacks {_say(best)}{where}, p = {mechanism_p:.2f}; {fall}."
     return result(word, text, mechanism_p, [s.label for s in best.hypothesis.suspects])
+
+
+CLOSE = 6.0
+"""Log evidence up to which an explanation is in a tie if held-out data do not tell it from the best either."""
+
+
+def credible(rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict[int, Score]) -> tuple[list[Fit], float]:
+    """The explanations that hold 95 % of the probability, and those that held-out data do not tell from the best."""
+    best, total, kept = rows[order[0]], 0.0, []
+    evidence = dict(zip((id(f) for f in rows), supported(rows, scores), strict=True))
+    for i in order:
+        f = rows[i]
+        d, error = difference(scores[id(best)], scores[id(f)]) if f is not best else (0.0, 1.0)
+        close = evidence[id(best)] - evidence[id(f)] < CLOSE and d < 2.0 * error
+        if total < 0.95 or close:
+            kept.append(f)
+            total += float(p[i])
+    return kept, min(total, 1.0)
+
+
+def chance_of_null(p_value: float) -> float:
+    """Probability that nothing is missing, from the look-elsewhere test (Sellke, Bayarri & Berger 2001), prior 4 to 1."""
+    bound = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else 1.0
+    return float(4 * bound / (4 * bound + 1))
 
 
 def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, result, over, probability):
@@ -173,10 +207,27 @@ def removable(before: np.ndarray, after: np.ndarray, sigma: np.ndarray) -> float
     return (e0 - e1) / excess if excess > 0 else 0.0
 
 
-def structured(forward, f: Fit, sigma: np.ndarray) -> bool:
-    """Whether residuals beyond the noise have a memory, so that they are not just more noise."""
-    rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
-    return bool(np.any(rms > FLOOR * sigma) and memory([r / sigma for r in f.residuals]) > 3.0)
+WINDOW = 10
+"""Frames over which residuals are averaged to tell structure from noise."""
+
+
+def structure(f: Fit, reference: Fit) -> tuple[float, float]:
+    """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
+
+    Squares of window means in units of what white noise would give, less one each, summed. The white noise is that of the
+    reference's fast residual (second differences), so that a noise level that was stated wrongly does not matter.
+    """
+    total, count = 0.0, 0
+    fast = np.concatenate([np.diff(r, n=2, axis=0) for r in reference.residuals])
+    white = np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
+    for r in f.residuals:
+        n = len(r) // WINDOW
+        if not n:
+            continue
+        means = np.mean(r[: n * WINDOW].reshape(n, WINDOW, -1), axis=1) / (white / np.sqrt(WINDOW))
+        total += float(np.nansum(means**2 - 1.0))
+        count += int(np.isfinite(means).sum())
+    return total, float(np.sqrt(2.0 * max(count, 1)))
 
 
 def departure(forward, f: Fit, sigma: np.ndarray) -> float:

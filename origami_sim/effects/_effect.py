@@ -99,6 +99,7 @@ class Effect:
         channels: kinds of channels that a distortion of the measurement can act on (empty: all).
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
+        stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
             the energy, and the time-integrated work otherwise.
         stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
@@ -120,6 +121,7 @@ class Effect:
     apply: Callable | None = None
     channels: tuple[str, ...] = ()
     fitted: tuple[str, ...] = ()
+    stated: tuple[str, ...] = ()
     conservative: bool = False
     memory: tuple[Memory, ...] = ()
     stiffness: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None

@@ -26,8 +26,8 @@ EFFECT = Effect(
     channels=("marker", "marker_2d"),
     parameters=(
         Parameter("tilt_z", "rz", "rad", 0.0, (-0.8, 0.8), "turn about z", typical=0.03),
-        Parameter("tilt_y", "ry", "rad", 0.0, (-0.8, 0.8), "turn about y", typical=0.03),
-        Parameter("tilt_x", "rx", "rad", 0.0, (-0.8, 0.8), "turn about x", typical=0.03),
+        Parameter("tilt_y", "ry", "rad", 0.0, (-0.8, 0.8), "turn about y", typical=0.0),
+        Parameter("tilt_x", "rx", "rad", 0.0, (-0.8, 0.8), "turn about x", typical=0.0),
     ),
     fitted=("tilt_z", "tilt_y", "tilt_x"),
     formula="y = R x,  R the rotation by (rx, ry, rz) about the origin",

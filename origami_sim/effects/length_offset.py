@@ -22,8 +22,8 @@ EFFECT = Effect(
     channels=("marker", "marker_2d", "tip_displacement"),
     parameters=(
         Parameter("offset_x", "x0", "m", 0.0, (-1.0, 1.0), "constant added to the first component", typical=0.001),
-        Parameter("offset_y", "y0", "m", 0.0, (-1.0, 1.0), "constant added to the second component", typical=0.001),
-        Parameter("offset_z", "z0", "m", 0.0, (-1.0, 1.0), "constant added to the third component", typical=0.001),
+        Parameter("offset_y", "y0", "m", 0.0, (-1.0, 1.0), "constant added to the second component", typical=0.0),
+        Parameter("offset_z", "z0", "m", 0.0, (-1.0, 1.0), "constant added to the third component", typical=0.0),
     ),
     fitted=("offset_x", "offset_y", "offset_z"),
     formula="y = x + (x0, y0, z0), so many as the channel has components",

@@ -80,6 +80,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
             "time_base": side.time_base(table),
             "notes": notes,
             "scene": side.scene,
+            "priors": side.priors,
             **side.free_text,
         },
     )

@@ -20,6 +20,7 @@ CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
     "marker_2d": ("length", (2,)),
     "tip_displacement": ("length", (1, 2, 3)),
     "force": ("force", (1, 2, 3)),
+    "moment": ("moment", (1,)),
 }
 """Dimension and allowed component counts of each kind of channel.
 
@@ -28,6 +29,7 @@ CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
 - marker: point on the body, 3D. marker_2d: the same in a camera plane, in metres, right and up.
 - tip_displacement: how far a point moved since the first frame: the distance, the part along a direction, or a vector.
 - force: of the support or the ground on the object: the part along a direction, or a vector.
+- moment: applied to a crease to hold it, positive towards valley.
 """
 
 DIFFERENCE_ORDER = 6

@@ -53,6 +53,9 @@
     name = "pendulum_chain"             # the scene that simulates this object
     overrides = { arm1_mass = 0.09 }    # arguments of its build()
 
+    [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
+    mass_1 = 0.5e-3                     # in the unit of the scene's setting, or "5 %" of its value, or "0.5 mm"
+
 Any other key is an error. Units: see `origami_sim.recording.units`.
 """
 
@@ -84,6 +87,7 @@ _TOP_KEYS = (
     "cameras",
     "drive",
     "scene",
+    "priors",
 )
 _SOURCE_KEYS = ("format", "likelihood", "axes", "origin", "about")
 _TIME_KEYS = ("column", "unit", "rate_hz")
@@ -116,6 +120,7 @@ class Sidecar:
     cameras: dict[str, dict[str, Any]]
     drive: dict[str, dict[str, Any]]
     scene: dict[str, Any]
+    priors: dict[str, float | str]
 
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
@@ -151,6 +156,7 @@ class Sidecar:
             cameras=cameras,
             drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
             scene={"name": scene.text("name", None), "overrides": scene.table("overrides")} if scene.values else {},
+            priors={name: top.label("priors", name) for name in top.table("priors")},
         )
 
     @property

@@ -169,7 +169,7 @@ def simulate(
     else:
         batch = Batch(model, parameters, applied, state, device=device, threads=threads)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
-    speed_limit = 0.5 * lengths.min(initial=1.0) / step
+    speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     record: list[tuple[State, Evaluation]] = []

@@ -32,7 +32,7 @@ class TimeStep:
         return f"dt = {self.dt:.3g} s ({limit})"
 
 
-def _gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
+def gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
     """Nodes [n, k] of the elements of a family and the norms of their coordinate's gradient there [n, k]."""
     x = model.position
     if family == "node":
@@ -89,7 +89,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
             if slope is None or effect.family == "triangle" or not model.count(effect.family):
                 continue
             nodes_own = {"mass": parameters["inertia", "mass"]} if effect.family == "node" else {}
-            nodes, norms = _gradient_norms(model, effect.family)
+            nodes, norms = gradient_norms(model, effect.family)
             norms = norms * free[nodes]
             k = np.asarray(slope({**nodes_own, **parameters.of(name)}))
             k = np.broadcast_to(k, (len(nodes), worlds))

@@ -319,8 +319,8 @@ def everything(seed=7, *, rates=True):
     rng = np.random.default_rng(seed)
     model, state = configuration("random", rng)
     parameters = quiet(model)
-    for name in ALL:
-        give(parameters, model, name, rng)
+    for name in ALL:  # each has numbers of its own, so that a new effect does not change those of the others
+        give(parameters, model, name, np.random.default_rng([seed, *name.encode()]))
     # magnets and stacks of the same size as the rest
     for name in ("magnetic_torque", "magnetic_torque_affine", "field_gradient"):
         parameters.set(name, "volume", 1e-6)

@@ -1,0 +1,311 @@
+"""What may be concealed in an object: laws of our own, written for MuJoCo, and what they are called in a diagnosis.
+
+The laws are other formulas or other regularisations than those of the simulator under test wherever physics allows it:
+dry friction is Dahl's, air drag is integrated over nine points of a panel, a Prony branch is stepped implicitly.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from world import Law, Numbers, World, cross
+
+
+class DryFriction(Law):
+    """Dahl 1968: the moment approaches its limit with the angle turned."""
+
+    ANGLE = 0.008
+
+    def reset(self, world, q):
+        self.moment = 0.0
+
+    def act(self, world, t, q, w, dt):
+        if not self.strength:
+            return
+        rate = w[self.place]
+        pull = 1.0 - self.moment / self.strength * math.copysign(1.0, rate)
+        self.moment += self.strength / self.ANGLE * pull * rate * dt
+        self.moment = max(-self.strength, min(self.strength, self.moment))
+        world.torque[self.place] -= self.moment
+
+
+class QuadraticDamping(Law):
+    def act(self, world, t, q, w, dt):
+        world.torque[self.place] -= self.strength * abs(w[self.place]) * w[self.place]
+
+
+class AirDrag(Law):
+    """(1/2) rho Cd v_n |v_n| on nine points of every panel."""
+
+    DENSITY = 1.2
+
+    def act(self, world, t, q, w, dt):
+        for p, corners in enumerate(world.corners):
+            if p == world.o["held"]:
+                continue
+            if p not in self.extra:
+                u, v = corners[1] - corners[0], corners[-1] - corners[0]
+                grid, weight = np.polynomial.legendre.leggauss(3)
+                n, share = world.normals[p], np.outer(weight, weight).ravel() / 4
+                at = np.array([0.5 * a * u + 0.5 * b * v for a in grid for b in grid])
+                self.extra[p] = n, np.cross(at, n), 0.5 * self.DENSITY * world.areas[p] * share
+            n, arms, weights = self.extra[p]
+            turn, spin, velocity = world.moving(p)
+            normal = turn @ n
+            speed = normal @ velocity + arms @ (spin @ turn)  # (spin x r) . n = spin . (r x n)
+            force = -self.strength * weights * np.abs(speed) * speed
+            world.wrench[p, :3] += force.sum() * normal
+            world.wrench[p, 3:] += turn @ (force @ arms)
+
+
+class Hysteresis(Law):
+    """Bouc-Wen with exponent 1.5; `extra["angle"]` is where the loop would saturate along its first slope."""
+
+    def reset(self, world, q):
+        self.z = 0.0
+
+    def act(self, world, t, q, w, dt):
+        rate = w[self.place] / self.extra["angle"]
+        z = self.z
+        self.z += dt * (rate - 0.5 * abs(rate) * math.sqrt(abs(z)) * z - 0.5 * rate * abs(z) ** 1.5)
+        world.torque[self.place] -= self.strength * self.z
+
+
+class Relaxation(Law):
+    """One Maxwell branch, implicit Euler; relaxed at the start."""
+
+    def reset(self, world, q):
+        self.q, self.moment = q[self.place], 0.0
+
+    def act(self, world, t, q, w, dt):
+        turn, self.q = q[self.place] - self.q, q[self.place]
+        self.moment = (self.moment + self.strength * turn) / (1.0 + dt / self.extra["time"])
+        world.torque[self.place] -= self.moment
+
+
+class Stiffening(Law):
+    def act(self, world, t, q, w, dt):
+        world.torque[self.place] -= self.strength * q[self.place] ** 3
+
+
+class Asymmetry(Law):
+    def act(self, world, t, q, w, dt):
+        if q[self.place] > 0.0:
+            world.torque[self.place] -= self.strength * q[self.place]
+
+
+class RestAngle(Law):
+    """The crease is at rest at another angle: K times that angle."""
+
+    def act(self, world, t, q, w, dt):
+        world.torque[self.place] += world.o["creases"][self.place]["stiffness"] * self.strength
+
+
+class Viscosity(Law):
+    """One crease loses more than the others."""
+
+    def act(self, world, t, q, w, dt):
+        world.torque[self.place] -= self.strength * w[self.place]
+
+
+class Softness(Law):
+    """One crease is softer or stiffer than the others."""
+
+    def act(self, world, t, q, w, dt):
+        world.torque[self.place] -= self.strength * q[self.place]
+
+
+class Misalignment(Law):
+    """The field is turned about y (a field along x or z stays in the plane of a strip)."""
+
+    def field(self, b, dt):
+        c, s = math.cos(self.strength), math.sin(self.strength)
+        return np.array([c * b[0] + s * b[2], b[1], c * b[2] - s * b[0]])
+
+
+class Lag(Law):
+    def reset(self, world, q):
+        self.b = np.zeros(3)
+
+    def field(self, b, dt):
+        self.b = b + (self.b - b) * math.exp(-dt / self.strength) if self.strength > 0 else b
+        return self.b
+
+
+class Remanence(Law):
+    def prepare(self, numbers: Numbers):
+        numbers.remanence[self.place] += self.strength
+
+
+class Eccentric(Law):
+    def prepare(self, numbers: Numbers):
+        numbers.lift[self.place] += self.strength
+
+
+class Tilt(Law):
+    def prepare(self, numbers: Numbers):
+        numbers.tilt[0] += self.strength
+
+
+class Tether(Law):
+    """A soft lead from the middle of the last panel's far edge to where that was in the flat state."""
+
+    def act(self, world, t, q, w, dt):
+        p = len(world.corners) - 1
+        if not self.extra:
+            hinge = next(h[0] for h in world.hinges if h[2] == p)
+            self.extra["at"] = world.centres[p] - hinge
+        at = self.extra["at"]
+        arm = world.data.xmat[world.body[p]].reshape(3, 3) @ at
+        force = self.strength * (world.centres[p] + at - world.data.xipos[world.body[p]] - arm)
+        world.wrench[p, :3] += force
+        world.wrench[p, 3:] += cross(arm, force)
+
+
+# outside the catalogue ------------------------------------------------------------------------------------------------
+
+
+class Parametric(Law):
+    """Stiffness that oscillates by itself."""
+
+    def act(self, world, t, q, w, dt):
+        wave = math.sin(2 * math.pi * self.extra["frequency"] * t)
+        world.torque[self.place] -= self.strength * wave * q[self.place]
+
+
+class Neighbour(Law):
+    """A moment that depends on the square of the next crease's angle."""
+
+    def act(self, world, t, q, w, dt):
+        other = (self.place + 1) % len(q)
+        world.torque[self.place] -= self.strength * q[other] ** 2
+
+
+class HiddenMagnets(Law):
+    """Unknown point dipoles along the normals of the first two moving panels; strength: m1 m2 [A^2 m^4]."""
+
+    def act(self, world, t, q, w, dt):
+        d, pair = world.data, [world.body[h[2]] for h in world.hinges[:2]]
+        n = [d.xmat[b].reshape(3, 3) @ world.normals[h[2]] for b, h in zip(pair, world.hinges[:2], strict=True)]
+        r = d.xipos[pair[1]] - d.xipos[pair[0]]
+        far = float(np.linalg.norm(r))
+        u, k = r / far, 1e-7 * self.strength
+        n0, n1 = float(n[0] @ u), float(n[1] @ u)
+        force = 3 * k / far**4 * (n0 * n[1] + n1 * n[0] + (float(n[0] @ n[1]) - 5 * n0 * n1) * u)
+        for sign, here, there, along, p in ((1, n[1], n[0], n0, 1), (-1, n[0], n[1], n1, 0)):
+            panel = world.hinges[p][2]
+            world.wrench[panel, :3] += sign * force
+            world.wrench[panel, 3:] += cross(here, k / far**3 * (3 * along * u - there))
+
+
+class FallingFriction(Law):
+    """Friction that vanishes with speed, so that it falls where friction is flat."""
+
+    def act(self, world, t, q, w, dt):
+        rate = w[self.place]
+        world.torque[self.place] -= self.strength * math.tanh(rate / 0.2) * math.exp(-((rate / 3.0) ** 2))
+
+
+class Pushes(Law):
+    """Somebody touches the crease now and then: pulses of 40 ms at times drawn beforehand."""
+
+    def act(self, world, t, q, w, dt):
+        for at, sign in self.extra["pulses"]:
+            if 0.0 <= t - at < 0.04:
+                world.torque[self.place] += sign * self.strength * math.sin(math.pi * (t - at) / 0.04)
+
+
+# measurement ----------------------------------------------------------------------------------------------------------
+
+
+class ClockRate(Law):
+    """e: time that passes per recorded time, less one."""
+
+
+class ClockDelay(Law):
+    """Lateness of the recording [s]."""
+
+
+class Scale(Law):
+    """Relative error of all readings."""
+
+
+class Offset(Law):
+    """Constant added to all readings."""
+
+
+@dataclass(frozen=True)
+class Concealed:
+    """A mechanism that may be drawn.
+
+    Attributes:
+        law: its class. names: what the diagnosis may call it, the first being the exact name; empty: nothing fits.
+        site: "crease", "panel", "all" (panels) or "" (the whole object or its measurement).
+        first: strength to begin the search with, times the crease stiffness where `stiff`. largest: likewise.
+        signed: either sign is possible. only: structures that it suits; empty: all.
+        number: parameter of the catalogue's effect that means the same as the strength, if there is one.
+    """
+
+    law: type[Law]
+    names: tuple[str, ...]
+    site: str = "crease"
+    first: float = 0.1
+    stiff: bool = True
+    signed: bool = False
+    largest: float = 1e9
+    only: tuple[str, ...] = ()
+    number: str = ""
+
+
+DRIVEN = ("magnetic_strip", "box")
+ELASTIC = ("hanging_strip", "magnetic_strip", "box")
+STRIPS = ("hanging_strip", "pendulum_chain", "magnetic_strip")
+
+INSIDE: dict[str, Concealed] = {
+    "dry_friction": Concealed(DryFriction, ("crease_friction",), number="friction_moment"),
+    "quadratic_damping": Concealed(QuadraticDamping, ("crease_quadratic_damping",), first=5e-3, number="coefficient"),
+    "air_drag": Concealed(AirDrag, ("air_drag",), "all", 2.0, False, largest=10.0, number="drag_coefficient"),
+    "hysteresis": Concealed(Hysteresis, ("crease_hysteresis",), only=ELASTIC, number="hysteresis_moment"),
+    "relaxation": Concealed(Relaxation, ("crease_relaxation",), first=0.3, only=ELASTIC, number="stiffness_1"),
+    "stiffening": Concealed(Stiffening, ("crease_stiffening",), first=0.3, number="cubic_stiffness"),
+    "asymmetry": Concealed(
+        Asymmetry, ("crease_asymmetry",), signed=True, largest=0.8, only=ELASTIC, number="valley_stiffness"
+    ),
+    "rest_angle": Concealed(RestAngle, ("crease_offset", "crease_swelling"), "crease", 0.05, False, True),
+    "viscosity": Concealed(Viscosity, ("crease_viscosity",), first=0.01, number="viscosity"),
+    "softness": Concealed(
+        Softness, ("crease_softness",), signed=True, largest=0.8, only=ELASTIC, number="stiffness_change"
+    ),
+    "misalignment": Concealed(Misalignment, ("field_misalignment",), "", 0.05, False, True, 0.7, DRIVEN),
+    "field_lag": Concealed(Lag, ("field_lag", "drive_delay"), "", 0.01, False, False, 0.2, DRIVEN, number="lag"),
+    "remanence": Concealed(
+        Remanence, ("remanence_error",), "panel", 0.1, False, True, 0.8, DRIVEN, number="remanence_gain"
+    ),
+    "eccentric_weight": Concealed(Eccentric, ("eccentric_weight",), "panel", 1e-4, False, True, 0.01),
+    "gravity_tilt": Concealed(Tilt, ("gravity_tilt",), "", 0.01, False, True, 0.5, number="tilt_x"),
+    "tether": Concealed(Tether, ("tether",), "", 0.01, False, largest=1.0, only=STRIPS),
+    "clock_rate": Concealed(ClockRate, ("clock_rate",), "", 2e-3, False, True, 0.1, number="clock_rate"),
+    "clock_delay": Concealed(ClockDelay, ("clock_delay",), "", 2e-3, False, False, 0.1, DRIVEN, number="clock_delay"),
+    "angle_scale": Concealed(Scale, ("angle_scale",), "", 5e-3, False, True, 0.3, number="angle_scale"),
+    "angle_offset": Concealed(Offset, ("angle_offset",), "", 2e-3, False, True, 0.5, number="angle_offset"),
+}
+"""Mechanisms that the catalogue has."""
+
+OUTSIDE: dict[str, Concealed] = {
+    "parametric_stiffness": Concealed(Parametric, (), only=ELASTIC),
+    "neighbour_moment": Concealed(Neighbour, (), signed=True),
+    "hidden_magnets": Concealed(HiddenMagnets, (), "", 1e-4, False, True, only=STRIPS),
+    "falling_friction": Concealed(FallingFriction, ()),
+    "pushes": Concealed(Pushes, (), first=0.1),
+}
+"""Mechanisms that it has not."""
+
+MEASUREMENT = ("clock_rate", "clock_delay", "angle_scale", "angle_offset")
+
+
+def build(name: str, strength: float, place: int, extra: dict) -> Law:
+    """The law of that name."""
+    return {**INSIDE, **OUTSIDE}[name].law(strength, place, dict(extra))
+
+
+__all__ = ["INSIDE", "MEASUREMENT", "OUTSIDE", "Concealed", "World", "build"]

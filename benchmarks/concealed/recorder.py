@@ -1,0 +1,65 @@
+"""The tracker: what a camera makes of a motion, and the files that it leaves (see docs/recordings.md)."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from world import Motion, World
+
+
+def channels(world: World, angles: np.ndarray) -> np.ndarray:
+    """Readings (n, D) without error: fold angles, or angles of the panels from the upright towards +x."""
+    if world.o["channels"] == "crease_angle":
+        return angles
+    side = float(world.normals[0][0])  # hanging strips only: every face looks along x
+    return np.pi - side * np.cumsum(angles, axis=1)
+
+
+def names(o: dict) -> list[tuple[str, str]]:
+    """(channel, attachment in TOML) of all readings."""
+    if o["channels"] == "crease_angle":
+        return [(c["name"], f'crease = "{c["name"]}"') for c in o["creases"]]
+    return [(f"arm{c['panels'][1]}", f'panel = "panel{c["panels"][1]}"') for c in o["creases"]]
+
+
+def readings(world: World, motion: Motion, times: np.ndarray, chain: dict) -> np.ndarray:
+    """Readings (n, D) at the camera's times with the errors of the measurement chain, but without noise."""
+    first = motion.times[0]
+    true = first + (times - first) * (1 + chain.get("clock_rate", 0.0)) - chain.get("clock_delay", 0.0)
+    curve = CubicSpline(motion.times, channels(world, motion.angles))
+    values = curve(np.clip(true, motion.times[0], motion.times[-1]))
+    return values * (1 + chain.get("angle_scale", 0.0)) + chain.get("angle_offset", 0.0)
+
+
+def tracked(values: np.ndarray, tracker: dict, rng: np.random.Generator) -> np.ndarray:
+    """Readings with noise, smoothing, quantisation and lost frames."""
+    y = values + tracker["noise"] * rng.normal(size=values.shape)
+    if tracker["smoothing"]:
+        y[1:-1] = 0.25 * y[:-2] + 0.5 * y[1:-1] + 0.25 * y[2:]
+    y = np.round(y / tracker["quantum"]) * tracker["quantum"]
+    inside = slice(8, len(y) - 8)
+    y[inside][rng.random((len(y) - 16, y.shape[1])) < tracker["lost"]] = np.nan
+    if tracker["gap"]:
+        at = int(rng.integers(16, len(y) - 16 - tracker["gap"]))
+        y[at : at + tracker["gap"]] = np.nan
+    return y
+
+
+def write(folder: Path, name: str, o: dict, recording: dict, times, values, tracker: dict) -> None:
+    """The table and its sidecar."""
+    columns = {"time_s": times}
+    columns |= {channel: values[:, n] for n, (channel, _) in enumerate(names(o))}
+    drive = recording.get("field")
+    if drive:
+        b = drive["amplitude"] * np.sin(2 * np.pi * drive["frequency"] * times)
+        columns |= {f"b{a}_T": b * drive["axis"][k] for k, a in enumerate("xyz")}
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in rows)]
+    (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    text = [f'name = "{name}"', "allow_gaps = true", "[time]", 'column = "time_s"', 'unit = "s"']
+    for channel, attachment in names(o):
+        text += [f"[channels.{channel}]", f'column = "{channel}"', f'kind = "{o["channels"]}"', 'unit = "rad"']
+        text += [attachment] + ([f"noise = {tracker['stated']:.6g}"] if tracker["stated"] else [])
+    if drive:
+        text += ["[drive.field]", 'columns = ["bx_T", "by_T", "bz_T"]', 'unit = "T"']
+    (folder / f"{name}.toml").write_text("\n".join(text) + "\n")

@@ -1,0 +1,156 @@
+"""The diagnosis on constructed cases with known answers, stage by stage."""
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose import Options, diagnose
+from origami_sim.diagnose.articulation import Articulation
+from origami_sim.diagnose.compare import memory, probabilities
+from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit
+from origami_sim.diagnose.hypothesis import suspects
+from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.screen import screen
+from origami_sim.errors import InputError
+from origami_sim.model import dihedral_angles
+from origami_sim.scene import read_calibration
+from origami_sim.scenes import box
+from tests.diagnose.strips import hanging, record, subject
+
+FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
+LOOPS = ("crease_friction", "crease_hysteresis", "air_drag", "crease_stiffening", "crease_offset", "mass_damping")
+SMALL = {"duration": 4.0, "panels": 3, "rate": 100}
+
+
+@pytest.mark.parametrize("which", ["strip", "box"])
+def test_articulation_moves_panels_rigidly_and_knows_its_jacobian(which):
+    model = hanging()[0] if which == "strip" else box.build(read_calibration("box"))[0]
+    arm, rng = Articulation(model), np.random.default_rng(1)
+    assert len(arm.open) == 0 and not arm.floating
+    pose = arm.moved(arm.reference(3), 0.5 * rng.normal(size=(arm.size, 3)))
+    x = arm.positions(pose)
+    a, b = model.bars.T
+    lengths = np.linalg.norm(x[a] - x[b], axis=-1)
+    assert lengths == pytest.approx(np.repeat(np.linalg.norm(model.position[a] - model.position[b], axis=-1)[:, None], 3, 1))
+    assert dihedral_angles(x, model.creases)[arm.creases] == pytest.approx(pose.angles, abs=1e-12)
+    for k, tangent in enumerate(arm.jacobian(pose)):
+        by = np.zeros((arm.size, 3))
+        by[k] = 1e-6
+        slope = (arm.positions(arm.moved(pose, by)) - arm.positions(arm.moved(pose, -by))) / 2e-6
+        assert slope == pytest.approx(tangent, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """The nominal fit and the screening of a strip with dry friction at its second crease."""
+    recordings = prepared([record(FRICTION, **SMALL)], 200.0)
+    forward = arranged(subject(3), recordings, Options())
+    given, base, weights, _ = nominal_fits(forward)
+    every = [s for s in suspects(forward.model, recordings, forward.drive) if s.effect in LOOPS]
+    return forward, given, base, weights, screen(forward, every, base, weights)
+
+
+def test_the_nominal_refit_is_no_worse_than_the_model_as_given(rubbing):
+    _, given, base, _, _ = rubbing
+    assert base.cost <= given.cost * (1 + 1e-9)
+
+
+def test_screening_names_the_effect_its_site_and_about_its_strength(rubbing):
+    *_, screening = rubbing
+    best = screening.signatures[0]
+    assert best.suspect.effect in ("crease_friction", "crease_hysteresis")
+    assert best.suspect.site == "crease 1"
+    friction = next(s for s in screening.signatures if s.suspect.label == "crease_friction at crease 1")
+    assert friction.strength == pytest.approx(2e-5, rel=0.5)
+    assert look_elsewhere(screening, 499, 0) < 0.01
+    overlap = screening.overlap()
+    assert np.diag(overlap) == pytest.approx(1.0) and overlap.max() <= 1 + 1e-9
+
+
+def test_equation_error_finds_the_crease(rubbing):
+    forward, _, base, _, _ = rubbing
+    places = locate(forward, base)
+    assert places[0].site == "crease 1" and places[0].share > 0.5
+    assert places[0].power < 0, "friction takes energy"
+    rate = next(c for c in places[0].curves if c.against == "rate")
+    moment = np.array(rate.mean)
+    assert moment[0] > 0 > moment[-1], "it opposes the motion"
+
+
+def test_a_nested_model_never_fits_worse(rubbing):
+    """Adding an effect, whichever, does not worsen the training fit."""
+    forward, _, base, weights, screening = rubbing
+    for found in screening.signatures[:2] + screening.signatures[-2:]:
+        f = refit(forward, base, found, weights, most=2)
+        assert f.failed or f.cost <= base.cost * (1 + 1e-6), found.suspect.label
+    assert chosen(screening, 2)[0] is screening.signatures[0]
+
+
+def test_memory_and_probabilities():
+    rng = np.random.default_rng(3)
+    white = [rng.normal(size=(2000, 2)) for _ in range(4)]
+    assert memory(white) == pytest.approx(1.0, abs=0.3)
+    smooth = [np.convolve(rng.normal(size=4020), np.ones(20) / 20, "valid")[:, None] for _ in range(4)]
+    assert memory(smooth) == pytest.approx(20.0, rel=0.25)  # a running mean of 20 samples
+    assert probabilities([0.0, 0.0, -np.inf]) == pytest.approx([0.5, 0.5, 0.0])
+
+
+def test_friction_is_found_with_its_strength_and_the_fit_improves():
+    found = diagnose(subject(3), [record(FRICTION, **SMALL)], catalogue=LOOPS)
+    assert found.verdict in ("MECHANISM", "TIE")
+    row = next(c for c in found.candidates if c.label == "crease_friction at crease 1")
+    assert found.chosen[0] == row.label
+    moment = next(n for n in row.numbers if n.label == "crease_friction.friction_moment")
+    assert moment.low < 2e-5 < moment.high and moment.value == pytest.approx(2e-5, rel=0.2)
+    before, after, noise = (np.sum(np.square(e)) for e in (found.error_refitted, found.error_after, found.noise))
+    assert (before - after) / (before - noise) > 0.9, "of what could be removed on held-out data"
+    assert found.exit_code >= 10 and found.candidates[0].gain > 0
+
+
+def test_nothing_is_found_where_nothing_is_missing():
+    found = diagnose(subject(3), [record(seed=4, **SMALL)], catalogue=LOOPS)
+    assert found.verdict == "ADEQUATE"
+    assert max(np.array(found.error_after) / found.noise) < 1.1
+
+
+def test_a_wrong_parameter_is_called_a_parameter():
+    found = diagnose(subject(3), [record(factors={("crease", "stiffness"): 1.1}, **SMALL)], catalogue=LOOPS)
+    assert found.verdict == "PARAMETER" and "crease.stiffness" in found.chosen
+    stiffness = next(n for n in found.candidates[0].numbers if n.label == "crease.stiffness")
+    assert stiffness.value == pytest.approx(1.1, abs=0.03)
+
+
+def test_an_offset_of_one_encoder_is_the_measurement():
+    r = record(**SMALL)
+    r.channels["fold1"].values[:] += 0.03
+    found = diagnose(subject(3), [r], catalogue=(*LOOPS, "angle_offset"))
+    assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_offset at channel fold1"
+
+
+@pytest.mark.slow
+def test_two_effects_are_found_together():
+    both = {**FRICTION, "air_drag": {"drag_coefficient": (2.0, None)}}
+    found = diagnose(subject(), [record(both, duration=10.0)], catalogue=(*LOOPS, "crease_mullins"))
+    assert found.verdict == "SEVERAL"
+    assert set(found.candidates[0].effects) == {"crease_friction", "air_drag"}
+
+
+@pytest.mark.slow
+def test_false_alarms_are_counted_over_a_hundred_nulls():
+    """Half of them with parameters drawn from their priors. At most 5 % at a nominal 1 %, plus two standard errors."""
+    alarms = []
+    for seed in range(100):
+        rng = np.random.default_rng([seed, 7])
+        factors = {} if seed % 2 else {("crease", "stiffness"): 1 + 0.05 * rng.normal()}
+        made = record(seed=seed, factors=factors, noise=float(rng.choice([1e-3, 3e-3])), **SMALL)
+        found = diagnose(subject(3), [made], catalogue=LOOPS)
+        if found.verdict not in ("ADEQUATE", "PARAMETER"):
+            alarms.append((seed, found.verdict, found.chosen))
+    assert len(alarms) <= 9, alarms
+
+
+def test_bad_data_are_named():
+    with pytest.raises(InputError, match="nothing to diagnose"):
+        diagnose(subject(), [])
+    short = record(duration=0.05, rate=100)
+    with pytest.raises(InputError, match="too short"):
+        diagnose(subject(), [short])
