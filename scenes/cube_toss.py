@@ -10,7 +10,7 @@ first blow, and of short windows around it, given the relative error of lengths 
 `tosses.parquet` holds the tosses of github.com/DAIRLab/contact-nets (BSD-3) as toss, time_s, position of the centre and
 orientation quaternion. A recording has the places of four corners, which together tell the pose. Then, for example:
 
-    origami-sim diagnose FOLDER/toss_0*.csv --model cube_toss
+    origami-sim diagnose FOLDER/toss_01*.csv --model cube_toss --segment 1
 
 The cube is eight corners and a centre, joined by bars; the masses at the corners give it its inertia. Corners bounce as
 unilateral spring-dashpots with bristle friction.

@@ -7,7 +7,7 @@ The ball is one node of its mass; without drag it falls freely, with it the drag
 one table with a sidecar; `drops.csv` comes from github.com/briandesilva/discovery-of-physics-from-data (MIT) in the
 layout ball, drop, time_s, height_m, velocity_m_s. Then, for example:
 
-    origami-sim diagnose FOLDER/tennis_ball_1.csv FOLDER/tennis_ball_2.csv --model falling_ball --set mass=0.0567 --segment 10
+    origami-sim diagnose FOLDER/tennis_ball_*.csv --model falling_ball --set mass=0.0567 --segment 10
 """
 
 import csv

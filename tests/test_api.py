@@ -75,7 +75,9 @@ def test_every_folder_is_installed():
     if not (root / "pyproject.toml").is_file():
         pytest.skip("not a checkout")
     listed = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    inside = {f"origami_sim.{p.parent.name}" for p in (root / "origami_sim").glob("*/__init__.py")}
+    folder = root / "origami_sim"
+    found = (p.parent.relative_to(folder).parts for p in folder.glob("*/**/__init__.py"))
+    inside = {".".join(("origami_sim", *parts)) for parts in found}
     assert set(listed) == {"origami_sim", "origami_sim.scenes", "origami_sim.calibrations"} | inside
 
 

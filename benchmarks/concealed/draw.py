@@ -161,12 +161,14 @@ def strength_for(case: Case, name: str, c: Concealed, place: int, extra: dict, w
 
 def nuisances(case: Case, rng: np.random.Generator, concealed: str) -> list[dict]:
     """Two or three things that nobody lists, each too small to be seen by itself."""
-    o = case.o
+    o, panel = case.o, case.world()
+    weight = o["density"] * o["thickness"] * panel.areas[1] * o["gravity"]
+    push = 0.02 * weight * float(np.ptp(panel.corners[1], axis=0).max())
     drawn = {
         "panel_masses": (1.0, {"errors": (0.01 * rng.normal(size=len(o["faces"]))).tolist()}),
         "angle_offset": (float(3e-3 * rng.normal()), {}),
         "air_drag": (float(rng.uniform(0.3, 1.2)), {}),
-        "pushes": (0.05 * o["creases"][0]["stiffness"], {"pulses": [[0.0, 1.0]]}),
+        "pushes": (push, {"pulses": [[0.0, 1.0]]}),  # an imperfect release
         "clock_rate": (float(1e-3 * rng.normal()), {}),
     }
     drawn.pop(concealed, None)

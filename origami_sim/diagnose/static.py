@@ -209,8 +209,8 @@ class Static(CurveForward):
 
     Every world follows its own equilibria from step to step. A step begins where the world was, moved as the nominal
     model moves there; a tangent is improved by Broyden's updates as long as each step halves the one before, and then
-    taken anew. A world that this does not bring to a stable rest is left to `statics.equilibrium`. Memory advances along
-    the path, each step taking as long as nothing relaxes any more.
+    taken anew. A world that this does not bring to a stable rest is left to `statics.equilibrium`. Memory advances
+    along the path, each step taking as long as nothing relaxes any more.
     """
 
     def __init__(

@@ -48,7 +48,7 @@ def relaxing(time_constant: float, share: float, seed=0) -> list[Recording]:
     """Ramp and hold of a standard linear solid, in closed form, to two angles."""
     out = []
     for n, level in enumerate((0.6, 1.1)):
-        t = np.concatenate([np.linspace(0.0, 2.0, 21), np.geomspace(2.1, 300.0, 100)])
+        t = np.concatenate([np.linspace(0.0, 2.0, 11), np.geomspace(2.1, 300.0, 50)])
         rate, tau, k1 = level / 2.0, time_constant, share * K
         branch = k1 * rate * tau * np.where(t <= 2.0, 1 - np.exp(-t / tau), np.exp(-t / tau) * (np.exp(2.0 / tau) - 1))
         angle = REST + np.minimum(rate * t, level)
