@@ -237,10 +237,12 @@ class Drive:
 
         The last axis has length 1 if no world differs.
         """
-        sampled = {k: s for k, s in enumerate(self.signals.values()) if s.times is not None}
-        times = np.unique(np.concatenate([s.times for s in sampled.values()])) if sampled else np.zeros(0)
-        worlds = max((s.values.shape[1] for s in sampled.values() if np.ndim(s.values) == 2), default=1)
+        sampled = [s.times for s in self.signals.values() if s.times is not None]
+        times = np.unique(np.concatenate(sampled)) if sampled else np.zeros(0)
+        shapes = [s.values.shape for s in self.signals.values() if s.values is not None]
+        worlds = max((shape[1] for shape in shapes if len(shape) == 2), default=1)
         values = np.zeros((len(self.signals), len(times), worlds))
-        for k, s in sampled.items():
-            values[k] = s._sampled(times).reshape(len(times), -1)
+        for k, s in enumerate(self.signals.values()):
+            if s.times is not None:
+                values[k] = s._sampled(times).reshape(len(times), -1)
         return times, values

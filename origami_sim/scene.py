@@ -300,7 +300,7 @@ def scene_module(name: str) -> ModuleType:
         raise InputError("there is no such scene", field="scene", value=name, allowed=", ".join(NAMES))
     module = importlib.import_module(f"origami_sim.scenes.{name}")
     if not hasattr(module.build, "__wrapped__"):
-        module.build = _extended(module.build)
+        setattr(module, "build", _extended(module.build))  # noqa: B010  a module has no declared attributes
     return module
 
 

@@ -1,8 +1,8 @@
 """What methods without physics would do with the same data: a parameter refit, sparse regression, a Gaussian process.
 
-The two that learn a correction learn it from the residual moment of equation error at each crease (`locate.motion`), on half of
-the segments, as a function of that crease's angle and rate. It is then put into the simulator as a table and predicts the
-other half, with the starts adapted exactly as for every hypothesis.
+The two that learn a correction learn it from the residual moment of equation error at each crease (`locate.motion`),
+on half of the segments, as a function of that crease's angle and rate. It is then put into the simulator as a table
+and predicts the other half, with the starts adapted exactly as for every hypothesis.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from origami_sim.diagnose.refit import Fit, Weights, fit
 KNOTS = 9
 
 THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
-"""Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the training data."""
+"""Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the data."""
 
 LIBRARY: dict[str, Callable] = {
     "1": lambda a, w: np.ones_like(a),
@@ -176,7 +176,9 @@ def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weig
         richer = model.with_effects("crease_discrepancy")
         out = parameters.for_model(richer)
         for c, (grid_a, grid_w, table) in zip(creases, tables, strict=True):
-            for name, value in zip(("angle_low", "angle_high", "rate_low", "rate_high"), (*grid_a, *grid_w), strict=True):
+            for name, value in zip(
+                ("angle_low", "angle_high", "rate_low", "rate_high"), (*grid_a, *grid_w), strict=True
+            ):
                 out.set("crease_discrepancy", name, value, np.array([c]))
             out.set("crease_discrepancy", "missing_moment", table.reshape(1, 1, -1), np.array([c]))
         return richer, out, drive
@@ -184,7 +186,9 @@ def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weig
     import copy
 
     other = copy.copy(forward)
-    nominals = tuple(Free(NOMINAL, f.name, f.unit, t, f.scale) for f, t in zip(base.free[:count], base.theta, strict=False))
+    nominals = tuple(
+        Free(NOMINAL, f.name, f.unit, t, f.scale) for f, t in zip(base.free[:count], base.theta, strict=False)
+    )
     other.subject = Subject(corrected, nominals)
     other._built = {}
     return fit(other, Hypothesis(), weights, theta=base.theta[:count], local=base.local, blocks=held, fixed=True)

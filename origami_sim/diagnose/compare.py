@@ -123,7 +123,9 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
     extra = len(fit.hypothesis.free)
     n = max(effective_samples(forward, fit, weights), 2.0)
     cost = float(sum(r @ r for r in residual)) + fit.penalty
-    sites = float(sum(np.log(s.sites) for s in fit.hypothesis.suspects))  # an effect is as likely at few sites as at many
+    sites = float(
+        sum(np.log(s.sites) for s in fit.hypothesis.suspects)
+    )  # an effect is as likely at few sites as at many
     return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n) - sites)
 
 
@@ -139,7 +141,8 @@ def reproducible(a: Score, b: Score) -> bool:
     """Whether a predicts held-out data better than b, and not by luck in one place.
 
     The gain must come from at least two blocks (if there are as many), and what other blocks lose must be a small part
-    of it. A standard error over blocks would not do: an effect of large motions gains nothing where the motion has died.
+    of it. A standard error over blocks would not do: an effect of large motions gains nothing where the motion has
+    died.
     """
     d = a.held_out - b.held_out
     enough = np.count_nonzero(d > 1.0) >= min(2, len(d))

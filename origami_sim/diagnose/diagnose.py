@@ -95,7 +95,8 @@ def diagnose(
         keep: remembers predictions, so that an interrupted diagnosis resumes, and the fits.
 
     Raises:
-        InputError: no recording, recordings of different channels, too few frames, a drive that the model does not know.
+        InputError: no recording, recordings of different channels, too few frames, a drive that the model does not
+        know.
     """
     o = options or Options()
     tell = progress or (lambda stage, part: None)
@@ -257,7 +258,7 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
 
 
 def starting(subject: Subject, recordings: list[Recording]) -> str:
-    """"rest" if all recordings begin at rest in the reference state, else "fit"."""
+    """ "rest" if all recordings begin at rest in the reference state, else "fit"."""
     probe = Forward(subject, recordings, start="rest")
     for index, recording in enumerate(recordings):
         values, noise = stacked(recording)
@@ -410,9 +411,7 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     a, b, x = best
     first = replace(a, strength=float(x[0] * a.error))
     second = replace(b, strength=float(x[1] * b.error))
-    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(
-        forward, base, first, weights
-    )
+    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(forward, base, first, weights)
     if one.failed:
         return []
     out = [] if any(one is f for f in fits) else [one]
@@ -444,7 +443,9 @@ def combine(forward, base, fits, scores, screening: Screening, weights, relax, o
             break
         more += tried
         f = max(tried, key=lambda f: scores[id(f)].evidence)
-        if not (reproducible(scores[id(f)], scores[id(best)]) and scores[id(f)].evidence > scores[id(best)].evidence + 3.0):
+        if not (
+            reproducible(scores[id(f)], scores[id(best)]) and scores[id(f)].evidence > scores[id(best)].evidence + 3.0
+        ):
             break
         best = f
     if best is not None and len(best.hypothesis.suspects) > 1:
@@ -458,7 +459,9 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
     for s in best.hypothesis.suspects:
         rest = tuple(t for t in best.hypothesis.suspects if t is not s)
         known = [f for f in (*fits, *out) if _same(f.hypothesis, rest) and not f.failed]
-        inner = known[0] if known else fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
+        inner = (
+            known[0] if known else fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
+        )
         if inner.failed:
             continue
         if not known:
@@ -587,9 +590,7 @@ def fit_percent(forward: Forward, f: Fit) -> np.ndarray:
 
 
 def _units(recording: Recording) -> list[str]:
-    return [
-        c.unit for c in recording.channels.values() for _ in range(1 if c.values.ndim == 1 else c.values.shape[1])
-    ]
+    return [c.unit for c in recording.channels.values() for _ in range(1 if c.values.ndim == 1 else c.values.shape[1])]
 
 
 def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights) -> list[Trace]:
@@ -652,7 +653,9 @@ def _against(forward: Forward, f: Fit, d: int, drive: str | None) -> list[np.nda
         if drive is None:
             out.append(np.gradient(np.nan_to_num(block.values[:, d]), block.times))
         else:
-            start = forward.recordings[block.recording].times[block.first] - forward.recordings[block.recording].times[0]
+            start = (
+                forward.recordings[block.recording].times[block.first] - forward.recordings[block.recording].times[0]
+            )
             out.append(np.squeeze(forward._drives[block.recording][drive](start + block.times)))
     return out
 

@@ -32,9 +32,11 @@ class Candidate:
     """One row of the table of explanations.
 
     Attributes:
-        label: effects and sites, "nominal as given" or "nominal refitted". kind: nominal, parameter, mechanism, measurement.
+        label: effects and sites, "nominal as given" or "nominal refitted". kind: nominal, parameter, mechanism,
+            measurement.
         effects, sites: of its suspects. numbers: what was fitted.
-        probability: tempered, over the table. gain: held-out log score over the refitted nominal. error: its standard error.
+        probability: tempered, over the table. gain: held-out log score over the refitted nominal. error: its standard
+            error.
         rms: held-out rms residual by component [SI]. fit: fit % = 100 (1 - NRMSE) by component, on all data.
         why: why it lost or won. distrust: when not to trust the row, or "". failed: why it could not be fitted, or "".
     """
@@ -56,7 +58,7 @@ class Candidate:
 
 @dataclass
 class Suspected:
-    """One suspect in the screening: score z, its strength with standard deviation [unit], part of the residual explained."""
+    """One suspect in the screening: score z, its strength with standard deviation [unit], part explained."""
 
     label: str
     effect: str
@@ -87,8 +89,9 @@ class Place:
     """What equation error says about one coordinate (a crease's fold angle, a coordinate of the root).
 
     Attributes:
-        site: name. score: how much structure its residual moment has, in standard deviations. share: posterior of being the
-            site. power: mean unexplained power [W], negative: lost. onset: first time at which it departs [s], nan: never.
+        site: name. score: how much structure its residual moment has, in standard deviations. share: posterior of
+            being the site. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
+            [s], nan: never.
         times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
     """
 
@@ -105,7 +108,7 @@ class Place:
 
 @dataclass
 class Trace:
-    """One component of one recording: times [s], recorded, and predictions before, refitted and after; band is +-2 sd."""
+    """One component of one recording: times [s], recorded, predicted before, refitted and after; band is +-2 sd."""
 
     recording: str
     component: str
@@ -204,7 +207,7 @@ class Diagnosis:
 
     def to_dict(self) -> dict:
         """Plain lists and numbers; what is not finite becomes None."""
-        return _plain(asdict(self))
+        return {k: _plain(v) for k, v in asdict(self).items()}
 
     def save_json(self, path: str | Path) -> Path:
         """Writes everything as JSON."""

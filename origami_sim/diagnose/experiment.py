@@ -110,7 +110,9 @@ def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, ti
         if stretch != 1.0:
             step = times[1] - times[0]
             times = np.arange(round((times[-1] / step) * stretch) + 1) * step
-        out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=np.zeros((len(times), b.values.shape[1]))))
+        out.blocks.append(
+            replace(b, pose=pose, rates=rates, times=times, values=np.zeros((len(times), b.values.shape[1])))
+        )
     if gain != 1.0 or speed != 1.0:
         out._drives = [_changed(d, gain, speed) for d in forward._drives]
     if tilt or load != 1.0:

@@ -90,6 +90,7 @@ class Forward:
         self.model, self.parameters, self.drive = subject.build(self.values)
         self.articulation = Articulation(self.model)
         self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._given = np.array([f.start for f in subject.nominals])
         self._settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
         self._calm: dict[int, int] = {}
         self._paths: dict[int, np.ndarray | None] = {}
@@ -202,18 +203,25 @@ class Forward:
             local: [K, B, L] start coordinates (as a shift from the block's own) and rates, for all blocks.
             blocks: which to predict (default all).
 
-        A world that goes unstable gives nan.
+        A world that goes unstable, or of whose numbers no model can be built, gives nan.
         """
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
-        worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
+        worlds, impossible = [], []
+        for k, (h, t) in enumerate(zip(each, theta, strict=True)):
+            try:
+                worlds.append(self._world(h, t, effects))
+            except InputError:  # numbers of which no model can be built, such as an inertia that no masses give
+                impossible.append(k)
+                worlds.append(self._world(Hypothesis(), self._given, effects))
         out: dict[int, np.ndarray] = {}
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             for group in _by_length(self.blocks, mine):
                 for b, values in zip(group, self._roll(r, group, each, worlds, local), strict=True):
                     out[b] = values
+                    out[b][impossible] = np.nan
         return [out[b] for b in wanted]
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
@@ -326,7 +334,9 @@ class Forward:
         step = float(np.median(np.diff(self.recordings[r].times)))
         frames = np.maximum(firsts[:, None] - lead + np.arange(lead + 1), 0)  # held still before the recording
         frames = np.minimum(frames, len(path) - 1)
-        held = Model(**{**{f: getattr(model, f) for f in model.__dataclass_fields__}, "free": np.zeros_like(model.free)})
+        held = Model(
+            **{**{f: getattr(model, f) for f in model.__dataclass_fields__}, "free": np.zeros_like(model.free)}
+        )
         begin = self.recordings[r].times[frames[:, 0]] - self.recordings[r].times[0]
         drive = distorted(model, parameters, shifted(self._drives[r], begin, lead * step, k), lead * step)
         state = State.at_rest(held, k * count, position=np.tile(np.moveaxis(path[frames[:, 0]], 0, 1), (1, k, 1)))
@@ -365,9 +375,7 @@ class Forward:
                     continue
                 own = name in self.model.effects  # a measurement that the model itself describes holds for all
                 here = np.repeat([own or _acts(h, name, index) for h in each], repeat)
-                given = {
-                    n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()
-                }
+                given = {n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()}
                 reader = _wrapped(effect, reader, given)
             parts.append(reader(at))
             row += width
@@ -479,10 +487,7 @@ def stacked(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
 def angle_mask(recording: Recording) -> np.ndarray:
     """(D,) whether a component is an angle."""
     return np.concatenate(
-        [
-            np.full(1 if c.values.ndim == 1 else c.values.shape[1], c.is_angle, bool)
-            for c in recording.channels.values()
-        ]
+        [np.full(1 if c.values.ndim == 1 else c.values.shape[1], c.is_angle, bool) for c in recording.channels.values()]
     )
 
 

@@ -149,7 +149,9 @@ ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
 """Parameters of a node that stand for its reference position."""
 
 
-def apply(parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float], model: Model) -> Parameters:
+def apply(
+    parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float] | np.ndarray, model: Model
+) -> Parameters:
     """Parameters for the model with the hypothesis' effects, with the fitted numbers in place.
 
     Parameters that are not fitted are copied from an effect of the model that has one of the same name for the same

@@ -1,8 +1,9 @@
-"""Where the mismatch is: the moment that a recorded motion needs at each crease beyond what the model gives (equation error).
+"""Where the mismatch is: the moment that a recorded motion needs at each crease beyond what the model gives (equation
+error).
 
 Panels are taken as rigid. A recorded frame gives the coordinates of the tree; a smoother gives their rates and
-accelerations; the residual generalised force is J'(m a - f), which for a crease's fold angle is the moment that is missing at
-that crease, whatever its cause. Its product with the rate is the unexplained power.
+accelerations; the residual generalised force is J'(m a - f), which for a crease's fold angle is the moment that is
+missing at that crease, whatever its cause. Its product with the rate is the unexplained power.
 """
 
 from collections.abc import Sequence
@@ -31,7 +32,8 @@ class Motion:
     """Smoothed motion of the tree in one recording, and the generalised forces that it needs.
 
     Attributes:
-        times: (n,) [s]. q, rate, acceleration: [m, n]. missing: [m, n] needed less modelled. error: [m, n] its deviation.
+        times: (n,) [s]. q, rate, acceleration: [m, n]. missing: [m, n] needed less modelled. error: [m, n] its
+            deviation.
         drive: channel -> (n,) values of what varies. half: half window of the smoother [frames].
     """
 
@@ -63,7 +65,9 @@ def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
     keep = slice(half, q.shape[1] - half)
     smooth, rate, acceleration, grid = smooth[:, keep], rate[:, keep], acceleration[:, keep], grid[keep]
     rough = (q - smooth_of(q, half))[:, half:-half]
-    deviation = np.maximum(noise, rough.std(axis=1)) * np.linalg.norm(savgol_coeffs(2 * half + 1, 4, deriv=2, delta=step))
+    deviation = np.maximum(noise, rough.std(axis=1)) * np.linalg.norm(
+        savgol_coeffs(2 * half + 1, 4, deriv=2, delta=step)
+    )
     model, parameters = forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
     without = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
     parameters = parameters.for_model(without)

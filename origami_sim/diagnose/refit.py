@@ -92,7 +92,9 @@ def whitened(values: np.ndarray, weights: Weights) -> np.ndarray:
 
 def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
     """Sum of squares of the departures from what was known before."""
-    return float(sum(((t - f.start) / f.spread) ** 2 for f, t in zip(free, theta, strict=True) if np.isfinite(f.spread)))
+    return float(
+        sum(((t - f.start) / f.spread) ** 2 for f, t in zip(free, theta, strict=True) if np.isfinite(f.spread))
+    )
 
 
 def misfits(forward, blocks, predicted: list[np.ndarray], weights: Weights) -> np.ndarray:
@@ -176,9 +178,9 @@ def fit(
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
-    Minimises the weighted squares of recorded minus predicted plus the squares of the departures from the priors, within
-    physical bounds, by Gauss-Newton steps of which several lengths are tried in one batch. The starts are eliminated
-    block by block.
+    Minimises the weighted squares of recorded minus predicted plus the squares of the departures from the priors,
+    within physical bounds, by Gauss-Newton steps of which several lengths are tried in one batch. The starts are
+    eliminated block by block.
 
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
@@ -213,7 +215,8 @@ def fit(
             a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
             y = np.concatenate([y, np.zeros(len(free))])
             r_, q_ = _compressed(a, y)
-            change = lsq_linear(r_, q_, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+            found = lsq_linear(r_, q_, (np.minimum(low, -1e-12), np.maximum(high, 1e-12)))
+            change = np.asarray(found.x, float)
         moves = np.zeros_like(local)
         for n, b in enumerate(blocks):
             left = line.residual[n] - line.tangent[n] @ change[: line.tangent[n].shape[1]]

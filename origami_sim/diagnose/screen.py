@@ -1,9 +1,9 @@
 """Screening: how well each suspect explains what the refitted nominal model leaves, before anything is refitted.
 
-All predictions are linearised at the refitted nominal model. What nominal parameters (within their priors) and starts could
-explain is projected out of the residual and of every suspect's signature; the score of a suspect is then a whitened
-matched filter, and two suspects whose signatures are parallel cannot be told apart by these recordings, whatever is
-fitted afterwards.
+All predictions are linearised at the refitted nominal model. What nominal parameters (within their priors) and starts
+could explain is projected out of the residual and of every suspect's signature; the score of a suspect is then a
+whitened matched filter, and two suspects whose signatures are parallel cannot be told apart by these recordings,
+whatever is fitted afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -148,7 +148,11 @@ def screen(
 
 def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
     """Whether a suspect is the sum of other suspects of its effect at single entities."""
-    return s.kind in ("crease", "panel") and s.entities is None and any(t.effect == s.effect and t.entities is not None for t in suspects)
+    return (
+        s.kind in ("crease", "panel")
+        and s.entities is None
+        and any(t.effect == s.effect and t.entities is not None for t in suspects)
+    )
 
 
 def again(screening: Screening, base: Fit, without: Sequence[str] = ()) -> Screening:
@@ -169,9 +173,7 @@ def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fi
     for s, size, parts in simulated:
         nothing = residual * 0
         if not all(np.all(np.isfinite(p)) for p in parts):
-            found.append(
-                Signature(s, [], size, nothing, 0.0, np.nan, 0.0, 0.0, np.inf, "its simulation goes unstable")
-            )
+            found.append(Signature(s, [], size, nothing, 0.0, np.nan, 0.0, 0.0, np.inf, "its simulation goes unstable"))
             continue
         raw = float(np.sqrt(sum(p @ p for p in parts)))
         shape = project(parts)

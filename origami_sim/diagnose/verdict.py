@@ -25,7 +25,8 @@ class Judgement:
 
     Attributes:
         verdict, sentence, probability, chosen: as in `Diagnosis`. best: the fit of the verdict. tied: fits in the tie.
-        removed: part of the removable squared error that it removes on held-out data. left: residual over noise after it.
+        removed: part of the removable squared error that it removes on held-out data. left: residual over noise after
+            it.
         onset: first lasting departure of the refitted nominal [s]; nan: none. others: other explanations, best first.
     """
 
@@ -42,7 +43,9 @@ class Judgement:
     others: list[Fit] = field(default_factory=list)
 
 
-def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, relax, o):
+def judge(
+    forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, relax, o
+):
     """Weighs all fits; see `docs/diagnosis.md` for the rules in words."""
     sigma = noise.deviation
     rows = [f for f in fits if id(f) in scores]
@@ -114,7 +117,8 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
         names = _distinct(kept)
         return result(
             "MEASUREMENT",
-            f"The measurement, not the device, explains the mismatch, and these recordings do not tell which of {_join(names)}: "
+            "The measurement, not the device, explains the mismatch, and these recordings do not tell which of "
+            f"{_join(names)}: "
             f"the best is {_say(best)}; {fall}.",
             total,
             names,
@@ -125,9 +129,7 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
         names = _distinct(kept)
         return result(
             "TIE",
-            f"{_join(names)} explain the recordings about equally well (p = "
-            + ", ".join(f"{p[rows.index(f)]:.2f}" for f in kept[: len(names)])
-            + f"); {fall}.",
+            _tied(kept, [float(p[rows.index(f)]) for f in kept]) + f"; {fall}.",
             total,
             names,
             best,
@@ -152,7 +154,9 @@ CLOSE = 6.0
 """Log evidence up to which an explanation is in a tie if held-out data do not tell it from the best either."""
 
 
-def credible(rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict[int, Score]) -> tuple[list[Fit], float]:
+def credible(
+    rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict[int, Score]
+) -> tuple[list[Fit], float]:
     """The explanations that hold 95 % of the probability, and those that held-out data do not tell from the best."""
     best, total, kept = rows[order[0]], 0.0, []
     evidence = dict(zip((id(f) for f in rows), supported(rows, scores), strict=True))
@@ -167,7 +171,7 @@ def credible(rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict
 
 
 def chance_of_null(p_value: float) -> float:
-    """Probability that nothing is missing, from the look-elsewhere test (Sellke, Bayarri & Berger 2001), prior 4 to 1."""
+    """Probability that nothing is missing, from the look-elsewhere test (Sellke et al. 2001), prior 4 to 1."""
     bound = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else 1.0
     return float(4 * bound / (4 * bound + 1))
 
@@ -184,7 +188,8 @@ def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, res
         text = (
             f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
             f"{said(f.start, f.unit)} to {said(t, f.unit)}, "
-            f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; what is left is {over:.1f} times the noise."
+            f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; "
+            f"what is left is {over:.1f} times the noise."
         )
         return result("PARAMETER", text, probability, [f.label for (f, t), s in far if abs(t - f.start) > s], base)
     return result(
@@ -214,8 +219,8 @@ WINDOW = 10
 def structure(f: Fit, reference: Fit) -> tuple[float, float]:
     """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
 
-    Squares of window means in units of what white noise would give, less one each, summed. The white noise is that of the
-    reference's fast residual (second differences), so that a noise level that was stated wrongly does not matter.
+    Squares of window means in units of what white noise would give, less one each, summed. The white noise is that of
+    the reference's fast residual (second differences), so that a noise level that was stated wrongly does not matter.
     """
     total, count = 0.0, 0
     fast = np.concatenate([np.diff(r, n=2, axis=0) for r in reference.residuals])
@@ -323,6 +328,17 @@ def title(effect: str) -> str:
     text = text.strip().splitlines()[0].split(":")[0].rstrip(".")
     first = text.split()[0]
     return text if len(first) > 1 and first.isupper() else text[0].lower() + text[1:]
+
+
+def _tied(fits: Sequence[Fit], p: Sequence[float]) -> str:
+    """What the explanations of a tie have in common, and between which they leave the choice."""
+    common = set.intersection(*({s.effect for s in f.hypothesis.suspects} for f in fits))
+    shared = [s.label for s in fits[0].hypothesis.suspects if s.effect in common]
+    text = "These recordings do not decide between "
+    text += _join([f"{f.hypothesis.label} (p = {q:.2f})" for f, q in zip(fits[:4], p, strict=False)])
+    if len(fits) > 4:
+        text += f" and {len(fits) - 4} more"
+    return text + (f"; all of them contain {_join(shared)}" if shared and len(fits) > 1 else "")
 
 
 def _join(names: Sequence[str]) -> str:

@@ -39,7 +39,17 @@ def subject(panels: int = 4) -> Subject:
 
 
 def record(
-    effects=None, *, panels=4, factors=None, seed=0, duration=6.0, rate=200, noise=2e-3, size=1.0, scale=1.0, name="swing"
+    effects=None,
+    *,
+    panels=4,
+    factors=None,
+    seed=0,
+    duration=6.0,
+    rate=200,
+    noise=2e-3,
+    size=1.0,
+    scale=1.0,
+    name="swing",
 ) -> Recording:
     """A free swing with concealed effects {effect: {parameter: (value, creases or None)}} and a tracker's noise.
 

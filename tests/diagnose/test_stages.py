@@ -30,7 +30,9 @@ def test_articulation_moves_panels_rigidly_and_knows_its_jacobian(which):
     x = arm.positions(pose)
     a, b = model.bars.T
     lengths = np.linalg.norm(x[a] - x[b], axis=-1)
-    assert lengths == pytest.approx(np.repeat(np.linalg.norm(model.position[a] - model.position[b], axis=-1)[:, None], 3, 1))
+    assert lengths == pytest.approx(
+        np.repeat(np.linalg.norm(model.position[a] - model.position[b], axis=-1)[:, None], 3, 1)
+    )
     assert dihedral_angles(x, model.creases)[arm.creases] == pytest.approx(pose.angles, abs=1e-12)
     for k, tangent in enumerate(arm.jacobian(pose)):
         by = np.zeros((arm.size, 3))
