@@ -88,9 +88,13 @@ def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int]) ->
     sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
     h = hashlib.sha256(repr((_sources(), type(forward).__name__, forward.start, effects, sites, wanted)).encode())
     nominal = np.array([f.start for f in forward.subject.nominals])
-    worlds = [forward._world(one, values, effects) for one, values in zip(each, theta, strict=True)]
-    for model, parameters in (forward._world(Hypothesis(), nominal, ()), *worlds):
-        h.update(model.hash.encode() + parameters.hash.encode())
+    model, parameters = forward._world(Hypothesis(), nominal, ())
+    h.update(model.hash.encode() + parameters.hash.encode())
+    for values in theta:
+        h.update(np.asarray(values, float).tobytes() + b"|")
+    path = getattr(forward, "_q", None)  # of a prescribed motion
+    for part in path if isinstance(path, (list, tuple)) else [path]:
+        h.update(b"-" if part is None else np.asarray(part, float).tobytes())
     h.update(b"-" if local is None else np.ascontiguousarray(np.asarray(local)[:, wanted]).tobytes())
     for b in wanted:
         block = forward.blocks[b]

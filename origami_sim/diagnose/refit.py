@@ -200,6 +200,7 @@ def fit(
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     line = None
     for _ in range(most):
+        assert theta is not None and local is not None
         line = linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed)
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
