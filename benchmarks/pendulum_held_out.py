@@ -1,0 +1,91 @@
+"""Real two-hinge chain: held-out error of the published model, of its refit and of what the diagnosis named.
+
+    python benchmarks/pendulum_held_out.py path/to/pendulum_chain/double.csv
+
+Half of the segments are fitted and the others predicted: first half and second half, odd and even segments, both ways;
+only the starts of predicted segments are adapted. The block-energy error is the error of the change of energy over a segment, with the published masses.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from origami_sim.cli import _sidecar
+from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared
+from origami_sim.diagnose.forward import local_line
+from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.refit import fit
+from origami_sim.recording import read_recording
+from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P
+from origami_sim.scene import read_calibration, scene_module
+
+SPREADS = {
+    "mass_1": 0.00094, "centre_1": 0.0011, "inertia_1": 4.4e-5, "inertia_2": 1.3e-4, "viscosity_1": 1.2e-4,
+    "viscosity_2": 2e-5, "gravity": 0.01,
+}  # fmt: skip
+NAMED = {
+    "air drag on arm 2": ("air_drag at arm2",),
+    "dry friction in both hinges": ("crease_friction at all creases",),
+    "dry friction and air drag": ("crease_friction at all creases", "air_drag at arm2"),
+}
+
+
+def energy(angle: np.ndarray, rate: np.ndarray) -> float:
+    """Energy of the chain with the published masses [J]; angles from the upright [rad]."""
+    (a, b), (v, w) = angle, rate
+    kinetic = 0.5 * (P.I1 + P.m1 * P.a1**2 + P.m2 * P.L1**2) * v**2 + 0.5 * (P.I2 + P.m2 * P.a2**2) * w**2
+    kinetic += P.m2 * P.L1 * P.a2 * np.cos(a - b) * v * w
+    return kinetic + P.g * ((P.m1 * P.a1 + P.m2 * P.L1) * np.cos(a) + P.m2 * P.a2 * np.cos(b))
+
+
+def change(times: np.ndarray, values: np.ndarray, noise: np.ndarray) -> float:
+    """Change of energy over a segment [J], from local polynomials near its ends."""
+    seen = np.flatnonzero(np.all(np.isfinite(values), axis=1))
+    ends = [energy(*local_line(times, values, noise, int(n))) for n in (seen[12], seen[-13])]
+    return ends[1] - ends[0]
+
+
+def main():
+    file = Path(sys.argv[1])
+    recordings = prepared([read_recording(file, _sidecar(file))], 200.0)
+    subject = Subject.from_scene(scene_module("pendulum_chain"), read_calibration("pendulum_chain"), spreads=SPREADS)
+    forward = arranged(subject, recordings, Options(steps=300_000, segment=2.0))
+    _, base, weights, _ = nominal_fits(forward)
+    found = {s.label: s for s in suspects(forward.model, recordings, forward.drive, forward.parameters)}
+    blocks = np.arange(len(forward.blocks))
+    halves = [list(map(int, h)) for h in np.array_split(blocks, 2)]
+    turns = [list(map(int, blocks[k::2])) for k in range(2)]
+    splits = {
+        "second half": (halves[0], halves[1]),
+        "first half": (halves[1], halves[0]),
+        "odd segments": (turns[0], turns[1]),
+        "even segments": (turns[1], turns[0]),
+    }
+    given = np.array([f.start for f in subject.nominals])
+    print(f"{len(blocks)} segments of {forward.blocks[0].times[-1]:.2f} s")
+    print(f"{'model':34s}{'held out':>16s}{'theta1':>10s}{'theta2':>10s}{'block energy':>14s}")
+    cases = {"published": None, "refitted": (), **NAMED}
+    for name, labels in cases.items():
+        for held, (train, test) in splits.items():
+            hypothesis = Hypothesis(tuple(found[s] for s in labels or ()))
+            theta = given
+            if labels is not None:
+                start = np.concatenate([base.theta, *([0.3 * f.scale] for s in hypothesis.suspects for f in s.free)])
+                theta = fit(forward, hypothesis, weights, theta=start, local=base.local, blocks=train, most=8).theta
+            f = fit(forward, hypothesis, weights, theta=theta, local=base.local, blocks=test, fixed=True)
+            rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0)) * 1e3
+            misses = []
+            for b, r in zip(f.blocks, f.residuals, strict=True):
+                block = forward.blocks[b]
+                predicted = block.values - r
+                misses.append(
+                    change(block.times, predicted, block.noise) - change(block.times, block.values, block.noise)
+                )
+            miss = np.sqrt(np.mean(np.square(misses))) * 1e6
+            print(f"{name:34s}{held:>16s}{rms[0]:8.2f} m{rms[1]:8.2f} m{miss:11.1f} uJ", flush=True)
+
+
+if __name__ == "__main__":
+    main()
