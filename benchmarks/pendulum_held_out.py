@@ -3,7 +3,8 @@
     python benchmarks/pendulum_held_out.py path/to/pendulum_chain/double.csv
 
 Half of the segments are fitted and the others predicted: first half and second half, odd and even segments, both ways;
-only the starts of predicted segments are adapted. The block-energy error is the error of the change of energy over a segment, with the published masses.
+only the starts of predicted segments are adapted. The block-energy error is the error of the change of energy over a
+segment, with the published masses.
 """
 
 import sys
