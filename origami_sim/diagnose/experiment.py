@@ -65,7 +65,8 @@ def separation(forward: Forward, a: Fit, b: Fit, weights: Weights) -> float:
     rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
     scale = np.array([f.scale for f in b.free])
-    known = np.linalg.pinv(np.linalg.cholesky(b.covariance + 1e-12 * np.diag(scale**2))) * scale
+    value, vector = np.linalg.eigh(b.covariance / np.outer(scale, scale))  # a number on its bound has next to no spread
+    known = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
     stacked = np.concatenate([rows, known])
     target = np.concatenate([gap, np.zeros(len(known))])
     if not np.all(np.isfinite(stacked)) or not np.all(np.isfinite(target)):
