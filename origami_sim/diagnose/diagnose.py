@@ -11,8 +11,6 @@ from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import (
     Score,
     difference,
-    effective_samples,
-    memory,
     probabilities,
     reproducible,
     score,
@@ -30,7 +28,6 @@ from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, screen
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
-from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import stable_step
@@ -122,7 +119,6 @@ def diagnose(
     if catalogue is not None:
         every = [s for s in every if s.effect in catalogue]
     screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
-    p_value = look_elsewhere(screening, o.draws, o.seed)
     lap("screen")
     tell("locate", 0.0)
     places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, base)
@@ -677,6 +673,3 @@ def patch(best: Fit) -> dict[str, float]:
         where = "" if n.entities is None else "@" + ",".join(map(str, n.entities))
         out[n.label + where] = float(t)
     return out
-
-
-__all__ = ["Options", "diagnose", "effective_samples", "get", "memory", "prepared", "thinned"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.refit import Fit, Weights, linearise, whitened
+from origami_sim.diagnose.refit import Fit, Weights, linearise
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.drive import Drive, Signal
 
@@ -156,6 +156,3 @@ def _changed(drive: Drive, gain: float, speed: float) -> Drive:
             tiled = np.concatenate([times + k * (span + (times[1] - times[0])) for k in range(count)])
             changed[name] = replace(changed[name], times=tiled, values=np.concatenate([s.values] * count))
     return drive.replace(**changed)
-
-
-__all__ = ["propose", "separation", "whitened"]

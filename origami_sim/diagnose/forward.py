@@ -100,7 +100,6 @@ class Forward:
         self.blocks: list[Block] = []
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, most)
-        self._order = [np.flatnonzero([b.recording == r for b in self.blocks]) for r in range(len(self.recordings))]
         self.local = 2 * self.articulation.size if start == "fit" else 0
 
     # --- segments
@@ -373,13 +372,18 @@ class Forward:
                 effect = get(name)
                 if effect.channels and channel.kind not in effect.channels:
                     continue
-                own = name in self.model.effects  # a measurement that the model itself describes holds for all
-                here = np.repeat([own or _acts(h, name, index) for h in each], repeat)
-                given = {n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()}
-                reader = _wrapped(effect, reader, given)
+                reader = _wrapped(effect, reader, self._at_channel(name, index, each, parameters, repeat))
             parts.append(reader(at))
             row += width
         return np.concatenate(parts, axis=1)
+
+    def _at_channel(
+        self, name: str, channel: int, each: Sequence[Hypothesis], parameters: Parameters, repeat: int = 1
+    ) -> dict[str, np.ndarray]:
+        """Parameters (W,) of a measurement effect at one channel: the defaults in worlds that suspect it elsewhere."""
+        own = name in self.model.effects  # a measurement that the model itself describes holds for all
+        here = np.repeat([own or _acts(h, name, channel) for h in each], repeat)
+        return {n: np.where(here, v[0], get(name).parameter(n).default) for n, v in parameters.of(name).items()}
 
 
 def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:

@@ -1,7 +1,7 @@
 """Fits of a hypothesis to recordings: Gauss-Newton over batched rollouts, with priors, bounds and fitted starts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -276,8 +276,3 @@ def _failed(hypothesis, free, theta, local, blocks, why: str) -> Fit:
     return Fit(
         hypothesis, free, theta, local, blocks, np.inf, 0.0, [], np.full((n, n), np.nan), np.zeros(n, bool), failed=why
     )
-
-
-def without_line(f: Fit) -> Fit:
-    """The fit without its large arrays."""
-    return replace(f, linear=None)

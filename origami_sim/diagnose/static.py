@@ -2,6 +2,7 @@
 
 import copy
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -54,7 +55,7 @@ MOST_WORLDS = 4000
 """Perturbed copies whose forces are found in one launch."""
 
 
-class CurveForward(Forward):
+class CurveForward(Forward, ABC):
     """What curves have in common: no starts to fit, all blocks of a recording in one pass.
 
     Args:
@@ -111,7 +112,7 @@ class CurveForward(Forward):
             curve = self._curve(r, worlds)
             first = np.repeat(stacked(recording)[0][0][:, None], len(worlds), axis=1)
             continuous(curve, angle_mask(recording), first)
-            curves[r] = self._read(worlds, recording, curve)
+            curves[r] = self._read(each, worlds, recording, curve)
         out = []
         for b in wanted:
             block = self.blocks[b]
@@ -152,24 +153,25 @@ class CurveForward(Forward):
                 out.append(replace(s, free=tuple(free)))
         return out
 
+    @abstractmethod
     def _curve(self, r: int, worlds: list[tuple[Model, Parameters]]) -> np.ndarray:
         """Undistorted channels [n, D, K] of a recording."""
-        raise NotImplementedError
+        ...
 
-    def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
+    def _read(self, each: list[Hypothesis], worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
         """The channels [n, D, K] as distorted measurements show them."""
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
         names = [e for e in model.effects if get(e).family == "measurement" and not (recording.by_step and e in TIMED)]
         out, row = curve.copy(), 0
         at = np.repeat(recording.times[:, None], len(worlds), axis=1)
-        for channel in recording.channels.values():
+        for index, channel in enumerate(recording.channels.values()):
             part = slice(row, row + (1 if channel.values.ndim == 1 else channel.values.shape[1]))
             row = part.stop
             for name in names:
                 effect = get(name)
                 if effect.apply is None or (effect.channels and channel.kind not in effect.channels):
                     continue
-                given = {n: np.broadcast_to(v[0], (len(worlds),)) for n, v in parameters.of(name).items()}
+                given = self._at_channel(name, index, each, parameters)
                 known = out[:, part].copy()
                 read = (lambda t, v=known: v) if recording.by_step else _interpolated(recording.times, known)
                 out[:, part] = effect.apply(read, at, **given)
@@ -182,9 +184,10 @@ class CurveForward(Forward):
             self._rested[key] = held(self._drives[r], float(k))
         return self._rested[key]
 
+    @abstractmethod
     def locate(self, fit: Fit) -> list[Place]:
         """Residual moments by crease, most suspicious first; empty where they cannot be told."""
-        raise NotImplementedError
+        ...
 
     def menu(self) -> list[tuple[str, "CurveForward"]]:
         """Experiments like those recorded that a user could make: what, and its predictions."""
@@ -200,7 +203,6 @@ class CurveForward(Forward):
     def _other(self) -> "CurveForward":
         out = copy.copy(self)
         out.blocks, out._built = list(self.blocks), {}
-        out.__dict__.pop("predict", None)  # a remembered one is that of the recorded experiment
         return out
 
 
