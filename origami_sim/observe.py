@@ -331,14 +331,19 @@ def _measured(model: Model, channel: Channel) -> list[str]:
 
 def _distorted(trajectory, channel, frames, values, times, world) -> np.ndarray:
     """The channel (n,) or (n, d) after the measurement effects; the run is held at its ends."""
-    spline = CubicSpline(frames, values.reshape(len(frames), -1))
+    columns = values.reshape(len(frames), -1)
+    if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
+        depth = channel.camera.depth(body_point(trajectory.model, trajectory.x[:, :, world], channel))
+        columns = np.column_stack([columns, depth])
+    spline = CubicSpline(frames, columns)
 
     def read(at: np.ndarray) -> np.ndarray:
         return np.moveaxis(spline(np.clip(at, frames[0], frames[-1])), -1, 1)  # [n, W, d] -> [n, d, W]
 
     for name in _measured(trajectory.model, channel):
         read = _through(get(name), trajectory.parameters, world, read)
-    return read(times[:, None])[:, :, 0].reshape(len(times), *values.shape[1:])
+    seen = read(times[:, None])[:, : values[0].size, 0]
+    return seen.reshape(len(times), *values.shape[1:])
 
 
 def _through(effect, parameters: Parameters, world: int, read):
@@ -418,7 +423,7 @@ def _find(model: Model, channel: Channel, family: str, given: object, count: int
     if isinstance(given, int) and 0 <= given < count:
         return given
     raise InputError(
-        "the model has nothing of that name",
+        "the model has nothing of that name" if given is not None else f"a {channel.kind} needs a {family}",
         field=f"channels.{channel.name}.{family}",
         value=given,
         allowed=", ".join(names) or f"0 to {count - 1}",

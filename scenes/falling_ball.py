@@ -103,14 +103,14 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         "speed_m_s": -motion.v[every, 0, 0, 2],
     }
     error = float(np.abs(height - exact(s, motion.times)).max())
+    final = terminal_speed(s)
+    limit = f"terminal speed {final:.3g} m/s" if np.isfinite(final) else "no drag, so that no speed is terminal"
     return Outcome(
         motion,
         {"fall": table},
         units={"time_s": "s", "height_m": "m", "speed_m_s": "m/s"},
-        summary=[
-            f"terminal speed {terminal_speed(s):.3g} m/s; the fall is within {1e6 * error:.2g} um of its closed form"
-        ],
-        numbers={"error_m": error, "terminal_speed_m_s": terminal_speed(s), "last_height_m": float(height[-1])},
+        summary=[f"{limit}; the fall is within {1e6 * error:.2g} um of its closed form"],
+        numbers={"error_m": error, "terminal_speed_m_s": final, "last_height_m": float(height[-1])},
     )
 
 

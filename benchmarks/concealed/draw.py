@@ -1,125 +1,91 @@
 """Draws one case: an object with something concealed, its recordings, and the sealed answer.
 
     python draw.py --seed 7 --case 3 --folder cases/0003 --answer sealed/0003.json
+    python draw.py --nearest --answer sealed/0003.json --into sealed/0003.nearest.json
+    python draw.py --realise "field reversed" --folder cases/0003 --answer sealed/0003.json --into cases/0003/suggested
 
 The case's folder gets object.json (what an experimenter knows) and the recordings; the answer goes elsewhere. Nothing
-here imports the simulator under test. The strength is set by detectability d': the norm of the difference that the
-effect makes over stretches of a second, each from the same start, in standard deviations of the noise, after projecting
-out what the starts and the uncertain numbers (within what is known of them) can take up.
+here imports the simulator under test. What kind of case it is, and of what mechanism, structure and strength, follows
+from the number of the case, so that any first cases of a seed are balanced (strata.py). The strength is set by
+detectability d': the norm of an effect's signature (rigid.py, beam.py).
 """
 
 import argparse
 import json
+import shutil
+import sys
 from pathlib import Path
 
+import beam
+import laws
 import numpy as np
-from laws import INSIDE, MEASUREMENT, OUTSIDE, Concealed, Law, build
-from objects import STRUCTURES, draw
-from recorder import channels, readings, tracked, write
-from world import FINE, Motion, Numbers, World
+import objects
+from beam import BeamCase
+from laws import Concealed
+from rigid import RigidCase, entry
+from rivals import ALIKE, APART, PAIRS, TIED, Pair, apart, changed, overlap, proposed
+from strata import PROPORTIONS, stratum
 
 LEVELS = (2.0, 5.0, 10.0, 20.0, 50.0)
-STRETCH = 1.0
-"""Length of the stretches over which d' is taken [s]."""
-
-EVERY = 4
-"""Of the samples of a motion, which are used for d'."""
+STRUCTURES = (*objects.STRUCTURES, *beam.STRUCTURES)
 
 NUISANCE = 2.0
 """Largest d' of an unlisted nuisance: beyond, it would be a second effect."""
 
-KINDS = {"single": 0.55, "null": 0.25, "outside": 0.12, "double": 0.08}
+CROSSED = 0.7
+"""Largest overlap of two effects in one object: beyond, one hides the other."""
+
+ATTEMPTS = 12
+"""Objects that are drawn until one suits its stratum."""
+
+
+class Unsuited(Exception):
+    """An object that cannot be what its stratum wants."""
+
+
+STEPS = 20
+"""Of the search for a strength."""
+
 NULLS = ("plain", "wrong_parameter", "wrong_camera")
-FACTORS = {
-    "crease.stiffness": "stiffness",
-    "crease_viscosity.viscosity": "viscosity",
-    "inertia.mass": "mass",
-    "magnetic_torque.remanence": "remanence",
-}
+Case = RigidCase | BeamCase
 
 
-class PanelMasses(Law):
-    """Panels whose masses differ one by one, by about one per cent."""
-
-    def prepare(self, numbers: Numbers):
-        numbers.mass *= 1 + self.strength * np.array(self.extra["errors"])
-
-
-def numbers_of(o: dict, factors: dict[str, float]) -> Numbers:
-    """True numbers from common factors."""
-    numbers = Numbers.described(o)
-    for name, factor in factors.items():
-        getattr(numbers, FACTORS[name])[:] *= factor
-    return numbers
+def table(structure: str, outside: bool = False) -> dict[str, Concealed]:
+    """What may be concealed in a structure."""
+    if structure in beam.STRUCTURES:
+        return (beam.OUTSIDE if outside else beam.INSIDE)[structure]
+    known = laws.OUTSIDE if outside else laws.INSIDE
+    return {n: c for n, c in known.items() if not c.only or structure in c.only}
 
 
-class Case:
-    """An object with its true common factors, and what effects do to its recordings."""
+def cells(structures=STRUCTURES, kinds=tuple(PROPORTIONS)) -> dict[str, list[tuple]]:
+    """The strata of each kind that may be drawn."""
+    pairs = [(n, p.structure, way) for n, p in enumerate(PAIRS) for way in (0, 1) if p.structure in structures]
+    out = {
+        "single": [(d, m, s) for s in structures for m in table(s) for d in LEVELS],
+        "null": [(what, s) for s in structures for what in NULLS],
+        "outside": [(d, m, s) for s in structures for m in table(s, True) for d in LEVELS[2:]],
+        "confounded": pairs,
+        "double": [(m, n, s) for s in structures for m in table(s) for n in table(s) if n != m],
+    }
+    return {k: v for k, v in out.items() if k in kinds and v}
 
-    def __init__(self, o: dict, factors: dict[str, float]):
-        self.o, self.factors = o, factors
-        self._tangents: list | None = None
-        noise = np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12))
-        self._sigma = noise / np.sqrt(o["rate"] * EVERY / FINE)
 
-    def world(self, laws=(), **changed) -> World:
-        return World(self.o, numbers_of(self.o, {**self.factors, **changed}), tuple(laws))
+def case_of(o: dict, factors: dict[str, float]) -> Case:
+    return BeamCase(o, factors) if o["structure"] in beam.STRUCTURES else RigidCase(o, factors)
 
-    def motions(self, laws=()) -> list[Motion]:
-        """Motions of all recordings, from the release, or from rest where a field drives."""
-        world, out = self.world(laws), []
-        for r in self.o["recordings"]:
-            q0 = np.array(r["release"])
-            if "field" in r:
-                still = {"field": {**r["field"], "amplitude": 0.0}}
-                q0 = world.run(still, world.settled(), duration=1.5).angles[-1]
-            out.append(world.run(r, q0, duration=self.o["duration"] + 0.2))
-        return out
 
-    def detectability(self, laws=(), chain: dict | None = None, *, fresh: bool = False) -> float:
-        """d' of laws and of errors of the measurement.
+def drawn_object(structure: str, rng: np.random.Generator) -> dict:
+    return (beam if structure in beam.STRUCTURES else objects).draw(structure, rng)
 
-        Args:
-            fresh: find anew what starts and numbers can take up, about this motion; else about the last that did.
-        """
-        chain, plain = chain or {}, self.world()
-        stretches = list(self._stretches(self.motions(laws)))
-        if fresh or self._tangents is None:
-            self._tangents = [self._tangent(r, m, k) for r, m, k in stretches]
-        rows = []
-        for (r, m, k), (basis, _) in zip(stretches, self._tangents, strict=True):
-            times = m.times[k : k + round(STRETCH * FINE) + 1 : EVERY]
-            gap = readings(plain, m, times, chain) - self._stretch(plain, r, m.angles[k], m.rates[k], m.times[k])
-            d = gap.ravel() / self._sigma
-            rows.append(d - basis @ (basis.T @ d))
-        t, d = np.concatenate([c for _, c in self._tangents]), np.concatenate(rows)
-        x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
-        return float(np.sqrt(np.sum((d - t @ x) ** 2) + x @ x))
 
-    def _stretches(self, motions: list[Motion]):
-        """Recording, motion and first sample of every stretch."""
-        for r, m in zip(self.o["recordings"], motions, strict=True):
-            for start in np.arange(0.0, self.o["duration"] - 0.5 * STRETCH, STRETCH):
-                yield r, m, round(start * FINE)
-
-    def _stretch(self, world: World, r: dict, q, w, start: float) -> np.ndarray:
-        """Readings (n, D) of one stretch from a start."""
-        return channels(world, world.run(r, q, w, duration=STRETCH, start=start).angles)[::EVERY]
-
-    def _tangent(self, r: dict, m: Motion, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Orthonormal columns of what the start takes up, and columns of the numbers per standard deviation."""
-        q, w, start, e = m.angles[k], m.rates[k], m.times[k], np.eye(len(self.o["creases"]))
-        plain, priors = self.world(), self.o["priors"]
-        base = self._stretch(plain, r, q, w, start)
-        local = [(self._stretch(plain, r, q + 1e-4 * v, w, start) - base) / 1e-4 for v in e]
-        local += [(self._stretch(plain, r, q, w + 1e-3 * v, start) - base) / 1e-3 for v in e]
-        common = []
-        for n, spread in priors.items():
-            other = self.world(**{n: self.factors.get(n, 1.0) * 1.001})
-            common.append((self._stretch(other, r, q, w, start) - base) / 1e-3 * spread)
-        local, common = (np.stack([v.ravel() for v in vs], axis=1) / self._sigma for vs in (local, common))
-        basis, _ = np.linalg.qr(local)
-        return basis, common - basis @ (basis.T @ common)
+def drawn_factors(o: dict, rng: np.random.Generator, *, wrong: bool = False) -> dict[str, float]:
+    """True over stated numbers; `wrong`: one of them is off by more than two standard deviations."""
+    draws = {n: float(np.clip(rng.normal(), -2, 2)) for n in o["priors"]}
+    if wrong:
+        draws[str(rng.choice(list(draws)))] = float(rng.choice([-1, 1]) * rng.uniform(2.0, 2.5))
+    relative = {n: s / o["settings"][n] if "settings" in o else s for n, s in o["priors"].items()}
+    return {n: 1 + z * relative[n] for n, z in draws.items()}
 
 
 def draw_extra(name: str, rng: np.random.Generator, duration: float) -> dict:
@@ -133,145 +99,316 @@ def draw_extra(name: str, rng: np.random.Generator, duration: float) -> dict:
     if name == "pushes":
         at = np.sort(rng.uniform(0.2, duration - 0.2, 5))
         return {"pulses": [[float(t), float(rng.choice([-1, 1]))] for t in at]}
+    if name == "field_offset":
+        return {"angle": float(rng.uniform(0.0, 2 * np.pi))}
     return {}
 
 
-def effect(name: str, strength: float, place: int, extra: dict) -> tuple[tuple[Law, ...], dict]:
-    """Laws and measurement errors of one effect."""
-    if name in MEASUREMENT:
-        return (), {name: strength}
-    return (build(name, strength, place, extra),), {}
+def placed(o: dict, mechanism: str, place: int, extra: dict, outside: bool = False) -> dict:
+    """What is concealed, but for its strength."""
+    c = table(o["structure"], outside)[mechanism]
+    site = c.site if c.site.startswith("all") else ""
+    if c.site == "crease":
+        site = o["creases"][place]["name"]
+    elif c.site == "panel":
+        site = f"panel{place}"
+    return {"mechanism": mechanism, "place": place, "site": site, "extra": extra}
 
 
-def strength_for(case: Case, name: str, c: Concealed, place: int, extra: dict, wanted: float, sign: float):
-    """The strength with the wanted d', and the d' that it has: secant steps in the logarithm."""
-    scale = case.o["creases"][place]["stiffness"] if c.stiff else 1.0
+def chosen(o: dict, mechanism: str, rng: np.random.Generator, outside: bool = False) -> dict:
+    """A mechanism at a place that is drawn."""
+    place = int(rng.choice(places(o, table(o["structure"], outside)[mechanism])))
+    return placed(o, mechanism, place, draw_extra(mechanism, rng, o.get("duration", 1.0)), outside)
+
+
+def places(o: dict, c: Concealed) -> list[int]:
+    """Where a mechanism may be: creases, or panels that move."""
+    if c.site == "crease":
+        return list(range(len(o["creases"])))
+    return [p for p in range(len(o["faces"])) if p != o["held"]] if c.site == "panel" else [0]
+
+
+def strengthened(case: Case, what: dict, c: Concealed, wanted: float, sign: float) -> tuple[dict, np.ndarray]:
+    """The effect at the strength with the wanted d', and its signature: secant steps in the logarithms.
+
+    Raises:
+        Unsuited: there is no such strength.
+    """
+    scale = case.scale(what["place"]) if c.stiff else 1.0
     largest, s = c.largest * scale, c.first * scale
-    fresh = False
-    for _ in range(12):
-        got = case.detectability(*effect(name, sign * s, place, extra), fresh=fresh)
+    fresh, last, power = False, None, 1.0
+    for _ in range(STEPS):
+        now = entry(what["mechanism"], sign * s, what["place"], what["extra"])
+        signature = case.signature([now], fresh=fresh)
+        got = max(float(np.linalg.norm(signature)), 1e-9)
         near = abs(np.log(got / wanted)) < 0.1 or (s == largest and got < wanted)
         if near and fresh:
-            break
+            return now, signature
         if not near:
-            s = min(largest, s * float(np.clip(wanted / max(got, 1e-9), 0.02, 50.0)))
-        fresh = near
-    return sign * s, got
+            if last and s != last[0]:
+                power = float(np.clip(np.log(got / last[1]) / np.log(s / last[0]), 0.5, 4.0))
+            last = s, got
+            s = min(largest, s * float(np.clip((wanted / got) ** (1 / power), 0.02, 50.0)))
+        fresh = fresh or near  # what starts and numbers take up depends on the motion: from here on found anew
+    raise Unsuited(f"no strength of {what['mechanism']} has d' = {wanted:g} in {case.o['structure']}")
 
 
-def nuisances(case: Case, rng: np.random.Generator, concealed: str) -> list[dict]:
+def concealed(case: Case, what: dict, wanted: float, rng: np.random.Generator, outside: bool = False):
+    """The answer's account of an effect, and its signature; where d' cannot be reached, the nearest level is wanted."""
+    c = table(case.o["structure"], outside)[what["mechanism"]]
+    sign = float(rng.choice([-1, 1])) if c.signed else 1.0
+    now, signature = strengthened(case, what, c, wanted, sign)
+    account = {**what, "names": list(c.names), "strength": now["strength"], "number": c.number}
+    d = float(np.linalg.norm(signature))
+    if d < 0.85 * wanted:
+        wanted = min(LEVELS, key=lambda level: abs(np.log(level / d)))
+    return account | {"d_wanted": wanted, "d": d}, signature
+
+
+def nuisances(case: Case, rng: np.random.Generator, without: set[str]) -> list[dict]:
     """Two or three things that nobody lists, each too small to be seen by itself."""
-    o, panel = case.o, case.world()
-    weight = o["density"] * o["thickness"] * panel.areas[1] * o["gravity"]
-    push = 0.02 * weight * float(np.ptp(panel.corners[1], axis=0).max())
-    drawn = {
-        "panel_masses": (1.0, {"errors": (0.01 * rng.normal(size=len(o["faces"]))).tolist()}),
-        "angle_offset": (float(3e-3 * rng.normal()), {}),
-        "air_drag": (float(rng.uniform(0.3, 1.2)), {}),
-        "pushes": (push, {"pulses": [[0.0, 1.0]]}),  # an imperfect release
-        "clock_rate": (float(1e-3 * rng.normal()), {}),
-    }
-    drawn.pop(concealed, None)
+    may = [n for n in case.nuisances(rng) if n["mechanism"] not in without]
     out = []
-    for name in rng.choice(list(drawn), size=int(rng.integers(2, 4)), replace=False).tolist():
-        strength, extra = drawn[name]
-        d = case.detectability(*nuisance(name, strength, extra))
+    for n in rng.choice(len(may), size=min(len(may), int(rng.integers(2, 4))), replace=False).tolist():
+        d = float(np.linalg.norm(case.signature([may[n]])))
         part = min(1.0, NUISANCE / max(d, 1e-9))
-        out.append({"name": name, "strength": strength * part, "extra": extra, "d": d * part})
+        out.append({**may[n], "strength": may[n]["strength"] * part, "d": d * part})
     return out
 
 
-def nuisance(name: str, strength: float, extra: dict) -> tuple[tuple[Law, ...], dict]:
-    if name == "panel_masses":
-        return (PanelMasses(strength, 0, dict(extra)),), {}
-    return effect(name, strength, 0, extra)
+# --- two effects
 
 
-def choose(o: dict, rng: np.random.Generator, kind: str, without: str = "") -> dict:
-    """What is concealed, but for its strength."""
-    table = OUTSIDE if kind == "outside" else INSIDE
-    suited = [n for n, c in table.items() if n != without and (not c.only or o["structure"] in c.only)]
-    name = str(rng.choice(suited))
-    c = table[name]
-    place, site = 0, {"": "", "all": "all panels"}.get(c.site, "")
-    if c.site == "crease":
-        place = int(rng.integers(len(o["creases"])))
-        site = o["creases"][place]["name"]
-    elif c.site == "panel":
-        free = [p for p in range(len(o["faces"])) if p != o["held"]]
-        place = int(rng.choice(free))
-        site = f"panel{place}"
-    return {"mechanism": name, "place": place, "site": site, "extra": draw_extra(name, rng, o["duration"])}
+def confounded(pair: Pair, way: int, rng: np.random.Generator) -> tuple[Case, dict, dict | None]:
+    """An object with one recording in which a pair is confounded, the answer, and the separating recording.
+
+    Raises:
+        Unsuited: the pair is not confounded in this object, or not separated.
+    """
+    true, rival = (pair.one, pair.other) if way == 0 else (pair.other, pair.one)
+    o = drawn_object(pair.structure, rng)
+    o["recordings"] = [o["recordings"][pair.first]]
+    factors = drawn_factors(o, rng)
+    case = case_of(o, factors)
+    extra = [pair.extra.get(m) or draw_extra(m, rng, o.get("duration", 1.0)) for m, _ in (true, rival)]
+    a, b = (placed(o, m, p, x) for (m, p), x in zip((true, rival), extra, strict=True))
+    more = changed(o["recordings"][0], **pair.separating) if pair.separating else None
+    wide = case_of({**o, "recordings": [o["recordings"][0], more]}, factors) if more else None
+    rate, tie = _rates(case, wide, a, b)
+    low, high = max(LEVELS[1], 1.1 * APART * rate), min(LEVELS[-1], TIED * tie / 1.1)
+    if low > high:
+        raise Unsuited("no strength at which the pair is confounded and can be separated")
+    account, mine = concealed(case, a, float(np.sqrt(low * high)), rng)
+    other, theirs = _like(case, b, account["d"], mine)
+    found = {"overlap": overlap(mine, theirs), "apart": apart(mine, theirs)}
+    if found["overlap"] < ALIKE or found["apart"] > TIED:
+        raise Unsuited("not confounded")
+    if wide:
+        now = entry(a["mechanism"], account["strength"], a["place"], a["extra"])
+        found["separated"] = apart(wide.signature([now], fresh=True), wide.signature([other]))
+        if found["separated"] < APART:
+            raise Unsuited("not separated")
+    names = list(table(pair.structure)[b["mechanism"]].names)
+    account["rival"] = {**b, "names": names, "strength": other["strength"], **found}
+    return case, account, more
+
+
+def _rates(case: Case, wide: Case | None, a: dict, b: dict) -> tuple[float, float]:
+    """d' of the effect over d' between it and its rival, with the separating recording and without; at d' = 10."""
+    known = table(case.o["structure"])
+    now, mine = strengthened(case, a, known[a["mechanism"]], 10.0, 1.0)
+    other, theirs = _like(case, b, 10.0, mine)
+    d = float(np.linalg.norm(mine))
+    if overlap(mine, theirs) < ALIKE:
+        return np.inf, 0.0
+    if wide is None:
+        return 0.0, d / apart(mine, theirs)
+    far = apart(wide.signature([now], fresh=True), wide.signature([other]))
+    return d / max(far, 1e-9), d / apart(mine, theirs)
+
+
+def _like(case: Case, b: dict, wanted: float, mine: np.ndarray, most: int = 4) -> tuple[dict, np.ndarray]:
+    """The rival as strong as the effect, with the sign that is more like it, about the effect's motion."""
+    c = table(case.o["structure"])[b["mechanism"]]
+    scale = case.scale(b["place"]) if c.stiff else 1.0
+    s, sign = c.first * scale, 1.0
+    for _ in range(most):
+        now = entry(b["mechanism"], sign * s, b["place"], b["extra"])
+        theirs = case.signature([now])
+        if c.signed and mine @ theirs < 0:
+            sign = -sign
+            continue
+        s = min(c.largest * scale, s * float(np.clip(wanted / max(np.linalg.norm(theirs), 1e-9), 0.02, 50.0)))
+    now = entry(b["mechanism"], sign * s, b["place"], b["extra"])
+    return now, case.signature([now])
+
+
+def doubled(first: str, second: str, structure: str, rng: np.random.Generator) -> tuple[Case, dict, None]:
+    """An object with two effects that do not hide one another.
+
+    Raises:
+        Unsuited: they do.
+    """
+    o = drawn_object(structure, rng)
+    case = case_of(o, drawn_factors(o, rng))
+    account, mine = concealed(case, chosen(o, first, rng), float(rng.choice(LEVELS[2:])), rng)
+    account["second"], theirs = concealed(case, chosen(o, second, rng), float(rng.choice(LEVELS[2:])), rng)
+    account["overlap"] = overlap(mine, theirs)
+    if account["overlap"] > CROSSED:
+        raise Unsuited("one effect hides the other")
+    return case, account, None
+
+
+# --- a case
+
+
+def single(wanted: float, mechanism: str, structure: str, rng: np.random.Generator, *, outside: bool = False):
+    """An object with one effect."""
+    o = drawn_object(structure, rng)
+    case = case_of(o, drawn_factors(o, rng))
+    return case, concealed(case, chosen(o, mechanism, rng, outside), wanted, rng, outside)[0], None
+
+
+def null(what: str, structure: str, rng: np.random.Generator) -> tuple[Case, dict, None]:
+    """An object without an effect; with a wrong parameter, or seen by a wrong camera."""
+    o = drawn_object(structure, rng)
+    case = case_of(o, drawn_factors(o, rng, wrong=what == "wrong_parameter"))
+    account = {"null": what}
+    if what == "wrong_camera":
+        name = "length_scale" if "scene" in o else str(rng.choice(["angle_scale", "clock_rate"]))
+        account |= concealed(case, placed(o, name, 0, {}), float(rng.choice(LEVELS)), rng)[0]
+    return case, account, None
+
+
+def drawn(kind: str, cell: tuple, rng: np.random.Generator) -> tuple[Case, dict, dict | None]:
+    """The case of a stratum, the answer's account of what is concealed, and a separating recording if there is one.
+
+    Raises:
+        Unsuited: none of the objects that were tried suits.
+    """
+    for _ in range(ATTEMPTS):
+        try:
+            if kind == "confounded":
+                return confounded(PAIRS[cell[0]], cell[2], rng)
+            if kind == "double":
+                return doubled(*cell, rng)
+            return null(*cell, rng) if kind == "null" else single(*cell, rng, outside=kind == "outside")
+        except Unsuited as error:
+            why = error
+    raise Unsuited(f"{kind} {cell}: {why}")
 
 
 def make(seed: int, index: int, folder: Path, answer: Path, *, structures=STRUCTURES, kinds=None) -> dict:
-    """Writes one case and its answer."""
+    """Writes one case and its answer.
+
+    Args:
+        seed, index: which. folder: of the case. answer: the file of the sealed answer. structures, kinds: only these.
+    """
+    kind, cell = stratum(seed, index, cells(structures, kinds or tuple(PROPORTIONS)))
     rng = np.random.default_rng([seed, index])
-    o = draw(str(rng.choice(list(structures))), rng)
-    kinds = {k: v for k, v in KINDS.items() if kinds is None or k in kinds}
-    kind = str(rng.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
-    what = str(rng.choice(NULLS)) if kind == "null" else ""
-    draws = {n: float(np.clip(rng.normal(), -2, 2)) for n in o["priors"]}
-    if what == "wrong_parameter":
-        wrong = str(rng.choice(list(draws)))
-        draws[wrong] = float(rng.choice([-1, 1]) * rng.uniform(2.0, 2.5))
-    factors = {n: 1 + z * o["priors"][n] for n, z in draws.items()}
-    case = Case(o, factors)
-    out: dict = {"seed": seed, "case": index, "kind": kind, "null": what, "structure": o["structure"]}
-    out |= {"mechanism": "", "names": [], "site": "", "strength": 0.0, "d_wanted": 0.0, "d": 0.0, "number": ""}
-    laws, chain = (), {}
-
-    def conceal(chosen: dict, levels: tuple[float, ...]) -> dict:
-        """Sets the strength of what was chosen, and puts it into the object."""
-        nonlocal laws, chain
-        c = {**INSIDE, **OUTSIDE}[chosen["mechanism"]]
-        wanted = float(rng.choice(levels))
-        sign = float(rng.choice([-1, 1])) if c.signed else 1.0
-        strength, d = strength_for(case, chosen["mechanism"], c, chosen["place"], chosen["extra"], wanted, sign)
-        more, errors = effect(chosen["mechanism"], strength, chosen["place"], chosen["extra"])
-        laws, chain = (*laws, *more), {**chain, **errors}
-        return {**chosen, "names": list(c.names), "strength": strength, "d_wanted": wanted, "d": d, "number": c.number}
-
-    if what == "wrong_camera":
-        name = str(rng.choice(["angle_scale", "clock_rate"]))
-        out |= conceal({"mechanism": name, "place": 0, "site": "", "extra": {}}, LEVELS)
-    elif kind != "null":
-        out |= conceal(choose(o, rng, kind), LEVELS if kind == "single" else LEVELS[2:])
-    if kind == "double":
-        out["second"] = conceal(choose(o, rng, kind, without=out["mechanism"]), LEVELS[2:])
-    others = nuisances(case, rng, out["mechanism"])
-    for n in others:
-        more, errors = nuisance(n["name"], n["strength"], n["extra"])
-        laws = (*laws, *more)
-        chain = {k: chain.get(k, 0.0) + errors.get(k, 0.0) for k in {**chain, **errors}}
-    smoothing = bool(rng.random() < 0.3)
-    tracker = {"noise": o["noise"], "quantum": o["noise"] / 2, "smoothing": smoothing}
-    tracker |= {"lost": float(rng.choice([0.0, 0.01])), "gap": int(rng.choice([0, 4]))}
-    level = np.hypot(o["noise"] * (np.sqrt(0.375) if smoothing else 1.0), tracker["quantum"] / np.sqrt(12))
-    tracker["stated"] = float(level) if rng.random() < 0.7 else 0.0
+    out: dict = {"seed": seed, "case": index, "kind": kind, "null": "", "mechanism": "", "names": [], "site": ""}
+    out |= {"strength": 0.0, "d_wanted": 0.0, "d": 0.0, "number": "", "onset": None}
+    case, account, more = drawn(kind, cell, rng)
+    out |= account
+    if out["mechanism"] == "pushes":
+        out["onset"] = out["extra"]["pulses"][0][0]
+    hidden = [e for e in (out if out["mechanism"] else None, out.get("second")) if e]
+    entries = [{k: e[k] for k in ("mechanism", "strength", "place", "extra")} for e in hidden]
+    others = nuisances(case, rng, {e["mechanism"] for e in hidden} | {out.get("rival", {}).get("mechanism", "")})
+    tracker = case.tracker(rng)
     folder.mkdir(parents=True, exist_ok=True)
     answer.parent.mkdir(parents=True, exist_ok=True)
-    world = case.world(laws)
-    times = np.arange(round(o["duration"] * o["rate"]) + 1) / o["rate"]
-    for n, (r, m) in enumerate(zip(o["recordings"], case.motions(laws), strict=True)):
-        values = tracked(readings(world, m, times, chain), tracker, rng)
-        write(folder, f"recording{n + 1}", o, r, times, values, tracker)
-    known = {k: v for k, v in o.items() if k not in ("recordings", "noise", "duration", "rate", "channels")}
-    (folder / "object.json").write_text(json.dumps(known, indent=1))
-    out |= {"factors": factors, "nuisances": others, "tracker": tracker, "rate": o["rate"]}
+    case.write(folder, entries + others, tracker, rng)
+    (folder / "object.json").write_text(json.dumps(case.known(), indent=1))
+    out |= {"structure": case.o["structure"], "factors": case.factors, "concealed": entries, "nuisances": others}
+    out |= {"tracker": tracker, "object": case.o, "separating": more}
     answer.write_text(json.dumps(out, indent=1))
+    if more:
+        add(folder, folder / "separating", out, [more])
     return out
+
+
+def add(folder: Path, into: Path, answer: dict, recordings: list[dict]) -> None:
+    """The case with more recordings, in a folder of its own."""
+    into.mkdir(parents=True, exist_ok=True)
+    for file in [*folder.glob("recording*"), folder / "object.json"]:
+        shutil.copy(file, into / file.name)
+    case = case_of({**answer["object"], "recordings": recordings}, answer["factors"])
+    rng = np.random.default_rng([answer["seed"], answer["case"], 1])
+    count = len(list(folder.glob("recording*.csv")))
+    case.write(into, answer["concealed"] + answer["nuisances"], answer["tracker"], rng, first=count + 1)
+
+
+def realise(what: str, folder: Path, answer: Path, into: Path, repeats: int = 1) -> None:
+    """Makes a proposed experiment, so often: the case with more recordings.
+
+    Raises:
+        ValueError: an experiment that cannot be made here.
+    """
+    sealed = json.loads(answer.read_text())
+    more = proposed(what, sealed["object"]["recordings"][0])
+    if more is None:
+        raise ValueError(f"'{what}' cannot be made")
+    add(folder, into, sealed, [more] * repeats)
+
+
+def nearest(sealed: dict) -> dict:
+    """Of all other mechanisms at all sites, the one that is hardest to tell from what is concealed.
+
+    Returns: its `mechanism` and `site`, their `overlap` |cos|, and `apart`: d' between the two at its best strength.
+    """
+    case = case_of(sealed["object"], sealed["factors"])
+    truth = sealed["concealed"][0]
+    mine = case.signature([truth], fresh=True)
+    best = {"mechanism": "", "site": "", "overlap": 0.0, "apart": float(np.linalg.norm(mine))}
+    for name, c in table(sealed["structure"]).items():
+        if set(c.names) & set(sealed["names"]):
+            continue
+        for place in places(case.o, c):
+            for extra in EXTRAS.get(name, ({},)):
+                what = placed(case.o, name, place, extra)
+                _, theirs = _like(case, what, float(np.linalg.norm(mine)), mine, most=2)
+                found = {"overlap": overlap(mine, theirs), "apart": apart(mine, theirs)}
+                if found["apart"] < best["apart"]:
+                    best = {"mechanism": name, "site": what["site"], **found}
+    return best
+
+
+EXTRAS = {
+    "hysteresis": ({"angle": 0.05}, {"angle": 0.2}),
+    "relaxation": ({"time": 0.05}, {"time": 0.2}, {"time": 1.0}),
+    "field_offset": ({"angle": 0.0}, {"angle": np.pi / 2}),
+}
+"""Second numbers that a rival is tried with."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--case", type=int, required=True)
-    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--seed", type=int)
+    parser.add_argument("--case", type=int)
+    parser.add_argument("--folder", type=Path)
     parser.add_argument("--answer", type=Path, required=True)
     parser.add_argument("--structures", nargs="+", choices=STRUCTURES, default=STRUCTURES)
-    parser.add_argument("--kinds", nargs="+", choices=list(KINDS))
+    parser.add_argument("--kinds", nargs="+", choices=list(PROPORTIONS))
+    parser.add_argument("--realise", metavar="WHAT", help="an experiment, in the words of the diagnosis")
+    parser.add_argument("--repeats", type=int, default=1, help="of that experiment")
+    parser.add_argument("--into", type=Path, help="folder for the case with that experiment")
+    parser.add_argument("--nearest", action="store_true", help="write to the file --into what is hard to tell from it")
     args = parser.parse_args()
+    if args.nearest:
+        args.into.write_text(json.dumps(nearest(json.loads(args.answer.read_text())), indent=1))
+        return
+    if args.realise:
+        try:
+            realise(args.realise, args.folder, args.answer, args.into, args.repeats)
+        except ValueError as error:
+            sys.exit(str(error))
+        return
+    if args.seed is None or args.case is None:
+        parser.error("--seed and --case say which case to draw")
+    made = args.structures, args.kinds
+    if not cells(made[0], made[1] or tuple(PROPORTIONS)):
+        parser.error(f"there are no {' or '.join(made[1])} cases of {', '.join(made[0])}")
     make(args.seed, args.case, args.folder, args.answer, structures=args.structures, kinds=args.kinds)
 
 

@@ -240,7 +240,7 @@ class Concealed:
 
     Attributes:
         law: its class. names: what the diagnosis may call it, the first being the exact name; empty: nothing fits.
-        site: "crease", "panel", "all" (panels) or "" (the whole object or its measurement).
+        site: "crease", "panel", all of them ("all panels") or "" (the whole object or its measurement).
         first: strength to begin the search with, times the crease stiffness where `stiff`. largest: likewise.
         signed: either sign is possible. only: structures that it suits; empty: all.
         number: parameter of the catalogue's effect that means the same as the strength, if there is one.
@@ -264,7 +264,7 @@ STRIPS = ("hanging_strip", "pendulum_chain", "magnetic_strip")
 INSIDE: dict[str, Concealed] = {
     "dry_friction": Concealed(DryFriction, ("crease_friction",), number="friction_moment"),
     "quadratic_damping": Concealed(QuadraticDamping, ("crease_quadratic_damping",), first=5e-3, number="coefficient"),
-    "air_drag": Concealed(AirDrag, ("air_drag",), "all", 2.0, False, largest=10.0, number="drag_coefficient"),
+    "air_drag": Concealed(AirDrag, ("air_drag",), "all panels", 2.0, False, largest=10.0, number="drag_coefficient"),
     "hysteresis": Concealed(Hysteresis, ("crease_hysteresis",), only=ELASTIC, number="hysteresis_moment"),
     "relaxation": Concealed(Relaxation, ("crease_relaxation",), first=0.3, only=ELASTIC, number="stiffness_1"),
     "stiffening": Concealed(Stiffening, ("crease_stiffening",), first=0.3, number="cubic_stiffness"),

@@ -4,8 +4,8 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.model import Model, dihedral_angles
-from origami_sim.observe import _index
-from origami_sim.recording import Channel
+from origami_sim.observe import _index, body_point
+from origami_sim.recording import Camera, Channel, Recording
 
 
 def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
@@ -28,10 +28,12 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
             raise InputError("a panel angle needs a crease on the panel", field="panel", value=panel)
         along = x[:, triangles].mean(axis=(1, 2)) - x[:, axis].mean(axis=1)
         return np.arctan2(along[..., 0], along[..., 2])[:, None]
-    if channel.kind in ("marker", "tip_displacement"):
+    if channel.kind == "marker":
+        return np.moveaxis(_points(model, channel, x), 2, 1)
+    if channel.kind == "marker_2d":
+        return np.moveaxis(_camera(channel).project(_points(model, channel, x)), 2, 1)
+    if channel.kind == "tip_displacement":
         node = _index(model, channel, "node", len(model.position))
-        if channel.kind == "marker":
-            return np.moveaxis(x[:, node], 2, 1)
         moved = x[:, node] - model.position[node]
         along = channel.attachment.get("direction")
         if along is None:
@@ -41,5 +43,27 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
         "this kind of channel cannot be diagnosed yet",
         field=f"channels.{channel.name}.kind",
         value=channel.kind,
-        allowed="crease_angle, panel_angle, marker, tip_displacement",
+        allowed="crease_angle, panel_angle, marker, marker_2d, tip_displacement",
     )
+
+
+def depths(model: Model, recording: Recording, x: np.ndarray) -> np.ndarray:
+    """How far each marker in a picture is before its plane, [F, k, W] at positions x [F, N, W, 3]."""
+    pictured = [c for c in recording.channels.values() if c.kind == "marker_2d"]
+    found = [_camera(c).depth(_points(model, c, x)) for c in pictured]
+    return np.stack(found, axis=1) if found else np.zeros((len(x), 0, x.shape[2]))
+
+
+def _points(model: Model, channel: Channel, x: np.ndarray) -> np.ndarray:
+    """The point of the body that carries a marker, [F, W, 3]."""
+    frames, nodes, worlds, _ = x.shape
+    if "panel" not in channel.attachment and not channel.attachment.get("height"):
+        return x[:, _index(model, channel, "node", nodes)]
+    each = np.moveaxis(x, 2, 1).reshape(frames * worlds, nodes, 3)
+    return body_point(model, each, channel).reshape(frames, worlds, 3)
+
+
+def _camera(channel: Channel) -> Camera:
+    if channel.camera is None:
+        raise InputError("a marker in a picture needs a camera", field=f"channels.{channel.name}.camera")
+    return channel.camera

@@ -15,6 +15,7 @@ from origami_sim.diagnose.diagnose import Options, diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.observed import check_recording
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.diagnose.report import geometry_of, write_report
@@ -24,6 +25,7 @@ from origami_sim.errors import InputError
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.scene import NAMES, Settings, read_calibration, scene_module, scene_settings
+from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
 
@@ -43,9 +45,10 @@ def run(args: Namespace) -> int:
     module, settings = model_of(args.model, data)
     name = module.__name__.rpartition(".")[2]
     settings = settings.override([*_overrides(data, name), *args.set])
-    model = module.build(settings)[0]
+    model, parameters = module.build(settings)[:2]
+    step = stable_step(model, parameters).dt
     for recording in data:
-        for note in check_scene(recording, model):
+        for note in [*check_scene(recording, model), *check_recording(recording, model, step)]:
             say(f"note: {note}")
     known = _priors(settings, data, args.prior)
     subject = Subject.from_scene(module, settings, spreads=known, name=name)

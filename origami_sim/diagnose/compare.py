@@ -82,7 +82,7 @@ def folds(forward, blocks: Sequence[int]) -> list[list[int]]:
     return [list(map(int, part)) for part in np.array_split(np.arange(len(blocks)), count)] if count > 1 else []
 
 
-def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
+def score(forward, fit: Fit, weights: Weights) -> Score:
     """Held-out score by one Gauss-Newton step of every leave-one-fold-out fit from the full fit.
 
     The linearisation of the full fit is exact for small changes of the numbers; leaving out a fold changes them by
@@ -90,7 +90,7 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
     its numbers.
 
     Args:
-        weights: those of the fit. relax: factor on all whitened squares, for weights that were learnt after the fit.
+        weights: those of the fit.
     """
     line = fit.linear
     assert line is not None
@@ -99,9 +99,8 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
     away = np.array([f.start for f in fit.free]) - fit.theta
     low = (np.array([f.lower for f in fit.free]) - fit.theta) / scale
     high = (np.array([f.upper for f in fit.free]) - fit.theta) / scale
-    k = float(np.sqrt(relax))
-    residual = [k * whitened(r, weights) for r in fit.residuals]
-    tangent = [k * line.clear(n, t) for n, t in enumerate(line.tangent)]
+    residual = [whitened(r, weights) for r in fit.residuals]
+    tangent = [line.clear(n, t) for n, t in enumerate(line.tangent)]
     cleared = [line.clear(n, r) for n, r in enumerate(residual)]
     held_out = np.array([-0.5 * float(c @ c) for c in cleared])
     left = [c.copy() for c in cleared]
@@ -115,9 +114,9 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
         step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
         for n in part:
             left[n] = cleared[n] - tangent[n] @ step
-            held_out[n] = -0.5 * float(left[n] @ left[n])
+            held_out[n] = _predictive(left[n], tangent[n], r)
     dims = len(weights.deviation)
-    squares = np.concatenate([v.reshape(-1, dims) ** 2 for v in left]) / (weights.part * relax)
+    squares = np.concatenate([v.reshape(-1, dims) ** 2 for v in left]) / weights.part
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
     rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation
     extra = len(fit.hypothesis.free)
@@ -127,6 +126,18 @@ def score(forward, fit: Fit, weights: Weights, *, relax: float = 1.0) -> Score:
         sum(np.log(s.sites) for s in fit.hypothesis.suspects)
     )  # an effect is as likely at few sites as at many
     return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n) - sites)
+
+
+def _predictive(residual: np.ndarray, tangent: np.ndarray, root: np.ndarray) -> float:
+    """Log density of a held-out residual (r,), with the uncertainty of the numbers that it was predicted with.
+
+    Args:
+        tangent: [r, P] by the numbers. root: [P, P] whose root' root is their precision.
+    """
+    spread = np.linalg.solve(root.T, tangent.T)  # [P, r]; the prediction's covariance is spread' spread
+    inner = np.eye(len(spread)) + spread @ spread.T
+    by = spread @ residual
+    return -0.5 * float(residual @ residual - by @ np.linalg.solve(inner, by) + np.linalg.slogdet(inner)[1])
 
 
 def probabilities(scores: Sequence[float], temperature: float = TEMPERATURE) -> np.ndarray:

@@ -24,8 +24,8 @@ from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspec
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.prescribed import curves
-from origami_sim.diagnose.refit import Fit, Weights, fit
-from origami_sim.diagnose.screen import Screening, Signature, again, screen
+from origami_sim.diagnose.refit import Fit, Weights, fit, linearise
+from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.errors import InputError
@@ -45,7 +45,7 @@ class Options:
         screened: segments that the screening uses at most.
         finalists: suspects that are refitted. most: effects that may be combined.
         significance: of the look-elsewhere test. clear: ratio of the best probability that is a verdict, not a tie.
-        seed: of the null draws.
+        seed: of the null draws. threads: see `Batch`.
     """
 
     segment: float | None = None
@@ -127,19 +127,22 @@ def diagnose(
     finalists = chosen(screening, o.finalists)
     for n, s in enumerate(finalists):
         tell("refit", n / max(len(finalists), 1))
-        fits.append(refit(forward, base, s, weights))
+        fits.append(refit(forward, base, s, weights, screening))
     fits += pairs(forward, base, screening, fits, weights, o)
-    final = weights_from(forward, fits)
-    relax = relaxation(weights, final)
-    scores = {id(f): scored(forward, f, weights, relax) for f in fits if not f.failed}
-    p_value = look_elsewhere(_relaxed(screening, relax), o.draws, o.seed)  # the effect itself no longer counts as noise
+    screening, fits, weights = settled(forward, screening, fits, weights)
+    fits += twins(forward, screening, fits, weights)
+    p_value = look_elsewhere(screening, o.draws, o.seed)  # with weights that do not count the effect itself as noise
     lap("refit")
     tell("combine", 0.0)
-    more = combine(forward, base, fits, scores, screening, weights, relax, o, tell)
-    fits += more
+    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
+    fits += combine(forward, fits, scores, screening, weights, o, tell)
+    screening, fits, weights = settled(forward, screening, fits, weights)
+    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
+    base = fits[0]
     lap("combine")
     tell("verdict", 0.0)
-    judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, relax, o)
+    given = fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=4)
+    judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, o)
     best = judged.best
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
@@ -162,7 +165,7 @@ def diagnose(
         places=places,
         p_value=p_value,
         onset=judged.onset,
-        traces=traces(forward, given, base, best, final),
+        traces=traces(forward, given, base, best, weights),
         correlations=correlations(forward, base, best),
         experiments=experiments,
         baselines=beside,
@@ -248,7 +251,7 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
     if length is None:
         count = FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings))
         length = min(whole / count, max(o.steps * step / FEWEST, whole / 100))
-        length = min(length, predictable(Forward(subject, recordings, segment=length, most=4)))
+        length = min(length, predictable(Forward(subject, recordings, segment=length, most=4, threads=o.threads)))
     most = max(FEWEST, int(o.steps * step / length)) // len(recordings)
     return Forward(subject, recordings, segment=length, start="fit", most=max(1, most), threads=o.threads)
 
@@ -307,23 +310,24 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
             "the nominal model goes unstable on this recording", field="model", allowed="a model that can be simulated"
         )
     rms = np.sqrt(np.nanmean(np.concatenate(gaps) ** 2, axis=0))
-    w = Weights(np.maximum(rms, noise), 0.1)
-    given = fit(forward, Hypothesis(), w, fixed=True, most=3, done=0.01)
-    w = weights_from(forward, [given])
-    base = given if not len(theta) else fit(forward, Hypothesis(), w, local=given.local, most=5, done=0.01)
-    for _ in range(2):
+    w = first = Weights(np.maximum(rms, noise), 0.1)
+    given = base = fit(forward, Hypothesis(), w, fixed=True, most=3, done=0.01)
+    for n in range(3):
         if base.failed:
             break
         new = weights_from(forward, [base])
-        if np.all(np.abs(np.log(new.deviation / w.deviation)) < 0.1) and abs(np.log(new.part / w.part)) < 0.3:
+        if n and np.all(np.abs(np.log(new.deviation / w.deviation)) < 0.1) and abs(np.log(new.part / w.part)) < 0.3:
             break
-        w = new
-        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, fixed=not len(theta), most=4)
+        known = None if base.linear is None else base.linear.reweighted(w, new)
+        w, kept = new, len(theta) if n else 0
+        base = fit(
+            forward, Hypothesis(), w, theta=base.theta, local=base.local, most=5, done=0.01, known=known, kept=kept
+        )
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
-    if len(theta):  # compared like with like: the same weights, starts as well fitted
-        given = fit(forward, Hypothesis(), w, local=base.local, fixed=True, most=4)
-    return given, base, w, Weights(noise, 1.0)
+    # everything that follows rests on these derivatives
+    line = linearise(forward, Hypothesis(), base.free, base.theta, base.local, base.blocks, w)
+    return given.reweighted(first, w), replace(base, linear=line), w, Weights(noise, 1.0)
 
 
 def look_elsewhere(screening: Screening, draws: int, seed: int) -> float:
@@ -341,46 +345,97 @@ def look_elsewhere(screening: Screening, draws: int, seed: int) -> float:
     return float((1 + np.count_nonzero(highest >= found)) / (draws + 1))
 
 
-ALIKE = 0.98
-"""Overlap beyond which two sites of one effect count as one explanation while finalists are chosen."""
+TWINS = 5
+"""Suspects that look the same as the best explanation and are fitted beside it, at most."""
+
+
+def alike(a: Signature, b: Signature) -> bool:
+    """Whether these recordings cannot tell two suspects apart, by less than half a unit of log likelihood."""
+    strength = max(abs(a.score), abs(b.score), 1.0)
+    return 1.0 - float(a.shape @ b.shape) ** 2 < 1.0 / strength**2
 
 
 def chosen(screening: Screening, most: int) -> list[Signature]:
-    """The best suspects, at most so many; of twins (the same effect with the same signature) only the better."""
+    """The best suspects, at most so many; of those that look the same, the best only."""
     out: list[Signature] = []
     for s in screening.signatures:
         if len(out) >= most or abs(s.score) < 2.0:
             break
-        twins = any(s.suspect.effect == t.suspect.effect and abs(s.shape @ t.shape) > ALIKE for t in out)
-        if not twins:
+        if not any(alike(s, t) for t in out):
             out.append(s)
     return out
 
 
-def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, most: int = 5) -> Fit:
-    """The nominal model with one more suspect, from the best fit so far and the screening's estimate.
+def twins(forward: Forward, screening: Screening, fits: Sequence[Fit], weights: Weights) -> list[Fit]:
+    """The single suspects that look the same as the best of those that were fitted, fitted as well."""
+    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
+    best = leader(fits, scores)
+    if best is None or len(best.hypothesis.suspects) != 1:
+        return []
+    done = {f.hypothesis.label for f in fits}
+    mine = next(s for s in screening.signatures if s.suspect.label == best.hypothesis.label)
+    same = [s for s in screening.signatures if s.suspect.label not in done and s.score and alike(s, mine)]
+    return [refit(forward, fits[0], s, weights, screening) for s in same[:TWINS]]
 
-    A second start from half the strength guards against a bad estimate; if the fit is still worse than the model that
-    it contains, it is repeated from there with the effect off, which cannot be worse.
+
+CONTENDERS = 5
+"""Fits that are refined with all derivatives anew, beside the model without any effect."""
+
+
+def settled(
+    forward: Forward, screening: Screening, fits: list[Fit], weights: Weights
+) -> tuple[Screening, list[Fit], Weights]:
+    """The fits with the weights of the best one, which first counted what it lacks as noise; the best ones refined."""
+    new = weights_from(forward, fits)
+    same = np.all(np.abs(np.log(new.deviation / weights.deviation)) < 0.05)
+    if same and abs(np.log(new.part / weights.part)) < 0.2:
+        new = weights
+    out = [f if f.failed else f.reweighted(weights, new) for f in fits]
+    order = sorted((n for n, f in enumerate(out) if n and not f.failed), key=lambda n: out[n].cost)
+    for n in [0, *order[:CONTENDERS]]:
+        f = out[n]
+        out[n] = fit(forward, f.hypothesis, new, theta=f.theta, local=f.local, blocks=f.blocks)
+    return reweighted(screening, out[0], weights, new), out, new
+
+
+SHAPES = (0.3, 3.0)
+"""Factors on the typical value of a suspect's second number (a time, an angle) from which fits begin as well."""
+
+
+def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, screening: Screening, most: int = 5) -> Fit:
+    """The nominal model with one more suspect: from the fit without it and its signature, which cannot become worse.
+
+    Of a suspect with a second number, which sets the shape of its signature, several values are tried.
     """
     s = found.suspect
-    hypothesis = base.hypothesis.plus(s)
-    best: Fit | None = None
-    first = s.free[0]
-    for part in (1.0, 0.3):
-        values = [float(np.clip(first.start + part * found.strength, first.lower, first.upper))]
-        values += [f.start for f in s.free[1:]]
-        f = fit(forward, hypothesis, weights, theta=np.concatenate([base.theta, values]), local=base.local, most=most)
-        if best is None or f.cost < best.cost:
-            best = f
-        if best.cost <= base.cost:
-            break
-    assert best is not None
-    if not best.cost <= base.cost * (1 + 1e-9):
-        values = [first.start, *(f.start for f in s.free[1:])]
-        f = fit(forward, hypothesis, weights, theta=np.concatenate([base.theta, values]), local=base.local, most=most)
-        best = f if f.cost < best.cost else best
-    return best
+    begin = None
+    if list(base.blocks) == screening.blocks and found.parts:
+        assert base.linear is not None
+        unit = s.free[0].scale / found.size
+        rest = len(s.free) - 1
+        columns = [np.concatenate([unit * p[:, None], np.zeros((len(p), rest))], axis=1) for p in found.parts]
+        begin = base.linear.beside(columns, len(base.free))
+
+    def fitted(second: float, begin) -> Fit:
+        values = [f.start for f in s.free]
+        if len(values) > 1:
+            values[1] = float(np.clip(second * values[1], s.free[1].lower, s.free[1].upper))
+        return fit(
+            forward,
+            base.hypothesis.plus(s),
+            weights,
+            theta=np.concatenate([base.theta, values]),
+            local=base.local,
+            most=most,
+            known=base.linear,
+            kept=len(base.free),
+            begin=begin,
+        )
+
+    tried = [fitted(1.0, begin)]
+    if len(s.free) > 1:
+        tried += [fitted(part, None) for part in SHAPES]
+    return min(tried, key=lambda f: f.cost)
 
 
 def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
@@ -407,33 +462,39 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     a, b, x = best
     first = replace(a, strength=float(x[0] * a.error))
     second = replace(b, strength=float(x[1] * b.error))
-    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(forward, base, first, weights)
+    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(
+        forward, base, first, weights, screening
+    )
     if one.failed:
         return []
     out = [] if any(one is f for f in fits) else [one]
-    both = refit(forward, one, second, weights)
+    both = refit(forward, one, second, weights, screening)
     return [*out, both]
 
 
-def combine(forward, base, fits, scores, screening: Screening, weights, relax, o: Options, tell) -> list[Fit]:
+INEXACT = 0.02
+"""Part of what an effect explains that an inexact law of it may leave; a further effect must explain more."""
+
+
+def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
     """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
     more: list[Fit] = []
-    best = leader(fits, scores)
+    base, best = fits[0], leader(fits, scores)
     while best is not None and best is not base and len(best.hypothesis.suspects) < o.most:
         tell("combine", len(best.hypothesis.suspects) / o.most)
         left = again(screening, best, without=best.hypothesis.effects)
         if not left.signatures:
             break
-        p = look_elsewhere(_relaxed(left, relax), o.draws, o.seed)
+        p = look_elsewhere(left, o.draws, o.seed)
         top = left.signatures[0]
-        if p > o.significance or top.score**2 < 0.05 * left.total:
+        if p > o.significance or top.score**2 < INEXACT * (base.cost - best.cost):
             break
         rivals = [g for g in left.signatures if g.suspect.effect == top.suspect.effect]  # the same at other sites
         tried = []
         for g in [g for g in rivals if g.score**2 > 0.7 * top.score**2][:3]:
-            f = refit(forward, best, g, weights)
+            f = refit(forward, best, g, weights, screening)
             if not f.failed:
-                scores[id(f)] = scored(forward, f, weights, relax)
+                scores[id(f)] = score(forward, f, weights)
                 tried.append(f)
         if not tried:
             break
@@ -445,11 +506,11 @@ def combine(forward, base, fits, scores, screening: Screening, weights, relax, o
             break
         best = f
     if best is not None and len(best.hypothesis.suspects) > 1:
-        more += swaps(forward, base, best, [*fits, *more], scores, screening, weights, relax)
+        more += swaps(forward, base, best, [*fits, *more], scores, screening, weights)
     return more
 
 
-def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, weights, relax) -> list[Fit]:
+def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, weights) -> list[Fit]:
     """Of several effects, each is left out in turn, and the others that could take its place are tried."""
     out: list[Fit] = []
     for s in best.hypothesis.suspects:
@@ -461,16 +522,16 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
         if inner.failed:
             continue
         if not known:
-            scores[id(inner)] = scored(forward, inner, weights, relax)
+            scores[id(inner)] = score(forward, inner, weights)
             out.append(inner)
         left = again(screening, inner, without=inner.hypothesis.effects)
         for g in left.signatures[:3]:
             wanted = (*inner.hypothesis.suspects, g.suspect)
             if any(_same(f.hypothesis, wanted) for f in (*fits, *out)):
                 continue
-            f = refit(forward, inner, g, weights)
+            f = refit(forward, inner, g, weights, screening)
             if not f.failed:
-                scores[id(f)] = scored(forward, f, weights, relax)
+                scores[id(f)] = score(forward, f, weights)
                 out.append(f)
     return out
 
@@ -490,20 +551,6 @@ def leader(fits: Sequence[Fit], scores: dict[int, Score]) -> Fit | None:
     """The fit of the highest evidence."""
     good = [f for f in fits if id(f) in scores]
     return good[int(np.argmax(supported(good, scores)))] if good else None
-
-
-def relaxation(old: Weights, new: Weights) -> float:
-    """Factor on whitened squares when the weights are replaced."""
-    return float(np.mean((old.deviation / new.deviation) ** 2) * new.part / old.part)
-
-
-def scored(forward: Forward, f: Fit, weights: Weights, relax: float) -> Score:
-    return score(forward, f, weights, relax=relax)
-
-
-def _relaxed(s: Screening, relax: float) -> Screening:
-    k = float(np.sqrt(relax))
-    return replace(s, signatures=[replace(g, score=g.score * k) for g in s.signatures])
 
 
 # --- results

@@ -9,7 +9,7 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose.articulation import Articulation, Pose
-from origami_sim.diagnose.channels import read
+from origami_sim.diagnose.channels import depths, read
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, apply
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
@@ -69,6 +69,7 @@ class Forward:
         start: "fit" if every segment has a start of its own that is fitted (coordinates and rates), "rest" if the
             recording starts from rest in the model's reference state.
         most: at most so many segments of each recording, evenly spread; None: all.
+        threads: see `Batch`.
 
     Attributes:
         blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
@@ -256,35 +257,29 @@ class Forward:
         state.memory[:] = self._memory(r, model, parameters, blocks, k)
         chosen = stable_step(model, parameters)
         substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
-        lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
-        reach = 0.5 * lengths.min(initial=np.inf)
         raw: list[np.ndarray] = []
         calm = min(self._calm[r], frames - 1)
         if calm:
             quiet, damped = calmed(model, parameters)
             finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
-            batch = Batch(quiet, damped, drive, _with_effects(state, quiet), threads=self.threads)
-            for n in range(calm + 1):
-                batch.advance(finer if n else 0, step / finer, reach * finer / step)
-                x, angles = batch.motion()
-                raw.append(channel_values(model, recording, x[None], angles[None])[0])
+            batch = self._batch(quiet, damped, drive, _with_effects(state, quiet))
+            raw += filmed(batch, recording, calm + 1, finer, step)
             state = _with_effects(batch.state(), model, step=calm * substeps)
-        batch = Batch(model, parameters, drive, state, threads=self.threads)
-        for n in range(len(raw), frames):
-            batch.advance(substeps if n else 0, step / substeps, reach * substeps / step)
-            x, angles = batch.motion()
-            raw.append(channel_values(model, recording, x[None], angles[None])[0])
-        channels = np.stack(raw)  # [frames, D, W]
-        channels[:, :, batch.state().status[0] >= 0] = np.nan
-        continuous(channels, angle_mask(recording), np.tile(np.stack([_begin(b) for b in blocks]), (k, 1)).T)
+        batch = self._batch(model, parameters, drive, state)
+        raw += filmed(batch, recording, frames - sum(map(len, raw)), substeps, step, first=not calm)
+        channels = np.concatenate(raw)  # [frames, D, W]
+        channels[:, :, batch.status() >= 0] = np.nan
+        turning = angle_mask(recording)
+        plain = channels[:, : len(turning)]  # without the depths
+        continuous(plain, turning, np.tile(np.stack([_begin(b) for b in blocks]), (k, 1)).T)
         grid = np.arange(frames) * step
         distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
             values = self._measured(model, parameters, recording, distort, each, grid, channels, times)
         elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
-            values = channels[: len(times)]
+            values = plain[: len(times)]
         else:
-            values = spline(grid, channels)(times)
+            values = spline(grid, plain)(times)
         values = values.reshape(len(times), -1, k, count)
         return [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)]
 
@@ -339,13 +334,12 @@ class Forward:
         begin = self.recordings[r].times[frames[:, 0]] - self.recordings[r].times[0]
         drive = distorted(model, parameters, shifted(self._drives[r], begin, lead * step, k), lead * step)
         state = State.at_rest(held, k * count, position=np.tile(np.moveaxis(path[frames[:, 0]], 0, 1), (1, k, 1)))
-        batch = Batch(held, parameters, drive, state, threads=self.threads)
-        batch.advance(0, step, np.inf)
-        for n in range(lead):
-            by = np.moveaxis(path[frames[:, n + 1]] - path[frames[:, n]], 0, 1) / step
-            batch.carry(np.tile(by, (1, k, 1)))
-            batch.advance(1, step, np.inf)
+        batch = self._batch(held, parameters, drive, state)
+        batch.carry(np.moveaxis(path[frames], (0, 1, 2), (2, 0, 1)), step)
         return batch.state().memory
+
+    def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State) -> Batch:
+        return Batch(model, parameters, drive, state, threads=self.threads)
 
     def _path(self, r: int) -> np.ndarray | None:
         """Positions [F, N, 3] of the recorded motion, smoothed; None if the channels do not give them."""
@@ -364,16 +358,19 @@ class Forward:
         worlds = channels.shape[2]
         repeat = worlds // len(each)
         at = np.repeat(times[:, None], worlds, axis=1)
-        parts, row = [], 0
+        parts, row, deep = [], 0, len(angle_mask(recording))
         for index, channel in enumerate(recording.channels.values()):
             width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
-            reader = _reader(grid, channels[:, row : row + width])
+            rows = [*range(row, row + width)]
+            if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
+                rows, deep = [*rows, deep], deep + 1
+            reader = _reader(grid, channels[:, rows])
             for name in distort:
                 effect = get(name)
                 if effect.channels and channel.kind not in effect.channels:
                     continue
                 reader = _wrapped(effect, reader, self._at_channel(name, index, each, parameters, repeat))
-            parts.append(reader(at))
+            parts.append(reader(at)[:, :width])
             row += width
         return np.concatenate(parts, axis=1)
 
@@ -403,6 +400,36 @@ def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
             dashpot = 2 * RATIO * np.sqrt(parameters["panel_bending", "stiffness"] * np.minimum(inertia, 1e300))
             out.set("panel_viscosity", "viscosity", out["panel_viscosity", "viscosity"] + dashpot)
     return quiet, out
+
+
+FILMED = 64e6
+"""Bytes of positions that are kept before they are read."""
+
+
+def filmed(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):
+    """Channels of the next frames and depths of markers in pictures, in parts [f, D + k, W].
+
+    With the present state as the first frame, if `first`.
+    """
+    model, out, left = batch.model, [], frames
+    lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
+    limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
+    if first:
+        batch.advance(0, step / substeps, limit)
+        x, angles = batch.motion()
+        out.append(_pictured(model, recording, x[None], angles[None]))
+        left -= 1
+    most = max(1, int(FILMED / (24 * len(model.position) * batch.worlds)))
+    while left > 0:
+        part = min(left, most)
+        out.append(_pictured(model, recording, *batch.film(part, substeps, step / substeps, limit)))
+        left -= part
+    return out
+
+
+def _pictured(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """All components, and after them the depth of every marker in a picture, [F, D + k, W]."""
+    return np.concatenate([channel_values(model, recording, x, angles), depths(model, recording, x)], axis=1)
 
 
 def _with_effects(state: State, model: Model, step: int | None = None) -> State:

@@ -1,7 +1,7 @@
 """Fits of a hypothesis to recordings: Gauss-Newton over batched rollouts, with priors, bounds and fitted starts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -11,8 +11,23 @@ from origami_sim.diagnose.hypothesis import Free, Hypothesis
 STEPS = (1.0, 0.4, 0.1, 0.01)
 """Fractions of a Gauss-Newton step that are tried in one batch."""
 
+CHORD = (1.0, 0.4)
+"""The same while derivatives of an earlier point are in use; if none of them helps, the derivatives are taken anew."""
+
+FAITHFUL = 0.7
+"""Part of the promised improvement with which a step must come true for its derivatives to be used again."""
+
+SLOWEST = 2.5
+"""How many times smaller than at the beginning the solver's step may become at a trial."""
+
+FAINT = 1e-3
+"""Changes of a start that show so much less than others are left alone: a rate that is damped at once may be anything."""
+
 DONE = 3e-3
-"""A fit ends when a step improves it by less than this part of the misfit."""
+"""A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
+
+LITTLE = 0.2
+"""An improvement of the weighted squares that decides nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,30 +78,74 @@ class Fit:
         """(P,) standard deviations of theta."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
+    def reweighted(self, old: Weights, new: Weights) -> "Fit":
+        """The same numbers, judged with other weights."""
+        assert self.linear is not None
+        line = self.linear.reweighted(old, new)
+        misfit = float(sum(r @ r for r in line.residual))
+        return replace(self, linear=line, misfit=misfit, covariance=_covariance(self.free, line))
+
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Whitened residuals and tangents of the fitted blocks, with the starts projected out.
+    """Whitened residuals of the fitted blocks, and their derivatives by the numbers and by the starts.
 
     Attributes:
-        residual: per block (r,). tangent: per block [r, P] by theta / scale. basis: per block [r, l] orthonormal
-            directions of the starts; project with `clear`. solve: per block, from projected changes to starts.
+        residual: per block (r,). tangent: per block [r, P] by theta / scale. slopes: per block [r, L] by the starts.
+        basis: per block [r, l] orthonormal directions of the starts; project with `clear`. starts: per block, from
+            projected changes to starts.
     """
 
     residual: list[np.ndarray]
     tangent: list[np.ndarray]
+    slopes: list[np.ndarray]
     basis: list[np.ndarray]
     starts: list[np.ndarray]
+
+    @classmethod
+    def of(cls, residual: list[np.ndarray], tangent: list[np.ndarray], slopes: list[np.ndarray]) -> "Linearisation":
+        basis, starts = [], []
+        for s in slopes:
+            u, sv, vt = np.linalg.svd(s, full_matrices=False)
+            good = sv > FAINT * sv.max(initial=1e-300)
+            basis.append(u[:, good])
+            starts.append(vt[good].T / sv[good])
+        return cls(residual, tangent, slopes, basis, starts)
 
     def clear(self, b: int, columns: np.ndarray) -> np.ndarray:
         """Columns [r, ...] without what a change of the start could explain."""
         q = self.basis[b]
         return columns - q @ (q.T @ columns)
 
+    def at(self, residual: list[np.ndarray]) -> "Linearisation":
+        """The same derivatives with other residuals."""
+        return Linearisation(residual, self.tangent, self.slopes, self.basis, self.starts)
+
+    def beside(self, columns: list[np.ndarray], kept: int) -> "Linearisation":
+        """The first `kept` columns of the tangent, and others after them."""
+        joined = [np.concatenate([t[:, :kept], c], axis=1) for t, c in zip(self.tangent, columns, strict=True)]
+        return Linearisation(self.residual, joined, self.slopes, self.basis, self.starts)
+
+    def reweighted(self, old: Weights, new: Weights) -> "Linearisation":
+        """The same for other weights."""
+        if old is new:
+            return self
+        factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
+        rows = [np.tile(factor, len(r) // len(factor)) for r in self.residual]
+        return Linearisation.of(
+            [f * r for f, r in zip(rows, self.residual, strict=True)],
+            [f[:, None] * t for f, t in zip(rows, self.tangent, strict=True)],
+            [f[:, None] * s for f, s in zip(rows, self.slopes, strict=True)],
+        )
+
 
 def whitened(values: np.ndarray, weights: Weights) -> np.ndarray:
     """Residuals [..., n, D] as (..., n D) numbers of unit variance; missing ones are zero."""
-    scaled = np.nan_to_num(values / weights.deviation) * np.sqrt(weights.part)
+    return _scaled(np.nan_to_num(values), weights)
+
+
+def _scaled(values: np.ndarray, weights: Weights) -> np.ndarray:
+    scaled = values / weights.deviation * np.sqrt(weights.part)
     return scaled.reshape(*values.shape[:-2], values.shape[-2] * values.shape[-1])
 
 
@@ -109,43 +168,48 @@ def misfits(forward, blocks, predicted: list[np.ndarray], weights: Weights) -> n
 
 
 def linearise(
-    forward, hypothesis: Hypothesis, free, theta, local, blocks, weights: Weights, *, fixed: bool = False
+    forward,
+    hypothesis: Hypothesis,
+    free,
+    theta,
+    local,
+    blocks,
+    weights: Weights,
+    *,
+    fixed: bool = False,
+    known: Linearisation | None = None,
+    kept: int = 0,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
     Args:
         fixed: leave theta out (only the starts are to be fitted).
+        known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
     """
     count = 0 if fixed else len(free)
-    size = local.shape[1]
+    kept = min(kept, count) if known is not None else 0
+    size = 0 if known is not None else local.shape[1]
     steps = np.array([_step(f, t) for f, t in zip(free, theta, strict=True)])[:count]
     nudges = start_steps(forward)
-    thetas = np.repeat(theta[None], 1 + count + size, axis=0)
-    locals_ = np.repeat(local[None], 1 + count + size, axis=0)
-    for p in range(count):
-        thetas[1 + p, p] += steps[p]
+    thetas = np.repeat(theta[None], 1 + count - kept + size, axis=0)
+    locals_ = np.repeat(local[None], 1 + count - kept + size, axis=0)
+    for row, p in enumerate(range(kept, count)):
+        thetas[1 + row, p] += steps[p]
     for i in range(size):
-        locals_[1 + count + i, :, i] += nudges[i]
+        locals_[1 + count - kept + i, :, i] += nudges[i]
     predicted = forward.predict(hypothesis, thetas, locals_, blocks)
-    residual, tangent, basis, starts = [], [], [], []
+    residual, tangent, starts = [], [], []
     for b, values in zip(blocks, predicted, strict=True):
-        r = whitened(forward.blocks[b].values - values[0], weights)
-        seen = np.isfinite(forward.blocks[b].values)
-        change = np.where(seen, values[1:] - values[0], 0.0)
-        slopes = whitened(change, weights).T
-        t = slopes[:, :count] * ([f.scale for f in free[:count]] / steps) if count else slopes[:, :0]
-        s = slopes[:, count:] / nudges if size else slopes[:, :0]
-        if size:
-            u, sv, vt = np.linalg.svd(s, full_matrices=False)
-            good = sv > 1e-7 * (sv[0] if len(sv) else 1.0)
-            q, back = u[:, good], vt[good].T / sv[good]
-        else:
-            q, back = np.zeros((len(r), 0)), np.zeros((0, 0))
-        residual.append(r)
-        tangent.append(t)
-        basis.append(q)
-        starts.append(back)
-    return Linearisation(residual, tangent, basis, starts)
+        measured = forward.blocks[b].values
+        seen = np.isfinite(measured)  # nan where something was measured and the prediction failed
+        residual.append(_scaled(np.where(seen, measured - values[0], 0.0), weights))
+        slopes = _scaled(np.where(seen, values[1:] - values[0], 0.0), weights).T
+        scale = [f.scale for f in free[kept:count]]
+        tangent.append(slopes[:, : count - kept] * (scale / steps[kept:]))
+        starts.append(slopes[:, count - kept :] / nudges[:size])
+    if known is not None:
+        return known.at(residual).beside(tangent, kept)
+    return Linearisation.of(residual, tangent, starts)
 
 
 def start_steps(forward) -> np.ndarray:
@@ -175,16 +239,21 @@ def fit(
     fixed: bool = False,
     most: int = 8,
     done: float = DONE,
+    known: Linearisation | None = None,
+    kept: int = 0,
+    begin: Linearisation | None = None,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
     Minimises the weighted squares of recorded minus predicted plus the squares of the departures from the priors,
     within physical bounds, by Gauss-Newton steps of which several lengths are tried in one batch. The starts are
-    eliminated block by block.
+    eliminated block by block. Derivatives are used again as long as the steps that they give keep what they promise.
 
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
         blocks: fit these only. fixed: keep theta and fit the starts only.
+        known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
+        begin: residuals and all derivatives of the point where the fit begins.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
     free = (*forward.subject.nominals, *hypothesis.free)
@@ -193,19 +262,28 @@ def fit(
     lower = np.array([f.lower for f in free])
     upper = np.array([f.upper for f in free])
     scale = np.array([f.scale for f in free])
-    prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
-    predicted = forward.predict(hypothesis, theta[None], local[None], blocks)
-    best = float(misfits(forward, blocks, predicted, weights).sum()) + penalty(free, theta)
+    prior = _precision(free)
+    width = 0 if fixed else len(free)
+
+    def derived(theta, local, near: Linearisation | None) -> Linearisation:
+        return linearise(
+            forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, known=near, kept=kept if near else 0
+        )
+
+    # which derivatives are those of the present point: by the hypothesis' own numbers, by all
+    line = begin or derived(theta, local, known)
+    own, full, doubts = begin is None, begin is None and known is None, 0
+    best = sum(float(r @ r) for r in line.residual) + penalty(free, theta)
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
-    line = None
-    for _ in range(most):
+    slowest = forward.step(hypothesis, theta) / SLOWEST
+    floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
+    for n in range(most):
         assert theta is not None and local is not None
-        line = linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed)
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
         change = np.zeros(len(free))
-        if not fixed and len(free):
+        if width:
             rows = [line.clear(n, line.tangent[n]) for n in range(len(blocks))]
             right = [line.clear(n, line.residual[n]) for n in range(len(blocks))]
             wanted = np.array([f.start for f in free])
@@ -218,23 +296,46 @@ def fit(
             r_, q_ = _compressed(a, y)
             found = lsq_linear(r_, q_, (np.minimum(low, -1e-12), np.maximum(high, 1e-12)))
             change = np.asarray(found.x, float)
-        moves = np.zeros_like(local)
-        for n, b in enumerate(blocks):
-            left = line.residual[n] - line.tangent[n] @ change[: line.tangent[n].shape[1]]
-            moves[b] = line.starts[n] @ (line.basis[n].T @ left) if forward.local else 0.0
-        trials = np.stack([np.clip(theta + s * change * scale, lower, upper) for s in STEPS])
-        starts = np.stack([local + s * moves for s in STEPS])
+        moves, promised = np.zeros_like(local), penalty(free, theta + change * scale)
+        for i, b in enumerate(blocks):
+            left = line.residual[i] - line.tangent[i] @ change[:width]
+            moves[b] = line.starts[i] @ (line.basis[i].T @ left) if forward.local else 0.0
+            rest = line.clear(i, left)
+            promised += float(rest @ rest)
+        enough = max(LITTLE, done * (best - floor))
+        if best - promised < enough and (own or not width):
+            break
+        trying = STEPS if full or not n else CHORD
+        trials = np.stack([np.clip(theta + s * change * scale, lower, upper) for s in trying])
+        starts = np.stack([local + s * moves for s in trying])
+        if width and hypothesis.suspects:  # a strength far beyond what is needed can ask for very small steps
+            slow = np.array([forward.step(hypothesis, t) < slowest for t in trials])
+            trials, starts = (trials[~slow], starts[~slow]) if not np.all(slow) else (trials[-1:], starts[-1:])
         predicted = forward.predict(hypothesis, trials, starts, blocks)
-        per_block = misfits(forward, blocks, predicted, weights)
-        costs = per_block.sum(axis=1) + [penalty(free, t) for t in trials]
+        costs = misfits(forward, blocks, predicted, weights).sum(axis=1) + [penalty(free, t) for t in trials]
         k = int(np.argmin(costs))
-        if not costs[k] < best:
+        gain = max(best - float(costs[k]), 0.0)
+        faithful = gain > FAITHFUL * (best - promised)
+        if gain < enough and full:
             break
-        gain = best - costs[k]
-        theta, local, best = trials[k], starts[k], float(costs[k])
-        if gain < done * best:
-            break
-    return _finished(forward, hypothesis, free, theta, local, blocks, weights, line, fixed)
+        if gain > 0.0:
+            theta, local, best = trials[k], starts[k], float(costs[k])
+            gaps = [forward.blocks[b].values - v[k] for b, v in zip(blocks, predicted, strict=True)]
+            line = line.at([whitened(g, weights) for g in gaps])
+        if gain < enough or not faithful:  # first the hypothesis' own derivatives are renewed, then all
+            doubts += 1
+            full = not kept or doubts > 1
+            line, own = derived(theta, local, None if full else line), True
+        else:
+            own = full = False
+    if width and not own:  # the intervals are those of the place where the fit ended
+        line = derived(theta, local, line)
+    return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
+
+
+def _precision(free: Sequence[Free]) -> np.ndarray:
+    """(P,) scales over the standard deviations of what was known before."""
+    return np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
 
 
 def _compressed(a: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -243,17 +344,16 @@ def _compressed(a: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return r, q.T @ y
 
 
-def _finished(forward, hypothesis, free, theta, local, blocks, weights, line, fixed) -> Fit:
-    predicted = forward.predict(hypothesis, theta[None], local[None], blocks)
-    residuals = [forward.blocks[b].values - v[0] for b, v in zip(blocks, predicted, strict=True)]
-    misfit = float(misfits(forward, blocks, predicted, weights).sum())
+def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) -> Fit:
+    dims = len(weights.deviation)
+    back = weights.deviation / np.sqrt(weights.part)
+    residuals = []
+    for n, b in enumerate(blocks):
+        r = line.residual[n].reshape(-1, dims) * back
+        residuals.append(np.where(np.isfinite(forward.blocks[b].values), r, np.nan))
+    misfit = float(sum(r @ r for r in line.residual))
     scale = np.array([f.scale for f in free])
     lower, upper = np.array([f.lower for f in free]), np.array([f.upper for f in free])
-    covariance = np.zeros((len(free), len(free)))
-    if line is not None and not fixed and len(free):
-        prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
-        a = np.concatenate([*(line.clear(n, t) for n, t in enumerate(line.tangent)), np.diag(prior)])
-        covariance = np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
     near = 1e-9 * np.maximum(scale, 1e-300)
     at_bound = (theta <= lower + near) | (theta >= upper - near)
     return Fit(
@@ -265,10 +365,19 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line, fi
         misfit,
         penalty(free, theta),
         residuals,
-        covariance,
+        _covariance(free, line),
         at_bound,
         linear=line,
     )
+
+
+def _covariance(free: Sequence[Free], line: Linearisation) -> np.ndarray:
+    """[P, P] covariance of theta; zero if the numbers were not fitted."""
+    if not line.tangent[0].shape[1]:
+        return np.zeros((len(free), len(free)))
+    scale = np.array([f.scale for f in free])
+    a = np.concatenate([*(line.clear(n, t) for n, t in enumerate(line.tangent)), np.diag(_precision(free))])
+    return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
 
 
 def _failed(hypothesis, free, theta, local, blocks, why: str) -> Fit:

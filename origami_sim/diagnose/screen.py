@@ -7,7 +7,7 @@ whatever is fitted afterwards.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -165,6 +165,18 @@ def again(screening: Screening, base: Fit, without: Sequence[str] = ()) -> Scree
     return rated(kept, base, screening.blocks)
 
 
+def reweighted(screening: Screening, base: Fit, old: Weights, new: Weights) -> Screening:
+    """The same signatures with other weights, against the residual of a fit with these."""
+    factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
+    kept = [
+        (s.suspect, s.size, [np.tile(factor, len(p) // len(factor)) * p for p in s.parts])
+        for s in (*screening.signatures, *screening.untestable)
+    ]
+    unseen = [s for s in screening.untestable if not s.parts]
+    found = rated([k for k in kept if k[2]], base, screening.blocks)
+    return replace(found, untestable=[*found.untestable, *unseen])
+
+
 def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fit, blocks: list[int]) -> Screening:
     """Scores of simulated changes against the residual of a fit."""
     project = Projector(base, blocks)
@@ -200,25 +212,38 @@ def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
     """Changes by suspects that share a program; strengths are scaled until the change is as large as the residual."""
     few = [max(blocks, key=lambda b: _size(base, b, weights))]
     goal = np.sqrt(_size(base, few[0], weights)) + 1.0
-    size = np.array([s.free[0].scale for s in group])
-    size = np.array([_affordable(forward, base, s, z) for s, z in zip(group, size, strict=True)])
-    for _ in range(3):  # on one block
-        change = _changes(forward, group, size, base, few)
-        with np.errstate(invalid="ignore", over="ignore"):
-            norm = np.array([np.linalg.norm(whitened(change[0][k], weights)) for k in range(len(group))])
-        lost = np.array([np.any(np.isnan(change[0][k])) for k in range(len(group))])
-        ratio = np.where(lost, 0.01, np.where(norm > 0, goal / np.maximum(norm, 1e-30), 100.0))
-        if np.all((ratio > 0.2) & (ratio < 5.0)):
-            break
-        factor = np.where((ratio > 0.2) & (ratio < 5.0), 1.0, np.clip(ratio, 1e-4, 1e4))
-        size = np.array([_affordable(forward, base, s, z) for s, z in zip(group, size * factor, strict=True)])
+    size = np.array([_affordable(forward, base, s, s.free[0].scale) for s in group])
+    change = _changes(forward, group, size, base, few)  # on one block first
+    size, _ = _resized(forward, group, size, change[0], goal, base, weights)
     change = _changes(forward, group, size, base, blocks)
+    for _ in range(2):
+        wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
+        redo = np.flatnonzero(off & (wanted != size))
+        if not len(redo):
+            break
+        size[redo] = wanted[redo]
+        for c, new in zip(change, _changes(forward, [group[k] for k in redo], size[redo], base, blocks), strict=True):
+            c[redo] = new
     out = []
     for k, s in enumerate(group):
         lost = any(np.any(np.isnan(c[k])) for c in change)
         parts = [np.full(c[k].size, np.nan) if lost else whitened(c[k], weights) for c in change]
         out.append((s, float(size[k]), parts))
     return out
+
+
+def _resized(forward, group, size, change, goal: float, base: Fit, weights: Weights):
+    """Sizes [S] that would change a block by as much as the goal, and whether the present ones are far from it."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        norm = np.array([np.linalg.norm(whitened(c, weights)) for c in change])
+    lost = np.array([bool(np.any(np.isnan(c))) for c in change])
+    ratio = np.where(lost, 0.01, np.where(norm > 0, goal / np.maximum(norm, 1e-30), 100.0))
+    off = (ratio < 0.1) | (ratio > 10.0)
+    new = [
+        _affordable(forward, base, s, z * np.clip(r, 1e-4, 1e4)) if not 0.2 < r < 5.0 else z
+        for s, z, r in zip(group, size, ratio, strict=True)
+    ]
+    return np.array(new), off
 
 
 def _size(base: Fit, block: int, weights: Weights) -> float:

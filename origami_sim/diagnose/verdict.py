@@ -43,9 +43,7 @@ class Judgement:
     others: list[Fit] = field(default_factory=list)
 
 
-def judge(
-    forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, relax, o
-):
+def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, o):
     """Weighs all fits; see `docs/diagnosis.md` for the rules in words."""
     sigma = noise.deviation
     rows = [f for f in fits if id(f) in scores]

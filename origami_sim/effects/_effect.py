@@ -95,7 +95,8 @@ class Effect:
         energy: potential energy of one entity [J], or None if the effect has none.
         apply: instead of a force, for a distortion of the drive, `apply(drive, duration, **parameters) -> Drive`, or of
             the measurement, `apply(read, times, **parameters) -> values`, where `read(times [n, W])` gives the
-            undistorted channel [n, d, W]. Parameters are arrays [W].
+            undistorted channel [n, d, W], a marker in a picture with its depth towards the camera as the third
+            component. Parameters are arrays [W].
         channels: kinds of channels that a distortion of the measurement can act on (empty: all).
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.

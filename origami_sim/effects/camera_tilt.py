@@ -8,7 +8,7 @@ from origami_sim.effects._signals import Read
 
 
 def apply(read: Read, times: np.ndarray, tilt_x: np.ndarray, tilt_y: np.ndarray, tilt_z: np.ndarray) -> np.ndarray:
-    """Positions turned by the rotation vector (tilt_x, tilt_y, tilt_z); of a camera picture only tilt_z is seen."""
+    """Positions turned by the rotation vector (tilt_x, tilt_y, tilt_z); without a depth only tilt_z is seen."""
     values = read(times)
     tilt = np.stack(np.broadcast_arrays(tilt_x, tilt_y, tilt_z), axis=-1)
     if values.shape[1] == 2:

@@ -40,6 +40,10 @@ class Camera:
         """Coordinates (..., 2) [m] in the picture of points (..., 3) of the model [m]."""
         return (points - self.origin) @ self.axes.T
 
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """How far points (..., 3) of the model lie before the origin's plane, towards the camera, (...) [m]."""
+        return (points - self.origin) @ np.cross(self.axes[0], self.axes[1])
+
     def metres(self, readings: np.ndarray) -> np.ndarray:
         """Coordinates (n, 2) [m] in the picture, up positive, of readings (n, 2) in the tracker's unit."""
         return self.scale * (readings - np.asarray(self.zero)) * np.array([1.0, -1.0 if self.flip else 1.0])

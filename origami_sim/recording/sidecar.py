@@ -100,6 +100,14 @@ _DRIVE_KEYS = (
     *("file", "time_column", "time_unit", "shift", "times", "values"),
 )
 _SCENE_KEYS = ("name", "overrides")
+_DRIVEN = {
+    "field": "flux density",
+    "gradient": "flux density gradient",
+    "voltage": "voltage",
+    "temperature": "temperature",
+    "load": "ratio",
+    "crease_angle": "angle",
+}
 _TRACKED = {"marker": "xyz", "marker_2d": "xy"}
 """Coordinates of a tracked point that a kind of channel takes."""
 
@@ -318,7 +326,7 @@ def _drive_spec(path: Path, name: str, table: object) -> dict[str, Any]:
     return {
         "columns": [] if "value" in given or "values" in given else section.columns(),
         "value": given.get("value"),
-        "unit": section.unit(None),
+        "unit": section.unit(_DRIVEN.get(name, _DRIVEN.get(name.partition("_")[0]))),
         "direction": section.direction(),
         "file": section.text("file", None),
         "time_column": section.text("time_column", None),

@@ -120,6 +120,8 @@ class Batch:
             self._upload(s, wp.float64) for s in (state.angles, state.memory, state.work, state.power)
         )
         self._status = self._upload(state.status, wp.int32)
+        self._nothing = wp.zeros((0, 1, 1), dtype=wp.vec3d, device=self.device)
+        self._no_angles = wp.zeros((0, 1, 1), dtype=wp.float64, device=self.device)
         self._mass = parameters["inertia", "mass"]
 
     def _pack(self, parameters: Parameters, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
@@ -179,6 +181,29 @@ class Batch:
 
     def advance(self, steps: int, dt: float, speed_limit: float):
         """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""
+        self._run(steps, dt, speed_limit, 0, self._nothing, self._no_angles, self._nothing)
+
+    def film(self, frames: int, steps: int, dt: float, speed_limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Takes `steps` steps for each frame, and keeps every frame.
+
+        Returns: positions [F, N, W, 3] [m] and hinge angles [F, C + Q, W] [rad]; nan after a world has stopped.
+        """
+        n, rows = len(self.model.position), len(self.model.creases) + len(self.model.bends)
+        size = (frames, max(n, 1), self._stride)
+        film = wp.full(size, wp.vec3d(np.nan), dtype=wp.vec3d, device=self.device)
+        angles = wp.full((frames, max(rows, 1), self._stride), np.nan, dtype=wp.float64, device=self.device)
+        self._run(frames * steps, dt, speed_limit, steps, film, angles, self._nothing)
+        return film.numpy()[:, :n, : self.worlds], angles.numpy()[:, :rows, : self.worlds]
+
+    def carry(self, path: np.ndarray, dt: float):
+        """Carries the nodes that are held along positions path [F + 1, N, S, 3], one step of dt [s] each.
+
+        World w follows column w modulo S.
+        """
+        rates = wp.array(np.ascontiguousarray(np.diff(path, axis=0) / dt), dtype=wp.vec3d, device=self.device)
+        self._run(len(path) - 1, dt, np.inf, 0, self._nothing, self._no_angles, rates)
+
+    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
         self._launch(
             self.program.rollout,
             [
@@ -192,6 +217,10 @@ class Batch:
                 steps,
                 wp.float64(dt),
                 wp.float64(speed_limit),
+                every,
+                film,
+                angles,
+                carried,
             ],
         )
         self.step = max(self.step, 0) + steps
@@ -225,14 +254,14 @@ class Batch:
         m = self.model
         return self._download(self._x, len(m.position)), self._download(self._angles, len(m.creases) + len(m.bends))
 
+    def status(self) -> np.ndarray:
+        """[W] the step at which a world went unstable; -1: none."""
+        return self._download(self._status, 2)[0]
+
     def place(self, x: np.ndarray, angles: np.ndarray):
         """Overwrites positions [N, W, 3] and the angles from which they are continued [C + Q, W]."""
         self._x.assign(self._upload(x, wp.vec3d))
         self._angles.assign(self._upload(angles, wp.float64))
-
-    def carry(self, v: np.ndarray):
-        """Overwrites the velocities [N, W, 3] [m/s]; nodes that are held move with them."""
-        self._v.assign(self._upload(v, wp.vec3d))
 
     def state(self) -> State:
         """The present state, copied to the host."""

@@ -57,10 +57,13 @@ def rollout({arguments}
     A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
     power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
+    every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar), carried: wp.array3d(dtype=vec3),
 ):
     w = (first_world + wp.tid()) & NATURAL
     if status[0, w] >= 0:
         return
+    frame = int(0)
+    wait = every
 {hoist}
     half_dt = scalar(0.5) * dt
     limit = speed_limit * speed_limit
@@ -77,6 +80,10 @@ def rollout({arguments}
             h = scalar(0.0)
             half = scalar(0.0)
         time = dt * scalar(start + s + 1)
+        if s >= 0 and s < carried.shape[0]:  # nodes that are held follow a prescribed motion
+            for row in range(mask.shape[0]):
+                n = row & NATURAL
+                V[n, w] = carried[s, n, w % carried.shape[2]]
         # kick and drift; v becomes the prediction of the velocity at the end of the step
         for row in range(mask.shape[0]):
             n = row & NATURAL
@@ -99,6 +106,15 @@ def rollout({arguments}
             status[0, w] = start + s + 1
             status[1, w] = fastest
             break
+        if s >= 0 and every > 0:
+            wait -= 1
+            if wait == 0:
+                for row in range(mask.shape[0]):
+                    film[frame, row, w] = X[row, w]
+                for row in range(hinges.shape[0]):
+                    film_angles[frame, row, w] = angles[row, w]
+                frame += 1
+                wait = every
 """
 
 _EVALUATE_HEAD = """

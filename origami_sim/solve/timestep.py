@@ -28,6 +28,8 @@ class TimeStep:
     cause: str
 
     def __str__(self):
+        if np.isinf(self.limit):
+            return "nothing limits the time step"
         limit = f"{SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause}"
         return f"dt = {self.dt:.3g} s ({limit})"
 

@@ -1,5 +1,7 @@
 """Diagnosis of curves with known answers, made by closed forms and root finding, not by the simulator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -130,6 +132,24 @@ def test_chains_are_those_of_the_statics():
         model, parameters, _ = module.build(settings.replace(modulus=modulus))
         found = observe_equilibria(model, parameters, follow(model, parameters, recording), recording)["tip"]
         assert np.abs(row - found).max() < 1e-8 * settings.length
+
+
+def test_a_measurement_at_one_channel_acts_there_only():
+    """Two sensors at one crease; the zero of the second is off. Exactly, and the other one is as it was."""
+    one = flap_curve().channels["fold"]
+    field = np.concatenate([np.linspace(0.0, 0.15, 10), np.linspace(0.15, -0.15, 19)[1:]])
+    forward = curves(flap(), [curve({n: replace(one, name=n) for n in ("left", "right")}, field=field)])
+    nominal = [f.start for f in forward.subject.nominals]
+    offset = {s.site: s for s in suspected(forward) if s.effect == "angle_offset"}
+    assert set(offset) == {"the measurement", "channel left", "channel right"}
+
+    def predicted(*sites):
+        theta = np.array([*nominal, *(0.03 for _ in sites)])
+        return np.concatenate([v[0] for v in forward.predict(Hypothesis(tuple(offset[s] for s in sites)), [theta])])
+
+    plain = predicted()
+    for site, moved in (("the measurement", [1, 1]), ("channel left", [1, 0]), ("channel right", [0, 1])):
+        np.testing.assert_allclose(predicted(site) - plain, np.outer(np.ones(28), 0.03 * np.array(moved)), atol=1e-12)
 
 
 def test_memory_follows_the_path():

@@ -82,7 +82,7 @@ def test_a_nested_model_never_fits_worse(rubbing):
     """Adding an effect, whichever, does not worsen the training fit."""
     forward, _, base, weights, screening = rubbing
     for found in screening.signatures[:2] + screening.signatures[-2:]:
-        f = refit(forward, base, found, weights, most=2)
+        f = refit(forward, base, found, weights, screening, most=2)
         assert f.failed or f.cost <= base.cost * (1 + 1e-6), found.suspect.label
     assert chosen(screening, 2)[0] is screening.signatures[0]
 

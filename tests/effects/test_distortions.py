@@ -281,3 +281,22 @@ def test_filters_take_the_body_to_have_rested_before(name, value):
     first = measured(name, motion, **{name: value})[0, 0, 0]
     assert first == pytest.approx(math.sin(WAVE * TIMES[0]), rel=1e-13)
     assert min(earliest) >= TIMES[0]
+
+
+def test_perspective_scales_with_the_depth_about_its_centre():
+    """A pinhole at 0.8 m that faces (0.02, -0.01): similar triangles; a picture without depth is left alone."""
+    x = np.array([[0.05, -0.03, 0.1], [-0.04, 0.08, -0.05], [0.02, -0.01, 0.3]])
+    eye = np.array([0.02, -0.01, 0.8])
+
+    def still(t):
+        return np.repeat(x[None, :, :], len(t), axis=0)
+
+    seen = measured("perspective", still, nearness=1 / 0.8, centre_right=eye[0], centre_up=eye[1])
+    for w in range(3):
+        point = x[:, w]
+        ray = eye + (point - eye) * eye[2] / (eye[2] - point[2])  # where it meets the plane of the ruler
+        assert seen[:, :2, w] == pytest.approx(np.broadcast_to(ray[:2], (len(TIMES), 2)), rel=1e-12, abs=1e-15)
+    flat = measured("perspective", lambda t: still(t)[:, :2], nearness=1 / 0.8)
+    assert np.array_equal(flat, still(TIMES)[:, :2])
+    behind = measured("perspective", lambda t: 10.0 + 0 * still(t), nearness=1.0)
+    assert np.all(np.isfinite(behind))

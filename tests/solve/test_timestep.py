@@ -8,7 +8,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.timestep import SAFETY, stable_step
+from origami_sim.solve.timestep import SAFETY, TimeStep, stable_step
 
 LOADED = Drive(load=1.0)
 RNG = np.random.default_rng(7)
@@ -220,6 +220,7 @@ def test_default_step_is_a_fraction_of_the_limit_and_names_its_cause():
     assert step.dt == SAFETY * step.limit
     assert "(bars)" in step.cause
     assert str(step.node) in str(step) and step.cause in str(step)
+    assert str(TimeStep(np.inf, np.inf, 0, "")) == "nothing limits the time step"
 
 
 def test_single_spring_and_dashpot_have_the_closed_form_limit():

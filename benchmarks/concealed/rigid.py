@@ -1,0 +1,174 @@
+"""Devices of rigid panels: motions of MuJoCo, what effects do to their recordings, and how well that shows."""
+
+from pathlib import Path
+
+import numpy as np
+from laws import MEASUREMENT, build
+from recorder import channels, readings, tracked, write
+from world import FINE, Law, Motion, Numbers, World
+
+STRETCH = 1.0
+"""Length of the stretches over which d' is taken [s]."""
+
+EVERY = 4
+"""Of the samples of a motion, which are used for d'."""
+
+FACTORS = {
+    "crease.stiffness": "stiffness",
+    "crease_viscosity.viscosity": "viscosity",
+    "inertia.mass": "mass",
+    "magnetic_torque.remanence": "remanence",
+}
+
+
+class PanelMasses(Law):
+    """Panels whose masses differ one by one, by about one per cent."""
+
+    def prepare(self, numbers: Numbers):
+        numbers.mass *= 1 + self.strength * np.array(self.extra["errors"])
+
+
+def numbers_of(o: dict, factors: dict[str, float]) -> Numbers:
+    """True numbers from common factors."""
+    numbers = Numbers.described(o)
+    for name, factor in factors.items():
+        getattr(numbers, FACTORS[name])[:] *= factor
+    return numbers
+
+
+class RigidCase:
+    """An object with its true common factors; effects are entries {mechanism, strength, place, extra}.
+
+    The signature of effects is the difference that they make, over stretches of a second that start alike, in standard
+    deviations of the noise, after projecting out what the starts and the uncertain numbers (within what is known of
+    them) can take up. Its norm is d'.
+    """
+
+    def __init__(self, o: dict, factors: dict[str, float]):
+        self.o, self.factors = o, factors
+        self._tangents: list | None = None
+        noise = np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12))
+        self._sigma = noise / np.sqrt(o["rate"] * EVERY / FINE)
+
+    def scale(self, place: int) -> float:
+        """What the strengths of elastic effects are measured in: the crease's stiffness [N m/rad]."""
+        return self.o["creases"][place]["stiffness"]
+
+    def duration(self, recording: dict) -> float:
+        return self.o["duration"] * recording.get("stretch", 1.0)
+
+    def world(self, laws=(), **changed) -> World:
+        return World(self.o, numbers_of(self.o, {**self.factors, **changed}), tuple(laws))
+
+    def motions(self, laws=()) -> list[Motion]:
+        """Motions of all recordings, from the release, or from rest where a field drives."""
+        world, out = self.world(laws), []
+        for r in self.o["recordings"]:
+            q0 = np.array(r["release"])
+            if "field" in r:
+                still = {"field": {**r["field"], "amplitude": 0.0}}
+                q0 = world.run(still, world.settled(), duration=1.5).angles[-1]
+            out.append(world.run(r, q0, duration=self.duration(r) + 0.2))
+        return out
+
+    def signature(self, entries: list[dict], *, fresh: bool = False) -> np.ndarray:
+        """The projected difference that effects make.
+
+        Args:
+            fresh: find anew what starts and numbers can take up, about this motion; else about the last that did.
+        """
+        (laws, chain), plain = entered(entries), self.world()
+        stretches = list(self._stretches(self.motions(laws)))
+        if fresh or self._tangents is None:
+            self._tangents = [self._tangent(r, m, k) for r, m, k in stretches]
+        rows = []
+        for (r, m, k), (basis, _) in zip(stretches, self._tangents, strict=True):
+            times = m.times[k : k + round(STRETCH * FINE) + 1 : EVERY]
+            gap = readings(plain, m, times, chain) - self._stretch(plain, r, m.angles[k], m.rates[k], m.times[k])
+            d = gap.ravel() / self._sigma
+            rows.append(d - basis @ (basis.T @ d))
+        t, d = np.concatenate([c for _, c in self._tangents]), np.concatenate(rows)
+        x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
+        return np.concatenate([d - t @ x, -x])
+
+    def _stretches(self, motions: list[Motion]):
+        """Recording, motion and first sample of every stretch."""
+        for r, m in zip(self.o["recordings"], motions, strict=True):
+            for start in np.arange(0.0, self.duration(r) - 0.5 * STRETCH, STRETCH):
+                yield r, m, round(start * FINE)
+
+    def _stretch(self, world: World, r: dict, q, w, start: float) -> np.ndarray:
+        """Readings (n, D) of one stretch from a start."""
+        return channels(world, world.run(r, q, w, duration=STRETCH, start=start).angles)[::EVERY]
+
+    def _tangent(self, r: dict, m: Motion, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Orthonormal columns of what the start takes up, and columns of the numbers per standard deviation."""
+        q, w, start, e = m.angles[k], m.rates[k], m.times[k], np.eye(len(self.o["creases"]))
+        plain, priors = self.world(), self.o["priors"]
+        base = self._stretch(plain, r, q, w, start)
+        local = [(self._stretch(plain, r, q + 1e-4 * v, w, start) - base) / 1e-4 for v in e]
+        local += [(self._stretch(plain, r, q, w + 1e-3 * v, start) - base) / 1e-3 for v in e]
+        common = []
+        for n, spread in priors.items():
+            other = self.world(**{n: self.factors.get(n, 1.0) * 1.001})
+            common.append((self._stretch(other, r, q, w, start) - base) / 1e-3 * spread)
+        local, common = (np.stack([v.ravel() for v in vs], axis=1) / self._sigma for vs in (local, common))
+        basis, _ = np.linalg.qr(local)
+        return basis, common - basis @ (basis.T @ common)
+
+    # --- what nobody lists
+
+    def nuisances(self, rng: np.random.Generator) -> list[dict]:
+        """Nuisances that may be drawn: panel masses, zero and clock of the camera, air, an imperfect release."""
+        o, still = self.o, self.world()
+        weight = o["density"] * o["thickness"] * still.areas[1] * o["gravity"]
+        push = 0.02 * weight * float(np.ptp(still.corners[1], axis=0).max())
+        errors = {"errors": (0.01 * rng.normal(size=len(o["faces"]))).tolist()}
+        return [
+            entry("panel_masses", 1.0, extra=errors),
+            entry("angle_offset", float(3e-3 * rng.normal())),
+            entry("air_drag", float(rng.uniform(0.3, 1.2))),
+            entry("pushes", push, extra={"pulses": [[0.0, 1.0]]}),
+            entry("clock_rate", float(1e-3 * rng.normal())),
+        ]
+
+    # --- recordings
+
+    def tracker(self, rng: np.random.Generator) -> dict:
+        """A camera's habits; `stated`: the noise that the sidecar states, 0 if none."""
+        smoothing = bool(rng.random() < 0.3)
+        out = {"noise": self.o["noise"], "quantum": self.o["noise"] / 2, "smoothing": smoothing}
+        out |= {"lost": float(rng.choice([0.0, 0.01])), "gap": int(rng.choice([0, 4]))}
+        level = np.hypot(out["noise"] * (np.sqrt(0.375) if smoothing else 1.0), out["quantum"] / np.sqrt(12))
+        return out | {"stated": float(level) if rng.random() < 0.7 else 0.0}
+
+    def write(self, folder: Path, entries: list[dict], tracker: dict, rng: np.random.Generator, first: int = 1) -> None:
+        """The recordings, numbered from `first` on."""
+        laws, chain = entered(entries)
+        world = self.world(laws)
+        for n, (r, m) in enumerate(zip(self.o["recordings"], self.motions(laws), strict=True)):
+            times = np.arange(round(self.duration(r) * self.o["rate"]) + 1) / self.o["rate"]
+            values = tracked(readings(world, m, times, chain), tracker, rng)
+            write(folder, f"recording{first + n}", self.o, r, times, values, tracker)
+
+    def known(self) -> dict:
+        """What an experimenter knows of the object."""
+        return {k: v for k, v in self.o.items() if k not in ("recordings", "noise", "duration", "rate", "channels")}
+
+
+def entry(mechanism: str, strength: float, place: int = 0, extra: dict | None = None) -> dict:
+    return {"mechanism": mechanism, "strength": strength, "place": place, "extra": extra or {}}
+
+
+def entered(entries: list[dict]) -> tuple[list[Law], dict[str, float]]:
+    """Laws and measurement errors of some effects; errors of the same kind add up."""
+    laws: list[Law] = []
+    chain: dict[str, float] = {}
+    for e in entries:
+        if e["mechanism"] in MEASUREMENT:
+            chain[e["mechanism"]] = chain.get(e["mechanism"], 0.0) + e["strength"]
+        elif e["mechanism"] == "panel_masses":
+            laws.append(PanelMasses(e["strength"], e["place"], dict(e["extra"])))
+        else:
+            laws.append(build(e["mechanism"], e["strength"], e["place"], e["extra"]))
+    return laws, chain

@@ -1,0 +1,132 @@
+"""The diagnosis of one case, from its folder alone."""
+
+import json
+import time
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from origami_sim.build import Sheet
+from origami_sim.diagnose import Options, Subject, diagnose, factor
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.materials import MU0
+from origami_sim.pattern.assemble import assemble
+from origami_sim.recording import read_recording
+from origami_sim.scene import scene_module, scene_settings
+
+RIGIDITY = 6e4
+"""Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.01 mm."""
+
+DIAGONAL_STIFFNESS = 0.2
+"""Of the diagonals of a panel, some 500 times that of a crease [N m/rad]."""
+
+
+def subject(folder: Path) -> Subject:
+    """The model that an experimenter would build from object.json, with what is known of its numbers.
+
+    An object is a scene with its settings [SI] and the standard deviations of some, or described panel by panel.
+    """
+    o = json.loads((folder / "object.json").read_text())
+    if "scene" in o:
+        module = scene_module(o["scene"])
+        return Subject.from_scene(module, scene_settings(module).replace(**o["settings"]), spreads=o["priors"])
+    return panels(o)
+
+
+def panels(o: dict) -> Subject:
+    """Rigid panels on linear, viscous creases.
+
+    Panels are kept straight by bars that stretch by less than a thousandth under the device's weight.
+    """
+    x, faces = np.array(o["vertices"]), o["faces"]
+    sheet = Sheet(
+        assemble(x, [tuple(f) for f in faces]),
+        thickness=o["thickness"],
+        density=o["density"],
+        modulus=1.5e6,
+        triangulation="center",
+    )
+    sheet.fix(panels=[o["held"]])
+    corners = [x[f] for f in faces]
+    area = sum(
+        np.linalg.norm(sum(np.cross(c[k] - c[0], c[k + 1] - c[0]) for k in range(1, len(c) - 1))) / 2
+        for p, c in enumerate(corners)
+        if p != o["held"]
+    )
+    weight = o["density"] * o["thickness"] * area * o["gravity"]
+    sheet.on("bars").set("bars", stiffness=RIGIDITY * weight)
+    sheet.set("panel_bending", stiffness=DIAGONAL_STIFFNESS)
+    for m in o["magnets"]:
+        sheet.magnetise(m["panel"], remanence=1.0, volume=m["moment"] * MU0, poling=m["poling"])
+    sheet.crease(range(len(o["creases"])), stiffness=0.0)
+    sheet.on("crease_viscosity")
+    sheet.gravity((0.0, 0.0, -o["gravity"]))
+    sheet.membrane_damping = 0.0
+    sheet.name("panel", [f"panel{p}" for p in range(len(faces))])
+    model, parameters = sheet.build()
+    middles = model.position[model.creases[:, 1:3]].mean(1)
+    names = [""] * len(middles)
+    for c in o["creases"]:
+        parent, child = (faces[p] for p in c["panels"])
+        middle = x[[v for v in child if v in parent]].mean(0)
+        n = int(np.argmin(np.linalg.norm(middles - middle, axis=1)))
+        names[n] = c["name"]
+        parameters.set("crease", "stiffness", c["stiffness"], np.array([n]))
+        parameters.set("crease_viscosity", "viscosity", c["viscosity"], np.array([n]))
+    model = replace(model, names={**model.names, "crease": tuple(names)})
+    return Subject.from_model(model, parameters, Drive(), [factor(n, s) for n, s in o["priors"].items()])
+
+
+def diagnose_case(folder: Path, device: str = "cpu") -> dict:
+    """Diagnoses the recordings of a case's folder and writes diagnosis.json there.
+
+    Raises:
+        InputError: a device that this diagnosis cannot use.
+    """
+    began = time.perf_counter()
+    recordings = [read_recording(p) for p in sorted(folder.glob("recording*.csv"))]
+    found = diagnose(subject(folder), recordings, options(device)).to_dict()
+    found["worked"] = telling(found["traces"])
+    for bulky in ("traces", "correlations", "isolability"):
+        found.pop(bulky, None)
+    for place in found["places"]:
+        for bulky in ("times", "moment", "error", "curves"):
+            place.pop(bulky, None)
+    found["wall"] = time.perf_counter() - began
+    found["rate"] = 1.0 / float(np.median(np.diff(recordings[0].times)))
+    write_json(folder / "diagnosis.json", found)
+    return found
+
+
+def telling(traces: list[dict]) -> dict | None:
+    """The trace on which the explanation gains most over the refitted model, in units of the noise."""
+
+    def gain(t: dict) -> float:
+        recorded, refitted, after = (np.array(t[k], float) for k in ("recorded", "refitted", "after"))
+        return float(np.nansum((recorded - refitted) ** 2 - (recorded - after) ** 2)) / t["noise"] ** 2
+
+    keys = ("recording", "component", "unit", "noise", "times", "recorded", "refitted", "after")
+    return {k: max(traces, key=gain)[k] for k in keys} if traces else None
+
+
+def options(device: str) -> Options:
+    """The options that ordinary users get, on a device."""
+    if "device" in {f.name for f in fields(Options)}:
+        return replace(Options(), **{"device": device})
+    if device != "cpu":
+        raise InputError("this diagnosis runs on the CPU only", field="--device", value=device, allowed="cpu")
+    return Options()
+
+
+def guard(event: str, arguments: tuple) -> None:
+    """Audit hook: the diagnosis never opens an answer."""
+    if event == "open" and Path(str(arguments[0])).parent.name == "sealed":
+        raise PermissionError("the diagnosis tried to open a sealed answer")
+
+
+def write_json(path: Path, value) -> None:
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(value, indent=1))
+    part.replace(path)

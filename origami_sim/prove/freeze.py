@@ -1,0 +1,88 @@
+"""What a run belongs to: thresholds of the diagnosis, and digests of its sources and of the truth."""
+
+import hashlib
+import importlib
+import json
+import pkgutil
+import subprocess
+from collections.abc import Iterable
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
+from origami_sim.errors import InputError
+
+PACKAGE = Path(__file__).resolve().parent.parent
+FROZEN = "frozen.json"
+
+
+def state(truth: Path) -> dict:
+    """Date, commit, digests of the diagnosis and of the truth, and every threshold by module.
+
+    Args:
+        truth: folder of the truth generator.
+    """
+    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts]
+    case = PACKAGE / "prove" / "case.py"
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "commit": _git("rev-parse", "HEAD"),
+        "changed": bool(_git("status", "--porcelain", "--", str(PACKAGE), str(truth))),
+        "diagnosis": digest([*own, case]),
+        "truth": digest(truth.glob("*.py")),
+        "thresholds": thresholds(),
+    }
+
+
+def digest(files: Iterable[Path]) -> str:
+    """SHA-256 of files' names and contents, in the order of their paths."""
+    out = hashlib.sha256()
+    for file in sorted(files):
+        content = file.read_bytes()
+        out.update(f"{file.name} {len(content)}\n".encode())
+        out.update(content)
+    return out.hexdigest()
+
+
+def thresholds() -> dict[str, dict[str, float]]:
+    """The numbers in capitals of every module of the diagnosis, and its default options."""
+    import origami_sim.diagnose as package
+    from origami_sim.diagnose import Options
+
+    out: dict = {"options": asdict(Options())}
+    for info in pkgutil.iter_modules(package.__path__):
+        module = importlib.import_module(f"{package.__name__}.{info.name}")
+        mine = {n: v for n, v in vars(module).items() if n.isupper() and isinstance(v, (int, float))}
+        out |= {info.name: mine} if mine else {}
+    return out
+
+
+def freeze(out: Path, truth: Path, *, sealed: bool) -> dict:
+    """Writes frozen.json when a run begins, and looks whether anything changed when it goes on.
+
+    Raises:
+        InputError: a sealed run that goes on with another diagnosis or another truth than it began with.
+    """
+    now, file = state(truth), out / FROZEN
+    if not file.exists():
+        file.write_text(json.dumps(now, indent=1))
+        return now
+    then = json.loads(file.read_text())
+    for what in ("diagnosis", "truth"):
+        if sealed and now[what] != then[what]:
+            raise InputError(
+                f"a sealed run goes on with the {what} that it began with",
+                file=file,
+                field=what,
+                value=now[what][:12],
+                allowed=then[what][:12],
+            )
+    return then
+
+
+def _git(*command: str) -> str:
+    try:
+        ran = subprocess.run(["git", *command], cwd=PACKAGE, capture_output=True, text=True, timeout=20)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return ran.stdout.strip() if ran.returncode == 0 else ""

@@ -1,0 +1,94 @@
+"""Markers in a picture: what the diagnosis reads of them, and a camera that stands too near."""
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose import diagnose
+from origami_sim.diagnose.articulation import Articulation
+from origami_sim.diagnose.forward import Forward
+from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.refit import Weights, fit
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.model import State
+from origami_sim.observe import body_point, observe
+from origami_sim.recording import Camera, Channel, Recording
+from origami_sim.solve.dynamics import simulate
+from tests.diagnose.strips import hanging, subject
+
+NEAR, NOISE = 0.3, 5e-5
+SIDE = Camera(np.array([0.0, 0.015, -0.05]), np.array([[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]))
+"""It sees the strip, which swings along x, from between front and side: folds come towards it, and their sign shows."""
+
+
+def swing(*, distance: float = np.inf, duration: float = 3.0, noise: float = NOISE) -> tuple[Recording, object]:
+    """A strip of three panels as a pinhole camera at a distance sees two corners of each moving panel."""
+    model, parameters = hanging(3)
+    arm, rng = Articulation(model), np.random.default_rng(0)
+    state = State.at_rest(model, position=arm.positions(arm.moved(arm.reference(), np.array([[0.8], [-0.5]])))[:, 0])
+    motion = simulate(model, parameters, Drive(), duration=duration, rate=100, state=state)
+    channels = {}
+    for n, (panel, side) in enumerate([(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)]):
+        attached = {"panel": panel, "point": [0.0, 0.012 * side, 0.0]}
+        name = f"m{n}"
+        channel = Channel(name, "marker_2d", np.zeros((len(motion.times), 2)), "m", noise, attached, SIDE)
+        x, y, z = (body_point(model, motion.x[:, :, 0], channel) - SIDE.origin).T
+        away = distance - (0.8 * x - 0.6 * y)
+        larger = 1.0 if distance == np.inf else distance / away
+        seen = np.stack([0.6 * x + 0.8 * y, z], axis=1) * np.reshape(larger, (-1, 1))
+        seen += noise * rng.normal(size=seen.shape)
+        channels[name] = Channel(name, "marker_2d", seen, "m", noise, attached, SIDE)
+    return Recording("picture", motion.times, channels), motion
+
+
+def near(forward: Forward) -> Hypothesis:
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    return Hypothesis((next(s for s in every if s.label == "perspective at the measurement"),))
+
+
+@pytest.mark.parametrize("distance", [np.inf, NEAR])
+def test_pictures_are_predicted_with_and_without_perspective(distance):
+    """Against a pinhole camera, with the start fitted; what is left is how panels bend in the first frames."""
+    recording, _ = swing(distance=distance, duration=0.4, noise=1e-7)
+    forward = Forward(subject(3), [recording], start="fit")
+    nominal = [f.start for f in forward.subject.nominals]
+    weights = Weights(np.full(8, 1e-5))
+    theta = np.array([*nominal, 1 / distance, 0.0, 0.0])
+    known = fit(forward, near(forward), weights, theta=theta, fixed=True)
+    assert known.residuals[0].shape == (41, 8) and len(forward.components) == 8
+    left = np.sqrt(np.nanmean(known.residuals[0] ** 2))
+    assert left < 3e-5
+    if distance == NEAR:
+        without = fit(forward, Hypothesis(), weights, theta=np.array(nominal), fixed=True)
+        assert np.sqrt(np.nanmean(without.residuals[0] ** 2)) > 10 * left
+
+
+def test_a_run_is_observed_through_a_near_camera():
+    recording, motion = swing(distance=NEAR, duration=0.4, noise=1e-9)
+    model = motion.model.with_effects("perspective")
+    motion.model, parameters = model, motion.parameters.for_model(model)
+    parameters.set("perspective", "nearness", 1 / NEAR)
+    motion.parameters = parameters
+    for name, values in observe(motion, recording).items():
+        np.testing.assert_allclose(values, recording.channels[name].values, atol=1e-8)
+
+
+def test_perspective_is_suspected_of_pictures_only():
+    recording, _ = swing(duration=0.4)
+    forward = Forward(subject(3), [recording], start="fit")
+    sites = [s.site for s in suspects(forward.model, [recording], forward.drive) if s.effect == "perspective"]
+    assert sites == ["the measurement", *(f"channel m{n}" for n in range(4))]
+    assert get("perspective").channels == ("marker_2d",)
+    angle = Channel("fold", "crease_angle", np.zeros(41), "rad", 1e-3, {"crease": 0})
+    folds = Recording("folds", recording.times, {"fold": angle})
+    assert "perspective" not in {s.effect for s in suspects(forward.model, [folds], forward.drive)}
+
+
+@pytest.mark.slow
+def test_a_camera_that_is_too_near_is_named_with_its_distance():
+    recording, _ = swing(distance=NEAR)
+    catalogue = ("perspective", "length_scale", "camera_tilt", "crease_friction", "crease_stiffening")
+    found = diagnose(subject(3), [recording], catalogue=catalogue)
+    assert found.verdict == "MEASUREMENT" and found.chosen[0].startswith("perspective")
+    number = next(n for n in found.candidates[0].numbers if n.label == "perspective.nearness")
+    assert 1 / number.value == pytest.approx(NEAR, rel=0.1)
