@@ -33,7 +33,6 @@ def register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, help=f"from {DEVELOPMENT} on: a sealed run (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time on this machine (default 1)")
     parser.add_argument("--cluster", metavar="WHERE", help="dask: local, local:WORKERS, or a scheduler's address")
-    parser.add_argument("--device", default="cpu", help="of the diagnosis: cpu, cuda:0, or cuda:0,cuda:1 in turn")
     parser.add_argument("--structures", nargs="+", default=[], choices=STRUCTURES, help="only these (default all)")
     parser.add_argument("--kinds", nargs="+", default=[], choices=KINDS, help="only these (default all)")
     parser.add_argument("--follow", action="store_true", help="make the experiment that a tie proposes, and look again")
@@ -74,7 +73,6 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             jobs=args.jobs,
             cluster=args.cluster,
-            device=args.device,
             structures=args.structures,
             kinds=args.kinds,
             follow=args.follow,

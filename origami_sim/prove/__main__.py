@@ -1,4 +1,4 @@
-"""python -m origami_sim.prove CASE_FOLDER [--device cpu]: the diagnosis of one case."""
+"""python -m origami_sim.prove CASE_FOLDER: the diagnosis of one case."""
 
 import argparse
 import sys
@@ -9,7 +9,6 @@ from origami_sim.prove.case import diagnose_case, guard
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--device", default="cpu")
     args = parser.parse_args()
     sys.addaudithook(guard)
-    diagnose_case(args.folder, args.device)
+    diagnose_case(args.folder)

@@ -1,4 +1,4 @@
-"""Drawing and diagnosing many cases: on this machine, on several devices, or on a Dask cluster."""
+"""Drawing and diagnosing many cases: on this machine or on a Dask cluster."""
 
 import hashlib
 import json
@@ -54,7 +54,6 @@ def prove(
     seed: int,
     jobs: int = 1,
     cluster: str | None = None,
-    device: str = "cpu",
     structures: Sequence[str] = (),
     kinds: Sequence[str] = (),
     follow: bool = False,
@@ -67,7 +66,7 @@ def prove(
     Args:
         out: folder of the run: cases/, sealed/, frozen.json, scoreboard.json, scoreboard.txt and figures.
         cases, seed: how many, and which. structures, kinds: only these (default: all).
-        jobs: cases at a time. cluster: dask instead, see `workers`. device: of the diagnosis; several in turn.
+        jobs: cases at a time. cluster: dask instead, see `workers`.
         follow: make the experiment that a tie proposes, and diagnose again with it.
         nearest: find out which other effect is hardest to tell from a single one. draw_only: no diagnosis.
 
@@ -87,14 +86,11 @@ def prove(
         raise InputError("the folder holds another run", field="--out", value=str(out), allowed="a folder of its own")
     write_json(stored, choice)
     sealed = seed >= DEVELOPMENT
-    frozen = freeze(out, generator().parent, sealed=sealed)
+    frozen = freeze(out, generator().parent, sealed=sealed, drawing=draw_only)
     say(f"{'sealed' if sealed else 'development'} run: seed {seed}, {cases} cases, in {out}")
-    say(f"diagnosis {frozen['diagnosis'][:12]} of {frozen['date']}")
-    devices = device.split(",")
-    works = [
-        Work(n, str(out.resolve()), json.dumps(choice), devices[n % len(devices)], follow, nearest, draw_only)
-        for n in range(cases)
-    ]
+    if not draw_only:
+        say(f"diagnosis {frozen['diagnosis'][:12]} of {frozen['date']}")
+    works = [Work(n, str(out.resolve()), json.dumps(choice), follow, nearest, draw_only) for n in range(cases)]
     missing = any(not (out / "cases" / f"{n:04d}" / "answer.sha256").exists() for n in range(cases))
     if (missing or follow or nearest) and find_spec("mujoco") is None:
         raise InputError("drawing needs MuJoCo: pip install 'origami-sim[proof]'", field="mujoco", value="absent")
@@ -115,7 +111,6 @@ class Work:
     index: int
     out: str
     choice: str
-    device: str
     follow: bool
     nearest: bool
     draw_only: bool
@@ -132,14 +127,14 @@ def do(work: Work) -> str:
         compared(answer)
     if work.draw_only:
         return f"case {work.index}: drawn"
-    found = diagnosed(folder, work.device)
+    found = diagnosed(folder)
     told = found.get("failed") or f"{found['verdict']} {', '.join(found['chosen'])}"
     if (folder / SEPARATING).exists():
-        told += f"; with another experiment {_said(diagnosed(folder / SEPARATING, work.device))}"
+        told += f"; with another experiment {_said(diagnosed(folder / SEPARATING))}"
     if work.follow and found.get("verdict") == "TIE":
         made = followed(folder, answer, found)
         if made:
-            told += f"; after '{made}' {_said(diagnosed(folder / SUGGESTED, work.device))}"
+            told += f"; after '{made}' {_said(diagnosed(folder / SUGGESTED))}"
     return f"case {work.index}: {told} (p = {found.get('probability') or 0:.2f})"
 
 
@@ -176,11 +171,11 @@ def compared(answer: Path) -> None:
         raise InputError(f"the truth generator failed ({ran})", field="answer", value=answer.name)
 
 
-def diagnosed(folder: Path, device: str) -> dict:
+def diagnosed(folder: Path) -> dict:
     """The diagnosis of a case, in a process of its own; a failure is a result too."""
     result = folder / "diagnosis.json"
     if not result.exists():
-        ran = _run([sys.executable, "-m", "origami_sim.prove", str(folder), "--device", device])
+        ran = _run([sys.executable, "-m", "origami_sim.prove", str(folder)])
         if isinstance(ran, str):
             write_json(result, {"failed": ran})
     return json.loads(result.read_text())

@@ -2,7 +2,7 @@
 
 import json
 import time
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject, diagnose, factor
 from origami_sim.drive import Drive
-from origami_sim.errors import InputError
 from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import read_recording
@@ -79,15 +78,11 @@ def panels(o: dict) -> Subject:
     return Subject.from_model(model, parameters, Drive(), [factor(n, s) for n, s in o["priors"].items()])
 
 
-def diagnose_case(folder: Path, device: str = "cpu") -> dict:
-    """Diagnoses the recordings of a case's folder and writes diagnosis.json there.
-
-    Raises:
-        InputError: a device that this diagnosis cannot use.
-    """
+def diagnose_case(folder: Path) -> dict:
+    """Diagnoses the recordings of a case's folder and writes diagnosis.json there."""
     began = time.perf_counter()
     recordings = [read_recording(p) for p in sorted(folder.glob("recording*.csv"))]
-    found = diagnose(subject(folder), recordings, options(device)).to_dict()
+    found = diagnose(subject(folder), recordings, Options(threads=1)).to_dict()
     found["worked"] = telling(found["traces"])
     for bulky in ("traces", "correlations", "isolability"):
         found.pop(bulky, None)
@@ -109,15 +104,6 @@ def telling(traces: list[dict]) -> dict | None:
 
     keys = ("recording", "component", "unit", "noise", "times", "recorded", "refitted", "after")
     return {k: max(traces, key=gain)[k] for k in keys} if traces else None
-
-
-def options(device: str) -> Options:
-    """The options that ordinary users get, on a device."""
-    if "device" in {f.name for f in fields(Options)}:
-        return replace(Options(), **{"device": device})
-    if device != "cpu":
-        raise InputError("this diagnosis runs on the CPU only", field="--device", value=device, allowed="cpu")
-    return Options()
 
 
 def guard(event: str, arguments: tuple) -> None:

@@ -57,19 +57,19 @@ def thresholds() -> dict[str, dict[str, float]]:
     return out
 
 
-def freeze(out: Path, truth: Path, *, sealed: bool) -> dict:
+def freeze(out: Path, truth: Path, *, sealed: bool, drawing: bool = False) -> dict:
     """Writes frozen.json when a run begins, and looks whether anything changed when it goes on.
+
+    Args:
+        drawing: nothing is diagnosed yet, so that only the truth is held.
 
     Raises:
         InputError: a sealed run that goes on with another diagnosis or another truth than it began with.
     """
     now, file = state(truth), out / FROZEN
-    if not file.exists():
-        file.write_text(json.dumps(now, indent=1))
-        return now
-    then = json.loads(file.read_text())
+    then = json.loads(file.read_text()) if file.exists() else {}
     for what in ("diagnosis", "truth"):
-        if sealed and now[what] != then[what]:
+        if sealed and what in then and not (drawing and what == "diagnosis") and now[what] != then[what]:
             raise InputError(
                 f"a sealed run goes on with the {what} that it began with",
                 file=file,
@@ -77,7 +77,12 @@ def freeze(out: Path, truth: Path, *, sealed: bool) -> dict:
                 value=now[what][:12],
                 allowed=then[what][:12],
             )
-    return then
+    if "diagnosis" in then:
+        return then
+    if drawing:
+        now = {k: v for k, v in now.items() if k not in ("diagnosis", "thresholds")}
+    file.write_text(json.dumps(now, indent=1))
+    return now
 
 
 def _git(*command: str) -> str:
