@@ -76,7 +76,7 @@ def test_frames_between_those_of_the_run_are_interpolated(motion):
         (channel("panel_angle", [0.0, 0.0], panel=9), r"nothing of that name.*9"),
         (channel("crease_angle", [0.0, 0.0], crease=5), r"nothing of that name.*crease.*5.*0 to 1"),
         (channel("marker", np.zeros((2, 3)), unit="m", node=999), r"nothing of that name.*node.*999"),
-        (channel("marker", np.zeros((2, 3)), unit="m"), r"nothing of that name"),
+        (channel("marker", np.zeros((2, 3)), unit="m"), r"a marker needs a node.*channels\.c\.node"),
     ],
 )
 def test_channels_that_the_model_lacks(motion, given, words):

@@ -8,6 +8,7 @@ import numpy as np
 
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.baselines import baselines
+from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.compare import (
     Score,
     difference,
@@ -23,6 +24,7 @@ from origami_sim.diagnose.forward import Forward, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import Fit, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen
@@ -109,6 +111,7 @@ def diagnose(
     forward = arranged(subject, recordings, o)
     if keep is not None:
         keep.follow(forward)
+    loop, unseen = closed_loop(recordings), [n for n in [unobserved(forward)] if n]
     tell("nominal", 0.0)
     given, base, weights, free_start = nominal_fits(forward)
     lap("nominal")
@@ -129,9 +132,11 @@ def diagnose(
         tell("refit", n / max(len(finalists), 1))
         fits.append(refit(forward, base, s, weights, screening))
     fits += pairs(forward, base, screening, fits, weights, o)
-    screening, fits, weights = settled(forward, screening, fits, weights)
-    fits += twins(forward, screening, fits, weights)
-    p_value = look_elsewhere(screening, o.draws, o.seed)  # with weights that do not count the effect itself as noise
+    rough = screening
+    screening, fits, weights = settled(forward, rough, fits, weights)
+    fits += twins(forward, rough, screening, fits, weights)
+    # with weights that do not count the effect itself as noise
+    p_value = look_elsewhere(screening, o.draws, o.seed, fits)
     lap("refit")
     tell("combine", 0.0)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
@@ -143,6 +148,8 @@ def diagnose(
     tell("verdict", 0.0)
     given = fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=4)
     judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, o)
+    if loop is not None:
+        judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
@@ -175,7 +182,9 @@ def diagnose(
         error_before=_rms(given).tolist(),
         error_refitted=scores[id(base)].rms.tolist(),
         error_after=after.rms.tolist(),
-        notes=judged.notes + [n for r in recordings for n in r.metadata.get("notes", [])],
+        notes=judged.notes
+        + ([unseen] if unseen else [])
+        + [n for r in recordings for n in r.metadata.get("notes", [])],
         settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
         seconds=seconds,
         patch=patch(best),
@@ -330,8 +339,13 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
     return given.reweighted(first, w), replace(base, linear=line), w, Weights(noise, 1.0)
 
 
-def look_elsewhere(screening: Screening, draws: int, seed: int) -> float:
-    """Chance that noise alone gives any suspect so high a score: draws of white residuals, the same projection."""
+def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[Fit] = ()) -> float:
+    """Chance that noise alone gives any suspect so high a score: draws of white residuals, the same projection.
+
+    Args:
+        fits: the model without an effect, then those with one; what they gain counts if it is more than the screening
+            saw, which knows small effects only.
+    """
     if not screening.signatures:
         return 1.0
     shapes = np.stack([s.shape for s in screening.signatures])
@@ -342,6 +356,10 @@ def look_elsewhere(screening: Screening, draws: int, seed: int) -> float:
     draws_ = rng.normal(size=(draws, len(value))) * np.sqrt(np.maximum(value, 0.0)) @ vector.T
     highest = np.abs(draws_).max(axis=1)
     found = max(abs(s.score) for s in screening.signatures)
+    for f in fits[1:]:
+        if not f.failed and len(f.hypothesis.suspects) == 1:
+            gain = fits[0].cost - f.cost - 2.0 * (len(f.hypothesis.free) - 1)
+            found = max(found, np.sqrt(max(gain, 0.0)))
     return float((1 + np.count_nonzero(highest >= found)) / (draws + 1))
 
 
@@ -366,16 +384,22 @@ def chosen(screening: Screening, most: int) -> list[Signature]:
     return out
 
 
-def twins(forward: Forward, screening: Screening, fits: Sequence[Fit], weights: Weights) -> list[Fit]:
-    """The single suspects that look the same as the best of those that were fitted, fitted as well."""
+def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequence[Fit], weights: Weights) -> list[Fit]:
+    """The single suspects that looked the same as the best of those that were fitted, fitted as well.
+
+    Args:
+        rough: the screening by which fits were chosen, whose weights may have hidden differences. screening: the same
+            with the present weights.
+    """
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     best = leader(fits, scores)
     if best is None or len(best.hypothesis.suspects) != 1:
         return []
     done = {f.hypothesis.label for f in fits}
-    mine = next(s for s in screening.signatures if s.suspect.label == best.hypothesis.label)
-    same = [s for s in screening.signatures if s.suspect.label not in done and s.score and alike(s, mine)]
-    return [refit(forward, fits[0], s, weights, screening) for s in same[:TWINS]]
+    mine = next(s for s in rough.signatures if s.suspect.label == best.hypothesis.label)
+    same = {s.suspect.label for s in rough.signatures if s.score and alike(s, mine)} - done
+    again = [s for s in screening.signatures if s.suspect.label in same]
+    return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
 CONTENDERS = 5

@@ -16,7 +16,7 @@ from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.observe import _index
+from origami_sim.observe import body_point
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import gradient_norms, stable_step
@@ -149,16 +149,16 @@ class Forward:
         From there the pose is found in small turns, however far the device has turned.
         """
         pose, row = self.articulation.reference(), 0
-        nodes, places = [], []
+        points, places = [], []
         for channel in recording.channels.values():
             width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
             if channel.kind == "marker" and np.all(np.isfinite(level[row : row + width])):
-                nodes.append(_index(self.model, channel, "node", len(self.model.position)))
+                points.append(body_point(self.model, self.model.position[None], channel)[0])
                 places.append(level[row : row + width])
             row += width
-        if not self.articulation.floating or len(nodes) < 3:
+        if not self.articulation.floating or len(points) < 3:
             return pose
-        here, there = self.model.position[nodes], np.array(places)
+        here, there = np.array(points), np.array(places)
         turn = Rotation.align_vectors(there - there.mean(0), here - here.mean(0))[0].as_matrix()
         centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
         return Pose(turn[None], centre[None], pose.angles)

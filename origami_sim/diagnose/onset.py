@@ -275,9 +275,10 @@ def bend(earlier: Sequence[Stretch], s: Stretch, stop: int) -> tuple[float, floa
     mean, root = _learnt(earlier, s.numbers.shape[2])
     y = (s.left - s.numbers @ mean)[seen]
     explained = _Explained(np.concatenate([(s.numbers @ root)[seen], VAGUE * s.start[seen]], axis=1))
+    losses = SHARPER if s.start.shape[2] else (0.0, 0.0, 0.0)
     total, trials = float(explained.rest(y, y)), []
     for k in range(2, len(s.times) - 1):
-        for lost, columns in zip(SHARPER, _responses(s, k), strict=True):
+        for lost, columns in zip(losses, _responses(s, k), strict=True):
             c = columns[seen]
             square, along = explained.rest(c, c), explained.rest(c, y)
             size = np.sqrt(np.maximum(np.diag(square), 0.0))

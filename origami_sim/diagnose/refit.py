@@ -21,7 +21,7 @@ SLOWEST = 2.5
 """How many times smaller than at the beginning the solver's step may become at a trial."""
 
 FAINT = 1e-3
-"""Changes of a start that show so much less than others are left alone: a rate that is damped at once may be anything."""
+"""Changes of a start that show so much less than others are left alone: a rate that dies at once may be anything."""
 
 DONE = 3e-3
 """A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
@@ -106,8 +106,9 @@ class Linearisation:
     def of(cls, residual: list[np.ndarray], tangent: list[np.ndarray], slopes: list[np.ndarray]) -> "Linearisation":
         basis, starts = [], []
         for s in slopes:
-            u, sv, vt = np.linalg.svd(s, full_matrices=False)
-            good = sv > FAINT * sv.max(initial=1e-300)
+            # of a start whose simulation fails nothing is known
+            u, sv, vt = np.linalg.svd(s if np.all(np.isfinite(s)) else np.zeros_like(s), full_matrices=False)
+            good = sv > max(FAINT * sv.max(initial=0.0), 1e-300)
             basis.append(u[:, good])
             starts.append(vt[good].T / sv[good])
         return cls(residual, tangent, slopes, basis, starts)
@@ -259,10 +260,7 @@ def fit(
     free = (*forward.subject.nominals, *hypothesis.free)
     theta = np.array([f.start for f in free] if theta is None else theta, float)
     local = np.zeros((len(forward.blocks), forward.local)) if local is None else local.copy()
-    lower = np.array([f.lower for f in free])
-    upper = np.array([f.upper for f in free])
-    scale = np.array([f.scale for f in free])
-    prior = _precision(free)
+    lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = 0 if fixed else len(free)
 
     def derived(theta, local, near: Linearisation | None) -> Linearisation:
@@ -282,26 +280,7 @@ def fit(
         assert theta is not None and local is not None
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
-        change = np.zeros(len(free))
-        if width:
-            rows = [line.clear(n, line.tangent[n]) for n in range(len(blocks))]
-            right = [line.clear(n, line.residual[n]) for n in range(len(blocks))]
-            wanted = np.array([f.start for f in free])
-            a = np.concatenate([*rows, np.diag(prior)])
-            y = np.concatenate([*right, prior * (wanted - theta) / scale])
-            low, high = (lower - theta) / scale, (upper - theta) / scale
-            norms = np.linalg.norm(a, axis=0)
-            a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
-            y = np.concatenate([y, np.zeros(len(free))])
-            r_, q_ = _compressed(a, y)
-            found = lsq_linear(r_, q_, (np.minimum(low, -1e-12), np.maximum(high, 1e-12)))
-            change = np.asarray(found.x, float)
-        moves, promised = np.zeros_like(local), penalty(free, theta + change * scale)
-        for i, b in enumerate(blocks):
-            left = line.residual[i] - line.tangent[i] @ change[:width]
-            moves[b] = line.starts[i] @ (line.basis[i].T @ left) if forward.local else 0.0
-            rest = line.clear(i, left)
-            promised += float(rest @ rest)
+        change, moves, promised = _proposed(forward, free, theta, local, blocks, line)
         enough = max(LITTLE, done * (best - floor))
         if best - promised < enough and (own or not width):
             break
@@ -333,15 +312,35 @@ def fit(
     return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
 
 
+def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple[np.ndarray, np.ndarray, float]:
+    """A Gauss-Newton step within the bounds: of theta / scale (P,), of the starts [B, L], and the cost it promises."""
+    lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
+    width = line.tangent[0].shape[1]
+    change = np.zeros(len(free))
+    if width:
+        prior = _precision(free)
+        rows = [line.clear(n, t) for n, t in enumerate(line.tangent)]
+        right = [line.clear(n, r) for n, r in enumerate(line.residual)]
+        a = np.concatenate([*rows, np.diag(prior)])
+        y = np.concatenate([*right, prior * (np.array([f.start for f in free]) - theta) / scale])
+        norms = np.linalg.norm(a, axis=0)
+        a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
+        y = np.concatenate([y, np.zeros(len(free))])
+        q, r = np.linalg.qr(a)  # a small system with the same least squares
+        low, high = (lower - theta) / scale, (upper - theta) / scale
+        change = np.asarray(lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, float)
+    moves, promised = np.zeros_like(local), penalty(free, theta + change * scale)
+    for n, b in enumerate(blocks):
+        left = line.residual[n] - line.tangent[n] @ change[:width]
+        moves[b] = line.starts[n] @ (line.basis[n].T @ left) if forward.local else 0.0
+        rest = line.clear(n, left)
+        promised += float(rest @ rest)
+    return change, moves, promised
+
+
 def _precision(free: Sequence[Free]) -> np.ndarray:
     """(P,) scales over the standard deviations of what was known before."""
     return np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
-
-
-def _compressed(a: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A small system with the same least squares."""
-    q, r = np.linalg.qr(a)
-    return r, q.T @ y
 
 
 def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) -> Fit:

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from origami_sim.diagnose.compare import Score, Weights, difference, probabilities, reproducible, supported
+from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.effects import get
@@ -17,6 +18,10 @@ FLOOR = 1.3
 
 REMOVED = 0.6
 """Part of the slow structure of the residual that named physics must remove; with less it is UNKNOWN."""
+
+
+STRAINED = 3.0
+"""Standard deviations from what was known that no number of a named explanation may be."""
 
 
 @dataclass
@@ -55,12 +60,12 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
     over = float(np.max(rms_base / sigma))
     left = float(np.max(rms_best / sigma))
     removed = removable(rms_base, rms_best, sigma)
-    onset = departure(forward, base, sigma)
+    begins = onset(forward, base, sigma, weights=weights).time
     others = [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)]
 
     def result(verdict, sentence, probability, chosen, fit=best, tied=()):
         return Judgement(
-            verdict, sentence, float(probability), list(chosen), fit, list(tied), removed, left, onset, notes, others
+            verdict, sentence, float(probability), list(chosen), fit, list(tied), removed, left, begins, notes, others
         )
 
     kept, total = credible(rows, p, order, scores)
@@ -93,8 +98,10 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             [],
             base,
         )
-    same = [f for f in rows if _effects(f) == _effects(best)]
+    # the same effects elsewhere, or with another that is not proven
+    same = [f for f in rows if _effects(f) == _effects(best) or _labels(f) > _labels(best)]
     mechanism_p = float(sum(p[rows.index(f)] for f in same))
+    kept = [f for f in kept if f is best or not _labels(f) > _labels(best)]
     fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
     if over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
@@ -107,6 +114,15 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             "UNKNOWN",
             f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, removes only "
             f"{max(removed, 0.0):.0%} of the removable error; {fall}.",
+            mechanism_p,
+            [best.hypothesis.label],
+        )
+    strain, number = _strain(best)
+    if strain > STRAINED:
+        return result(
+            "UNKNOWN",
+            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, needs {number} "
+            f"{strain:.1f} standard deviations from what is known of it; {fall}.",
             mechanism_p,
             [best.hypothesis.label],
         )
@@ -187,11 +203,18 @@ def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, res
             f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
             f"{said(f.start, f.unit)} to {said(t, f.unit)}, "
             f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; "
-            f"what is left is {over:.1f} times the noise."
+            f"held-out error is then {over:.2f} times the noise."
         )
         return result("PARAMETER", text, probability, [f.label for (f, t), s in far if abs(t - f.start) > s], base)
-    return result(
-        "ADEQUATE", f"The model is adequate: what is left is {over:.2f} times the noise.", probability, [], base
+    return result("ADEQUATE", _adequate(over), probability, [], base)
+
+
+def _adequate(over: float) -> str:
+    if over <= FLOOR:
+        return f"The model is adequate: held-out error is {over:.2f} times the noise."
+    return (
+        f"Nothing is found that the model lacks, although its held-out error is {over:.1f} times the noise: what is "
+        "left has no structure, as if the measurement were noisier than stated."
     )
 
 
@@ -217,35 +240,26 @@ WINDOW = 10
 def structure(f: Fit, reference: Fit) -> tuple[float, float]:
     """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
 
-    Squares of window means in units of what white noise would give, less one each, summed. The white noise is that of
-    the reference's fast residual (second differences), so that a noise level that was stated wrongly does not matter.
+    Squares of window means in units of what white noise would give, less one each, summed; short segments are one
+    window. The white noise is that of the reference's fast residual (second differences), so that a noise level that
+    was stated wrongly does not matter.
     """
     total, count = 0.0, 0
     fast = np.concatenate([np.diff(r, n=2, axis=0) for r in reference.residuals])
     white = np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
     for r in f.residuals:
-        n = len(r) // WINDOW
+        seen = r[np.any(np.isfinite(r), axis=1)]
+        wide = min(WINDOW, len(seen))
+        n = len(seen) // wide if wide else 0
         if not n:
             continue
-        means = np.mean(r[: n * WINDOW].reshape(n, WINDOW, -1), axis=1) / (white / np.sqrt(WINDOW))
+        parts = seen[: n * wide].reshape(n, wide, -1)
+        known = np.isfinite(parts).sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means = np.nansum(parts, axis=1) / np.sqrt(known) / white
         total += float(np.nansum(means**2 - 1.0))
         count += int(np.isfinite(means).sum())
     return total, float(np.sqrt(2.0 * max(count, 1)))
-
-
-def departure(forward, f: Fit, sigma: np.ndarray) -> float:
-    """First time at which five values in a row are beyond five standard deviations of the noise; nan: never."""
-    first = np.nan
-    for n, b in enumerate(f.blocks):
-        block = forward.blocks[b]
-        far = np.abs(f.residuals[n]) > 5.0 * sigma
-        for d in range(far.shape[1]):
-            run = np.convolve(far[:, d], np.ones(5), "valid")
-            hits = np.flatnonzero(run >= 5)
-            if len(hits):
-                t = forward.recordings[block.recording].times[block.first] + block.times[hits[0]]
-                first = t if np.isnan(first) else min(first, t)
-    return float(first)
 
 
 def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:
@@ -290,8 +304,19 @@ def _notes(forward, rows: Sequence[Fit], screening: Screening, sigma) -> list[st
     return notes
 
 
+def _strain(f: Fit) -> tuple[float, str]:
+    """The largest departure of a number from what was known of it, in standard deviations, and its name."""
+    return max(
+        ((abs(t - n.start) / n.spread, n.label) for n, t in zip(f.free, f.theta, strict=True)), default=(0.0, "")
+    )
+
+
 def _effects(f: Fit) -> tuple[str, ...]:
     return tuple(sorted(s.effect for s in f.hypothesis.suspects))
+
+
+def _labels(f: Fit) -> set[str]:
+    return {s.label for s in f.hypothesis.suspects}
 
 
 def _distinct(fits: Sequence[Fit]) -> list[str]:

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options
+from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared
 from origami_sim.diagnose.onset import Onset, Stretch, bend, crossing, innovations, onset, scatter, threshold
 from origami_sim.drive import Drive
 from origami_sim.model import State
 from origami_sim.recording import Channel, Recording
+from origami_sim.recording.recording import DriveChannel
+from origami_sim.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, record, subject
 
@@ -171,6 +173,24 @@ def test_what_sets_in_abruptly_is_dated_to_two_frames(which):
 def test_nothing_sets_in_where_nothing_is_missing():
     found = dated(record(factors={("crease", "stiffness"): 1.06}, **SMALL))
     assert np.isnan(found.time) and found.recording == -1
+
+
+def test_a_crease_that_gives_way_on_a_curve_is_dated_to_a_step():
+    """Load steps, a moment that falls by ten deviations from step 41 on; and the same curve without."""
+    q = np.linspace(1.8, -1.5, 72)
+    for fall, step in ((1e-4, 41), (0.0, np.nan)):
+        moment = 2e-3 * (q - 0.3) - np.where(np.arange(72) >= 41, fall, 0.0)
+        moment += 1e-5 * np.random.default_rng(0).normal(size=72)
+        channels = {"moment": Channel("moment", "moment", moment, "N m", 1e-5, {"crease": 0})}
+        path = {"crease_angle": DriveChannel("crease_angle", q, "rad", False)}
+        made = Recording("curve", np.arange(72.0), channels, path, {"time_base": "step"})
+        module = scene_module("crease_coupon")
+        settings = scene_settings(module).replace(stiffness=2e-3, rest_angle=0.3)
+        coupon = Subject.from_scene(module, settings, spreads={"stiffness": 4e-4, "rest_angle": 0.02})
+        forward = arranged(coupon, prepared([made], 200.0), Options())
+        _, base, weights, noise = nominal_fits(forward)
+        found = onset(forward, base, noise.deviation, weights=weights)
+        assert found.time == pytest.approx(step, abs=1.01, nan_ok=True)
 
 
 @pytest.mark.slow

@@ -89,7 +89,7 @@ def test_replicates_are_told_and_copies_refused(folder):
         (lambda s: s.replace("tip_displacement", "force").replace('"mm"', '"N"'), "another kind"),
         (
             lambda s: s.replace('"mT"', '"kV"').replace("direction = [0.0, 0.0, 1.0]\n", ""),
-            "drive 'field' has another unit",
+            "unknown unit of flux density .*'kV'",
         ),
         (lambda s: s.replace('"arch"', '"box"'), "name different scenes"),
         (lambda s: s.replace('[time]\ncolumn = "t"\n', ""), "mix load steps and times"),
@@ -98,6 +98,14 @@ def test_replicates_are_told_and_copies_refused(folder):
 def test_recordings_of_different_objects_are_refused(folder, change, words):
     (folder / "weak.toml").write_text(change(SIDECAR))
     with pytest.raises(InputError, match=words):
+        read_dataset([folder / "strong.csv", folder / "weak.csv"])
+
+
+def test_a_drive_that_only_the_scene_knows_has_one_unit(folder):
+    supply = SIDECAR.replace("[drive.field]", "[drive.supply]").replace("direction = [0.0, 0.0, 1.0]\n", "")
+    for name, unit in (("strong", '"mA"'), ("weak", '"V"')):
+        (folder / f"{name}.toml").write_text(supply.replace('"mT"', unit))
+    with pytest.raises(InputError, match="drive 'supply' has another unit"):
         read_dataset([folder / "strong.csv", folder / "weak.csv"])
 
 
