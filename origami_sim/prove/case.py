@@ -18,8 +18,8 @@ from origami_sim.scene import scene_module, scene_settings
 RIGIDITY = 6e4
 """Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.01 mm."""
 
-DIAGONAL_STIFFNESS = 0.2
-"""Of the diagonals of a panel, some 500 times that of a crease [N m/rad]."""
+DIAGONAL_STIFFNESS = 1.0
+"""Of the diagonals of a panel, some 2500 times that of a crease [N m/rad]."""
 
 
 def subject(folder: Path) -> Subject:
