@@ -12,4 +12,3 @@ def distorted(model: Model, parameters: Parameters, drive: Drive, duration: floa
         if effect.family == "drive" and effect.apply is not None:
             drive = effect.apply(drive, duration, **{n: v[0] for n, v in parameters.of(name).items()})
     return drive
-

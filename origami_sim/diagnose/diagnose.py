@@ -418,7 +418,10 @@ def settled(
     order = sorted((n for n, f in enumerate(out) if n and not f.failed), key=lambda n: out[n].cost)
     for n in [0, *order[:CONTENDERS]]:
         f = out[n]
-        out[n] = fit(forward, f.hypothesis, new, theta=f.theta, local=f.local, blocks=f.blocks)
+        # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
+        starts = (f.local,) if new is weights else (f.local, None)
+        tried = [fit(forward, f.hypothesis, new, theta=f.theta, local=local, blocks=f.blocks) for local in starts]
+        out[n] = min(tried, key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new
 
 

@@ -201,7 +201,7 @@ def apply(
 def suspects(
     model: Model, recordings: Sequence[Recording], drive: Drive, parameters: Parameters | None = None
 ) -> list[Suspect]:
-    """Everything in the catalogue that could act on this object and is not part of its model.
+    """Everything in the catalogue that could act on this object, and more of what its model has at one place.
 
     An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
     channel of its kind was recorded; one of the ground, if the device has contact points. Creases and panels are
@@ -215,6 +215,7 @@ def suspects(
         if not effect.fitted or not model.count(effect.family):
             continue
         if name in model.effects and not (effect.stated and parameters and _off(parameters, name)):
+            found += _more_of(model, name)
             continue
         if effect.stated and name not in model.effects:
             continue
@@ -234,7 +235,7 @@ def suspects(
 
 
 def _more_of(model: Model, name: str) -> list[Suspect]:
-    """An effect that the model has, stronger or weaker at one crease or panel than was thought."""
+    """An effect that the model has, stronger at one crease or panel than was thought."""
     effect = get(name)
     each = [s for s in _sites(model, effect.family) if s[2] is not None]
     if effect.family not in ("crease", "triangle") or len(each) < 2:

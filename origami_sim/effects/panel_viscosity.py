@@ -16,9 +16,7 @@ EFFECT = Effect(
     name="panel_viscosity",
     family="bend",
     force=moment,
-    parameters=(
-        Parameter("viscosity", "c", "N m s/rad", 0.0, (0.0, math.inf), "dashpot constant, 2 zeta sqrt(K I)"),
-    ),
+    parameters=(Parameter("viscosity", "c", "N m s/rad", 0.0, (0.0, math.inf), "dashpot constant, 2 zeta sqrt(K I)"),),
     damping=lambda p: p["viscosity"],
     formula="M = -c dtheta/dt",
     source="Kelvin-Voigt plate on the bending lines of a panel",

@@ -224,7 +224,8 @@ def _strength(row: dict, answer: dict, found: dict) -> None:
     """Concealed and recovered strength, its relative error, and whether the interval covers it."""
     name, effect = answer["number"], answer["names"][0]
     best = next((c for c in found["candidates"] if c["effects"] == [effect]), None)
-    number = next((n for n in best["numbers"] if n["label"] == f"{effect}.{name}"), None) if best and name else None
+    numbers = reversed(best["numbers"]) if best and name else []  # a nominal number of that name stands before it
+    number = next((n for n in numbers if n["label"] == f"{effect}.{name}"), None)
     if not number or number["value"] is None:
         return
     row |= {"effect": effect, "strength": answer["strength"], "recovery": abs(number["value"] / answer["strength"] - 1)}

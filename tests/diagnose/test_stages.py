@@ -128,6 +128,14 @@ def test_an_offset_of_one_encoder_is_the_measurement():
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_offset at channel fold1"
 
 
+def test_more_loss_at_one_crease_is_found_where_the_model_has_that_loss():
+    r = record({"crease_viscosity": {"viscosity": (1.2e-5, [1])}}, **SMALL)
+    found = diagnose(subject(3), [r], catalogue=("crease_viscosity", "crease_friction", "mass_damping"))
+    assert found.verdict == "MECHANISM" and found.chosen == ["crease_viscosity at crease 1"]
+    more = found.candidates[0].numbers[-1]
+    assert more.low < 8e-6 < more.high and more.value == pytest.approx(8e-6, rel=0.15)
+
+
 @pytest.mark.slow
 def test_two_effects_are_found_together():
     both = {**FRICTION, "air_drag": {"drag_coefficient": (2.0, None)}}

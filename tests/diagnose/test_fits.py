@@ -1,0 +1,132 @@
+"""Fits that use derivatives again, weights that are replaced, held-out densities: against plain ways to the same."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from origami_sim.diagnose import Options
+from origami_sim.diagnose.compare import _predictive
+from origami_sim.diagnose.diagnose import alike, arranged, nominal_fits, prepared, settled
+from origami_sim.diagnose.forward import FINER, refined
+from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.refit import Weights, fit, linearise
+from origami_sim.diagnose.screen import Signature, screen
+from origami_sim.solve.batch import Batch
+from tests.diagnose.strips import record, subject
+
+STIFFENING = {"crease_stiffening": {"cubic_stiffness": (4e-4, [1])}}
+SMALL = {"duration": 3.0, "panels": 3, "rate": 100}
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """The nominal fit of a strip with a stiffening crease."""
+    recordings = prepared([record(STIFFENING, **SMALL)], 200.0)
+    forward = arranged(subject(3), recordings, Options())
+    _, base, weights, _ = nominal_fits(forward)
+    one = next(
+        s
+        for s in suspects(forward.model, recordings, forward.drive)
+        if s.effect == "crease_stiffening" and s.entities == (1,)
+    )
+    return forward, base, weights, one
+
+
+def test_derivatives_that_are_used_again_lead_to_the_same_fit(stiff):
+    forward, base, weights, one = stiff
+    theta = np.concatenate([base.theta, [0.0]])
+    given = {"theta": theta, "local": base.local, "most": 12}
+    plain = fit(forward, Hypothesis((one,)), weights, **given)
+    again = fit(forward, Hypothesis((one,)), weights, **given, known=base.linear, kept=len(base.free))
+    assert again.cost == pytest.approx(plain.cost, abs=0.5)
+    assert np.all(np.abs(again.theta - plain.theta) < 0.3 * plain.deviations() + 1e-12)
+    assert again.deviations() == pytest.approx(plain.deviations(), rel=0.2)
+
+
+def test_new_weights_are_those_of_a_new_linearisation(stiff):
+    forward, base, weights, _ = stiff
+    new = Weights(weights.deviation * [0.5, 2.0], 0.3 * weights.part)
+    assert base.linear is not None
+    quick = base.linear.reweighted(weights, new)
+    slow = linearise(forward, base.hypothesis, base.free, base.theta, base.local, base.blocks, new)
+    for a, b in zip(quick.residual, slow.residual, strict=True):
+        assert a == pytest.approx(b, abs=1e-9)
+    column = np.random.default_rng(0).normal(size=len(slow.residual[0]))
+    assert quick.clear(0, column) == pytest.approx(slow.clear(0, column), abs=1e-6)
+
+
+def test_weights_settle_on_what_the_best_fit_leaves(stiff):
+    forward, base, weights, one = stiff
+    named = fit(forward, Hypothesis((one,)), weights, local=base.local)
+    screening = screen(forward, [one], base, weights)
+    after, (nominal, best), settled_on = settled(forward, screening, [base, named], weights)
+    noise = forward.blocks[0].noise
+    assert settled_on.deviation == pytest.approx(noise, rel=0.15) and weights.deviation[1] > 1.5 * noise[1]
+    assert nominal.hypothesis.suspects == () and best.cost < nominal.cost
+    assert best.cost == pytest.approx(sum(np.isfinite(b.values).sum() for b in forward.blocks), rel=0.15)
+    assert abs(after.signatures[0].score) > abs(screening.signatures[0].score)
+
+
+def test_held_out_density_is_that_of_a_normal_distribution():
+    rng = np.random.default_rng(1)
+    tangent, root, residual = (
+        rng.normal(size=(6, 2)),
+        np.triu(rng.normal(size=(2, 2))) + 2 * np.eye(2),
+        rng.normal(size=6),
+    )
+    covariance = np.eye(6) + tangent @ np.linalg.inv(root.T @ root) @ tangent.T
+    constant = 0.5 * 6 * np.log(2 * np.pi)
+    assert _predictive(residual, tangent, root) - constant == pytest.approx(
+        multivariate_normal(np.zeros(6), covariance).logpdf(residual)
+    )
+
+
+def test_suspects_are_alike_if_the_data_could_not_tell_them_apart(stiff):
+    *_, one = stiff
+
+    def signature(angle: float, score: float) -> Signature:
+        return Signature(one, [], 1.0, np.array([np.cos(angle), np.sin(angle)]), 1.0, 1.0, score, 0.0, 1.0)
+
+    assert alike(signature(0.0, 5.0), signature(0.1, 5.0)), "half a unit of log likelihood at most"
+    assert not alike(signature(0.0, 20.0), signature(0.1, 20.0))
+
+
+def test_a_film_is_the_rollout_frame_by_frame(stiff):
+    forward, *_ = stiff
+    model, parameters = forward.built({f.name: f.start for f in forward.subject.nominals})
+    state = forward._state(model, [(model, parameters)], forward.blocks, None)
+    one, other = (Batch(model, parameters, forward.drive, state, threads=2) for _ in range(2))
+    x, angles = one.film(5, 7, 1e-4, np.inf)
+    for n in range(5):
+        other.advance(7, 1e-4, np.inf)
+        positions, folds = other.motion()
+        assert np.array_equal(x[n], positions) and np.array_equal(angles[n], folds)
+    assert np.array_equal(one.state().v, other.state().v)
+
+
+def test_a_film_has_no_frames_after_a_world_stops(stiff):
+    forward, *_ = stiff
+    model, parameters = forward.built({f.name: f.start for f in forward.subject.nominals})
+    batch = Batch(model, parameters, forward.drive, forward._state(model, [(model, parameters)], forward.blocks, None))
+    x, _ = batch.film(4, 5, 1e-4, 1e-6)
+    assert np.all(batch.status() >= 0) and np.all(np.isnan(x))
+
+
+@pytest.mark.parametrize(
+    ("wave", "smooth"),
+    [
+        (lambda t: 0.02 * np.sin(15.0 * t), True),
+        (lambda t: np.round(0.02 * np.sin(15.0 * t), 5), True),
+        (lambda t: np.where(t % 0.5 < 0.25, 1.0, 0.0), False),
+        (lambda t: np.sin(t) + 0.05 * np.random.default_rng(0).normal(size=len(t)), False),
+    ],
+)
+def test_only_smooth_drives_are_refined(wave, smooth):
+    times = np.arange(240) / 120.0
+    t, values = refined(times, wave(times))
+    assert len(t) == (FINER * 239 + 1 if smooth else 240)
+    if smooth:
+        between = np.linspace(0.05, 1.9, 999)
+        true = 0.02 * np.sin(15.0 * between)
+        cut = np.abs(np.interp(between, times, wave(times)) - true).max()
+        assert np.abs(np.interp(between, t, values) - true).max() < 0.2 * cut
