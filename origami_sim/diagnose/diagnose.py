@@ -111,7 +111,11 @@ def diagnose(
     forward = arranged(subject, recordings, o)
     if keep is not None:
         keep.follow(forward)
-    loop, unseen = closed_loop(recordings), [n for n in [unobserved(forward)] if n]
+    loop = closed_loop(recordings)
+    noted = [n for r in recordings for n in r.metadata.get("notes", [])]
+    unseen = unobserved(forward)
+    if unseen is not None:
+        noted.append(unseen)
     tell("nominal", 0.0)
     given, base, weights, free_start = nominal_fits(forward)
     lap("nominal")
