@@ -186,9 +186,7 @@ def diagnose(
         error_before=_rms(given).tolist(),
         error_refitted=scores[id(base)].rms.tolist(),
         error_after=after.rms.tolist(),
-        notes=judged.notes
-        + ([unseen] if unseen else [])
-        + [n for r in recordings for n in r.metadata.get("notes", [])],
+        notes=[*judged.notes, *noted],
         settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
         seconds=seconds,
         patch=patch(best),
