@@ -79,6 +79,8 @@ def prove(
     """
     from origami_sim.prove.score import report
 
+    if cluster is not None:
+        dask(cluster)
     out.mkdir(parents=True, exist_ok=True)
     choice = {"seed": seed, "structures": list(structures), "kinds": list(kinds)}
     stored = out / RUN
@@ -232,16 +234,8 @@ def workers(cluster: str | None, jobs: int) -> Iterator[Callable[[Sequence[Work]
         with ThreadPoolExecutor(max(1, jobs)) as pool:
             yield lambda works: _pooled(pool, works)
         return
-    try:
-        distributed = import_module("distributed")
-    except ImportError:
-        raise InputError(
-            "a cluster needs Dask: pip install 'origami-sim[cluster]'", field="--cluster", value=cluster
-        ) from None
-    local = re.fullmatch(r"local(?::(\d+))?", cluster)
-    if not local and not re.fullmatch(r"\w+://\S+:\d+", cluster):
-        allowed = "local, local:WORKERS, or a scheduler such as tcp://HOST:8786"
-        raise InputError("no such cluster", field="--cluster", value=cluster, allowed=allowed)
+    distributed = dask(cluster)
+    local = LOCAL.fullmatch(cluster)
     count = int(local[1] or os.cpu_count() or 1) if local else 0
     if local and count < 1:
         raise InputError("a cluster needs workers", field="--cluster", value=cluster, allowed="local:1 or more")
@@ -256,6 +250,26 @@ def workers(cluster: str | None, jobs: int) -> Iterator[Callable[[Sequence[Work]
         client.close()
         if started is not None:
             started.close()
+
+
+LOCAL = re.compile(r"local(?::(\d+))?")
+
+
+def dask(cluster: str):
+    """The module dask.distributed.
+
+    Raises:
+        InputError: it is not installed, or no cluster has such a name.
+    """
+    if not LOCAL.fullmatch(cluster) and not re.fullmatch(r"\w+://\S+:\d+", cluster):
+        allowed = "local, local:WORKERS, or a scheduler such as tcp://HOST:8786"
+        raise InputError("no such cluster", field="--cluster", value=cluster, allowed=allowed)
+    try:
+        return import_module("distributed")
+    except ImportError:
+        raise InputError(
+            "a cluster needs Dask: pip install 'origami-sim[cluster]'", field="--cluster", value=cluster
+        ) from None
 
 
 def _pooled(pool: ThreadPoolExecutor, works: Sequence[Work]) -> Iterator[str]:
