@@ -404,6 +404,9 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
+HOPELESS = 4.0
+"""How many times the cost of the best fit one may have that is refined."""
+
 CONTENDERS = 5
 """Fits that are refined with all derivatives anew, beside the model without any effect."""
 
@@ -417,7 +420,9 @@ def settled(
     if same and abs(np.log(new.part / weights.part)) < 0.2:
         new = weights
     out = [f if f.failed else f.reweighted(weights, new) for f in fits]
-    order = sorted((n for n, f in enumerate(out) if n and not f.failed), key=lambda n: out[n].cost)
+    least = HOPELESS * min(f.cost for f in out)
+    order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < least]
+    order.sort(key=lambda n: out[n].cost)
     for n in [0, *order[:CONTENDERS]]:
         f = out[n]
         # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
