@@ -138,14 +138,16 @@ def diagnose(
     fits += pairs(forward, base, screening, fits, weights, o)
     rough = screening
     screening, fits, weights = settled(forward, rough, fits, weights)
-    fits += twins(forward, rough, screening, fits, weights)
+    alike_ones = twins(forward, rough, screening, fits, weights)
+    fits += alike_ones
     # with weights that do not count the effect itself as noise
     p_value = look_elsewhere(screening, o.draws, o.seed, fits)
     lap("refit")
     tell("combine", 0.0)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
-    fits += combine(forward, fits, scores, screening, weights, o, tell)
-    screening, fits, weights = settled(forward, screening, fits, weights)
+    more = combine(forward, fits, scores, screening, weights, o, tell)
+    if alike_ones or more:
+        screening, fits, weights = settled(forward, screening, [*fits, *more], weights)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
     lap("combine")

@@ -12,15 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from origami_sim.diagnose.hypothesis import Suspect, scaled
-from origami_sim.diagnose.refit import Fit, Weights, whitened
+from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 
 CHUNK = 8
 """Effects that share a program while screening: more compile longer, fewer compile more often."""
-
-SLOWEST = 2.5
-"""How many times smaller than the nominal model's the solver's step may become while screening."""
 
 SILENT = 0.3
 """Norm of a signature [standard deviations] below which a suspect at its largest admissible strength is not excited."""
