@@ -44,7 +44,7 @@ def energy(angle: np.ndarray, rate: np.ndarray) -> float:
 def change(times: np.ndarray, values: np.ndarray, noise: np.ndarray) -> float:
     """Change of energy over a segment [J], from local polynomials near its ends."""
     seen = np.flatnonzero(np.all(np.isfinite(values), axis=1))
-    ends = [energy(*local_line(times, values, noise, int(n))) for n in (seen[12], seen[-13])]
+    ends = [energy(*local_line(times, values, noise, int(n))[:2]) for n in (seen[12], seen[-13])]
     return ends[1] - ends[0]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.diagnose.refit import Fit, Weights, whitened
+from origami_sim.diagnose.refit import Fit, Weights
 
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
@@ -99,9 +99,8 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     away = np.array([f.start for f in fit.free]) - fit.theta
     low = (np.array([f.lower for f in fit.free]) - fit.theta) / scale
     high = (np.array([f.upper for f in fit.free]) - fit.theta) / scale
-    residual = [whitened(r, weights) for r in fit.residuals]
     tangent = [line.clear(n, t) for n, t in enumerate(line.tangent)]
-    cleared = [line.clear(n, r) for n, r in enumerate(residual)]
+    cleared = [line.clear(n, r) for n, r in enumerate(line.residual)]
     held_out = np.array([-0.5 * float(c @ c) for c in cleared])
     left = [c.copy() for c in cleared]
     for part in folds(forward, fit.blocks) if len(fit.free) else []:
@@ -116,16 +115,15 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
             left[n] = cleared[n] - tangent[n] @ step
             held_out[n] = _predictive(left[n], tangent[n], r)
     dims = len(weights.deviation)
-    squares = np.concatenate([v.reshape(-1, dims) ** 2 for v in left]) / weights.part
+    squares = np.concatenate([v[line.data(n)].reshape(-1, dims) ** 2 for n, v in enumerate(left)]) / weights.part
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
     rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation
     extra = len(fit.hypothesis.free)
     n = max(effective_samples(forward, fit, weights), 2.0)
-    cost = float(sum(r @ r for r in residual)) + fit.penalty
     sites = float(
         sum(np.log(s.sites) for s in fit.hypothesis.suspects)
     )  # an effect is as likely at few sites as at many
-    return Score(held_out, rms, -0.5 * cost - 0.5 * extra * np.log(n) - sites)
+    return Score(held_out, rms, -0.5 * fit.cost - 0.5 * extra * np.log(n) - sites)
 
 
 def _predictive(residual: np.ndarray, tangent: np.ndarray, root: np.ndarray) -> float:

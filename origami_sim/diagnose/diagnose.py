@@ -109,6 +109,7 @@ def diagnose(
     subject = subject_of(subject, priors)
     recordings = prepared([recordings] if isinstance(recordings, Recording) else list(recordings), o.rate)
     forward = arranged(subject, recordings, o)
+    forward.soften()
     if keep is not None:
         keep.follow(forward)
     loop = closed_loop(recordings)
@@ -336,10 +337,13 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
         base = fit(
             forward, Hypothesis(), w, theta=base.theta, local=base.local, most=5, done=0.01, known=known, kept=kept
         )
+    if not base.failed:
+        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, begin=base.linear, exact=True)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
     # everything that follows rests on these derivatives
-    line = linearise(forward, Hypothesis(), base.free, base.theta, base.local, base.blocks, w)
+    residual = None if base.linear is None else base.linear.residual
+    line = linearise(forward, Hypothesis(), base.free, base.theta, base.local, base.blocks, w, residual=residual)
     return given.reweighted(first, w), replace(base, linear=line), w, Weights(noise, 1.0)
 
 
@@ -410,7 +414,10 @@ HOPELESS = 4.0
 """How many times the cost of the best fit one may have that is refined."""
 
 CONTENDERS = 5
-"""Fits that are refined with all derivatives anew, beside the model without any effect."""
+"""Fits that are refined, beside the model without any effect."""
+
+AGAIN = 2
+"""Of these, how many are also fitted anew from the starts that were recorded."""
 
 
 def settled(
@@ -425,11 +432,13 @@ def settled(
     least = HOPELESS * min(f.cost for f in out)
     order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < least]
     order.sort(key=lambda n: out[n].cost)
-    for n in [0, *order[:CONTENDERS]]:
+    for place, n in enumerate([0, *order[:CONTENDERS]]):
         f = out[n]
-        # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
-        starts = (f.local,) if new is weights else (f.local, None)
-        tried = [fit(forward, f.hypothesis, new, theta=f.theta, local=local, blocks=f.blocks) for local in starts]
+        given = {"theta": f.theta, "blocks": f.blocks}
+        tried = [fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, exact=True, **given)]
+        if new is not weights and place <= AGAIN:
+            # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
+            tried.append(fit(forward, f.hypothesis, new, exact=True, **given))
         out[n] = min(tried, key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new
 
@@ -449,7 +458,8 @@ def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, scree
         assert base.linear is not None
         unit = s.free[0].scale / found.size
         rest = len(s.free) - 1
-        columns = [np.concatenate([unit * p[:, None], np.zeros((len(p), rest))], axis=1) for p in found.parts]
+        parts = [base.linear.below(n, p) for n, p in enumerate(found.parts)]
+        columns = [np.concatenate([unit * p[:, None], np.zeros((len(p), rest))], axis=1) for p in parts]
         begin = base.linear.beside(columns, len(base.free))
 
     def fitted(second: float, begin) -> Fit:

@@ -31,8 +31,21 @@ the damping they would begin to ring. What is measured in that time is not compa
 RATIO = 0.3
 """Damping of panels in that time, as a ratio of critical for each bar and bending line."""
 
+CAREFUL, TRUSTED = 3.0, 0.05
+"""A rate that was read from a recording is known within so many of its standard deviations, and such a part of it."""
+
 LEAD = 1500
 """Frames before a segment along which laws with memory are taken, at most; the motion there is as recorded."""
+
+SOFTER = (100.0, 30.0, 10.0)
+"""By how much softer panels may be where only derivatives are asked for: the solver's step grows with the root."""
+
+ALIKE = 0.05
+"""Part of the motion by which softer panels may change it."""
+
+STIFFNESS = {"bars": "stiffness", "panel_bending": "stiffness"}
+VISCOSITY = {"bar_viscosity": "viscosity", "panel_viscosity": "viscosity"}
+"""What keeps panels in shape, and what calms them."""
 
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
@@ -47,6 +60,7 @@ class Block:
         values: (n, D) all components of all channels [SI]; nan where missing.
         noise: (D,) their standard deviations.
         pose, rates: what the recording says about the start: coordinates and their rates [m].
+        known: (L,) standard deviations of that: of the coordinates (of which the data themselves say more), the rates.
         begin: (D,) what was measured at the first frame, which tells the turn of angles.
     """
 
@@ -57,6 +71,7 @@ class Block:
     noise: np.ndarray
     pose: Pose
     rates: np.ndarray
+    known: np.ndarray
     begin: np.ndarray | None = None
 
 
@@ -73,8 +88,10 @@ class Forward:
 
     Attributes:
         blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
-        components: names of the D components.
+        components: names of the D components. softness: of panels where only derivatives are asked for.
     """
+
+    softness = 1.0
 
     def __init__(
         self,
@@ -116,18 +133,20 @@ class Forward:
         blocks = []
         for first in firsts:
             part = slice(first, first + frames)
-            pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
+            pose, rates, known = self.articulation.reference(), np.zeros(self.articulation.size), np.zeros(0)
             if self.start == "fit":
-                pose, rates = self._initial(recording, values, noise, int(first))
+                pose, rates, known = self._initial(recording, values, noise, int(first))
             times = recording.times[part] - recording.times[first]
             compared = values[part].copy()
             compared[:calm] = np.nan
-            blocks.append(Block(index, int(first), times, compared, noise, pose, rates, seen_first(values[part])))
+            blocks.append(
+                Block(index, int(first), times, compared, noise, pose, rates, known, seen_first(values[part]))
+            )
         return blocks
 
-    def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray]:
-        """Pose and rates of the coordinates at a frame, from a local polynomial of the channels."""
-        level, slope = local_line(recording.times, values, noise, first)
+    def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray, np.ndarray]:
+        """Pose and rates of the coordinates at a frame, from a local polynomial of the channels, and what is known."""
+        level, slope, error = local_line(recording.times, values, noise, first)
         arm, pose = self.articulation, self._placed(recording, level)
         for _ in range(30):
             now, tangent = self._channel_tangent(recording, pose, level)
@@ -140,8 +159,12 @@ class Forward:
                 break
         _, tangent = self._channel_tangent(recording, pose, level)
         weight = np.where(np.isfinite(slope), 1.0 / noise, 0.0)
-        rates = np.linalg.lstsq(tangent * weight[:, None], np.nan_to_num(slope) * weight, rcond=1e-8)[0]
-        return pose, rates
+        inverse = np.linalg.pinv(tangent * weight[:, None], rcond=1e-8)
+        rates = inverse @ (np.nan_to_num(slope) * weight)
+        spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
+        told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
+        spread = np.where(told, np.hypot(CAREFUL * spread, TRUSTED * rates), np.inf)
+        return pose, rates, np.concatenate([np.full(arm.size, np.inf), spread])
 
     def _placed(self, recording: Recording, level: np.ndarray) -> Pose:
         """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
@@ -194,6 +217,9 @@ class Forward:
         theta: Sequence[np.ndarray] | np.ndarray,
         local: np.ndarray | None = None,
         blocks: Sequence[int] | None = None,
+        *,
+        soft: bool = False,
+        among: Sequence[str] = (),
     ) -> list[np.ndarray]:
         """Predicted channels of each block: a list of [K, n, D].
 
@@ -202,12 +228,15 @@ class Forward:
             theta: K times the nominals, then the hypothesis' numbers [SI].
             local: [K, B, L] start coordinates (as a shift from the block's own) and rates, for all blocks.
             blocks: which to predict (default all).
+            soft: with softer panels (see `soften`), for derivatives; not if a hypothesis is about panels' stiffness.
+            among: effects that the program has anyway, so that other hypotheses can share it.
 
         A world that goes unstable, or of whose numbers no model can be built, gives nan.
         """
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
-        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
+        softness = self.softness if soft and not any(map(stiff, effects)) else 1.0
         worlds, impossible = [], []
         for k, (h, t) in enumerate(zip(each, theta, strict=True)):
             try:
@@ -219,15 +248,47 @@ class Forward:
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             for group in _by_length(self.blocks, mine):
-                for b, values in zip(group, self._roll(r, group, each, worlds, local), strict=True):
+                for b, values in zip(group, self._roll(r, group, each, worlds, local, softness), strict=True):
                     out[b] = values
                     out[b][impossible] = np.nan
         return [out[b] for b in wanted]
 
-    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
-        """The solver's step for one world, a frame at most [s]."""
+    def soften(self) -> None:
+        """Finds how much softer panels may be for derivatives: at most so much that the motion stays the same.
+
+        Panels that bend when the device moves, and numbers of the model that say how stiff they are, forbid it.
+        """
+        theta, starts = self._given[None], np.zeros((1, len(self.blocks), self.local))
+        if not self._rigid():
+            return
+        exact = self.predict(Hypothesis(), theta, starts)
+        noise = self.blocks[0].noise
+        motion = np.concatenate([b.values - np.nanmean(b.values, axis=0) for b in self.blocks]) / noise
+        for self.softness in SOFTER:
+            other = self.predict(Hypothesis(), theta, starts, soft=True)
+            gap = np.concatenate([a[0] - b[0] for a, b in zip(exact, other, strict=True)]) / noise
+            if np.mean(gap**2) <= ALIKE**2 * np.nanmean(motion**2):
+                return
+        self.softness = 1.0
+
+    def _rigid(self) -> bool:
+        """Whether no number of the model changes what keeps panels in shape."""
+        given = self.built(dict(zip((f.name for f in self.subject.nominals), self._given, strict=True)))[1]
+        for n, f in enumerate(self.subject.nominals):
+            theta = self._given.copy()
+            theta[n] += f.scale if theta[n] + f.scale <= f.upper else -f.scale
+            other = self.built(dict(zip((f.name for f in self.subject.nominals), theta, strict=True)))[1]
+            for owner, name in (STIFFNESS | VISCOSITY).items():
+                if (owner, name) in given and np.any(given[owner, name] != other[owner, name]):
+                    return False
+        return True
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
+        """The solver's step for one world, a frame at most [s]; see `predict`."""
         frame = float(np.median(np.diff(self.recordings[0].times)))
-        return min(frame, stable_step(*self._world(hypothesis, theta, hypothesis.effects)).dt)
+        model, parameters = self._world(hypothesis, theta, hypothesis.effects)
+        softness = self.softness if soft and not any(map(stiff, hypothesis.effects)) else 1.0
+        return min(frame, stable_step(model, softened(model, parameters, softness)).dt)
 
     def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
         """The model with these effects, and the parameters of one world."""
@@ -240,13 +301,19 @@ class Forward:
         return richer, apply(parameters, hypothesis, values[count:], richer)
 
     def _roll(
-        self, r: int, group: list[int], each: list[Hypothesis], worlds: list[tuple[Model, Parameters]], local
+        self,
+        r: int,
+        group: list[int],
+        each: list[Hypothesis],
+        worlds: list[tuple[Model, Parameters]],
+        local,
+        softness: float,
     ) -> list[np.ndarray]:
         """[K, n, D] for blocks of equal length of one recording; the batch runs over worlds, then over blocks."""
         recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
         k, count = len(worlds), len(blocks)
         model = worlds[0][0]
-        parameters = Parameters.join([p for _, p in worlds], repeat=count)
+        parameters = softened(model, Parameters.join([p for _, p in worlds], repeat=count), softness)
         times = blocks[0].times
         step = float(np.median(np.diff(recording.times)))
         frames = int(np.ceil(times[-1] / step - 1e-6)) + 1 + SPARE
@@ -402,6 +469,23 @@ def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     return quiet, out
 
 
+def stiff(effect: str) -> bool:
+    """Whether an effect is about what keeps panels in shape."""
+    return get(effect).family in ("bar", "bend")
+
+
+def softened(model: Model, parameters: Parameters, by: float) -> Parameters:
+    """The same parameters with panels softer by a factor, damped by the same ratio of critical."""
+    if by == 1.0:
+        return parameters
+    out = parameters.copy()
+    for names, power in ((STIFFNESS, 1.0), (VISCOSITY, 0.5)):
+        for owner, name in names.items():
+            if owner in model.effects:
+                out.set(owner, name, parameters[owner, name] / by**power)
+    return out
+
+
 FILMED = 64e6
 """Bytes of positions that are kept before they are read."""
 
@@ -535,9 +619,11 @@ def continuous(channels: np.ndarray, turning: np.ndarray, first: np.ndarray) -> 
     channels[:, turning] = np.where(np.isfinite(channels[:, turning]), a, np.nan)
 
 
-def local_line(times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-    """Value and rate (D,) at a frame, from a cubic over a window that grows while the cubic fits to the noise."""
-    level, slope = np.full(values.shape[1], np.nan), np.full(values.shape[1], np.nan)
+def local_line(
+    times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window that grows while it fits."""
+    level, slope, error = np.full((3, values.shape[1]), np.nan)
     for d in range(values.shape[1]):
         half = 4
         while True:
@@ -547,18 +633,20 @@ def local_line(times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: 
             good = np.flatnonzero(np.isfinite(values[lo:hi, d])) + lo
             if len(good) >= 6:
                 t = times[good] - times[first]
-                design = np.vander(t / (np.abs(t).max() or 1.0), 4, increasing=True)
+                span = np.abs(t).max() or 1.0
+                design = np.vander(t / span, 4, increasing=True)
                 fit, *_ = np.linalg.lstsq(design, values[good, d], rcond=None)
                 scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
                 if np.isfinite(level[d]) and scatter > 1.5 * noise[d]:
                     break
-                level[d], slope[d] = fit[0], fit[1] / (np.abs(t).max() or 1.0)
+                level[d], slope[d] = fit[0], fit[1] / span
+                error[d] = max(scatter, noise[d]) * np.linalg.norm(np.linalg.pinv(design)[1]) / span
                 if scatter > 1.5 * noise[d]:
                     break
             half *= 2
             if half > 64 or half > len(times):
                 break
-    return level, slope
+    return level, slope, error
 
 
 def drive_of(recording: Recording, default: Drive) -> Drive:

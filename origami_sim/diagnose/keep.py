@@ -57,17 +57,21 @@ class Keep:
             theta: Sequence[np.ndarray] | np.ndarray,
             local: np.ndarray | None = None,
             blocks: Sequence[int] | None = None,
+            *,
+            soft: bool = False,
+            among: Sequence[str] = (),
         ) -> list[np.ndarray]:
             assert self.folder is not None
             wanted = list(range(len(forward.blocks)) if blocks is None else blocks)
-            file = self.folder / f"{digest(forward, hypothesis, theta, local, wanted)}.npz"
+            file = self.folder / f"{digest(forward, hypothesis, theta, local, wanted, (soft, *among))}.npz"
             stored = _read(file, len(wanted))
             if stored is not None:
                 self.found += 1
                 return stored
             began = clock.perf_counter()
             # in the order of memory that a file has: sums depend on it in their last digit
-            out = [np.ascontiguousarray(v) for v in kind.predict(forward, hypothesis, theta, local, blocks)]
+            made = kind.predict(forward, hypothesis, theta, local, blocks, soft=soft, among=among)
+            out = [np.ascontiguousarray(v) for v in made]
             self.computed += 1
             if clock.perf_counter() - began > WORTH:
                 _write(file, out)
@@ -81,12 +85,13 @@ class Keep:
             shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int]) -> str:
+def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int], options: tuple) -> str:
     """Digest of all that a prediction depends on."""
     each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
     effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
     sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
-    h = hashlib.sha256(repr((_sources(), type(forward).__name__, forward.start, effects, sites, wanted)).encode())
+    kind = (type(forward).__name__, forward.start, forward.softness, options)
+    h = hashlib.sha256(repr((_sources(), kind, effects, sites, wanted)).encode())
     nominal = np.array([f.start for f in forward.subject.nominals])
     model, parameters = forward._world(Hypothesis(), nominal, ())
     h.update(model.hash.encode() + parameters.hash.encode())

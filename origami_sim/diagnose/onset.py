@@ -149,11 +149,11 @@ def _around(forward, found: Fit, r: int, frame: int):
     values, noise = stacked(recording)
     block = forward.blocks[old[0]]
     if forward.start == "fit":
-        pose, rates = forward._initial(recording, values, noise, first)
+        pose, rates, known = forward._initial(recording, values, noise, first)
         compared = values[part].copy()
         compared[: forward._calm.get(r, 0)] = np.nan
         times = recording.times[part] - recording.times[first]
-        block = Block(r, first, times, compared, noise, pose, rates, seen_first(values[part]))
+        block = Block(r, first, times, compared, noise, pose, rates, known, seen_first(values[part]))
         earlier = [b for b in old if forward.blocks[b].first + len(forward.blocks[b].times) <= first + 1]
     else:  # it starts from rest, once
         block = next(b for b in (forward.blocks[i] for i in old) if b.first <= frame < b.first + len(b.times))
@@ -178,12 +178,12 @@ def stretched(
         block = forward.blocks[b]
         shape = block.values.shape
         known = np.array([f.spread / f.scale for f in found.free])
-        columns = line.tangent[n]
+        columns, left, slopes = (a[n][line.data(n)] for a in (line.tangent, line.residual, line.slopes))
         vague = VAGUE / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         columns = columns * np.where(np.isfinite(known), known, vague)
         times = forward.recordings[block.recording].times[block.first] + block.times
-        left = np.where(np.isfinite(block.values), line.residual[n].reshape(shape), np.nan)
-        ways, size, _ = np.linalg.svd(line.slopes[n], full_matrices=False)  # also those that hardly show
+        left = np.where(np.isfinite(block.values), left.reshape(shape), np.nan)
+        ways, size, _ = np.linalg.svd(slopes, full_matrices=False)  # also those that hardly show
         start = ways[:, size > 1e-7 * size.max(initial=1e-300)]
         out.append(Stretch(times, left, columns.reshape(*shape, -1), start.reshape(*shape, -1)))
     return out

@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 from origami_sim.diagnose.hypothesis import Free, Hypothesis
 
 STEPS = (1.0, 0.4, 0.1, 0.01)
-"""Fractions of a Gauss-Newton step that are tried in one batch."""
+"""Fractions of a Gauss-Newton step that are tried, until one keeps its promise."""
 
 CHORD = (1.0, 0.4)
 """The same while derivatives of an earlier point are in use; if none of them helps, the derivatives are taken anew."""
@@ -20,8 +20,15 @@ FAITHFUL = 0.7
 SLOWEST = 2.5
 """How many times smaller than at the beginning the solver's step may become at a trial."""
 
-FAINT = 1e-3
-"""Changes of a start that show so much less than others are left alone: a rate that dies at once may be anything."""
+FAINT = 1e-7
+"""Changes of a start that show so much less than others, and of which nothing else is known, are left alone."""
+
+STALE, OWN, ALL, SHARP = range(4)
+"""Which derivatives belong to the present point: none; those by the hypothesis' own numbers; all; all, of panels that
+are not softer."""
+
+SHARPENED = 4
+"""Steps that a fit may take with derivatives that are not of softer panels, after the others."""
 
 DONE = 3e-3
 """A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
@@ -49,7 +56,8 @@ class Fit:
     Attributes:
         hypothesis: what was fitted. free: the numbers, nominals first. theta: (P,) their values [SI].
         local: [B, L] fitted starts. blocks: which blocks were fitted.
-        misfit: weighted sum of squares of the residuals over the fitted blocks. penalty: of the departures from priors.
+        misfit: weighted sum of squares of the residuals over the fitted blocks and of the departures of their starts.
+        penalty: of the departures from priors.
         residuals: per fitted block (n, D), recorded minus predicted [SI].
         tangent: [R, P] whitened derivative of all predictions by theta (scaled), with the starts projected out.
         covariance: [P, P] of theta [SI], given the weights.
@@ -90,6 +98,8 @@ class Fit:
 class Linearisation:
     """Whitened residuals of the fitted blocks, and their derivatives by the numbers and by the starts.
 
+    After the rows of the data come L rows of what is known of the start (`Block.known`), as if it had been measured.
+
     Attributes:
         residual: per block (r,). tangent: per block [r, P] by theta / scale. slopes: per block [r, L] by the starts.
         basis: per block [r, l] orthonormal directions of the starts; project with `clear`. starts: per block, from
@@ -113,6 +123,14 @@ class Linearisation:
             starts.append(vt[good].T / sv[good])
         return cls(residual, tangent, slopes, basis, starts)
 
+    def data(self, b: int) -> slice:
+        """The rows of the data."""
+        return slice(0, len(self.residual[b]) - self.slopes[b].shape[1])
+
+    def below(self, b: int, columns: np.ndarray) -> np.ndarray:
+        """Columns of the data's rows, with the rows of the start, on which they have no effect."""
+        return np.concatenate([columns, np.zeros((len(self.residual[b]) - len(columns), *columns.shape[1:]))])
+
     def clear(self, b: int, columns: np.ndarray) -> np.ndarray:
         """Columns [r, ...] without what a change of the start could explain."""
         q = self.basis[b]
@@ -132,7 +150,10 @@ class Linearisation:
         if old is new:
             return self
         factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
-        rows = [np.tile(factor, len(r) // len(factor)) for r in self.residual]
+        rows = []
+        for n, r in enumerate(self.residual):
+            count = self.data(n).stop
+            rows.append(np.concatenate([np.tile(factor, count // len(factor)), np.ones(len(r) - count)]))
         return Linearisation.of(
             [f * r for f, r in zip(rows, self.residual, strict=True)],
             [f[:, None] * t for f, t in zip(rows, self.tangent, strict=True)],
@@ -155,6 +176,11 @@ def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
     return float(
         sum(((t - f.start) / f.spread) ** 2 for f, t in zip(free, theta, strict=True) if np.isfinite(f.spread))
     )
+
+
+def departures(forward, blocks, local: np.ndarray) -> float:
+    """Sum of squares of the departures of the starts [B, L] from what the recordings say of them."""
+    return float(sum(np.sum((local[b] / forward.blocks[b].known) ** 2) for b in blocks)) if forward.local else 0.0
 
 
 def misfits(forward, blocks, predicted: list[np.ndarray], weights: Weights) -> np.ndarray:
@@ -180,12 +206,16 @@ def linearise(
     fixed: bool = False,
     known: Linearisation | None = None,
     kept: int = 0,
+    residual: list[np.ndarray] | None = None,
+    soft: bool = True,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
     Args:
         fixed: leave theta out (only the starts are to be fitted).
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
+        residual: whitened residuals at this point, if they are known.
+        soft: take the derivatives with softer panels, see `Forward.soften`.
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
@@ -198,19 +228,33 @@ def linearise(
         thetas[1 + row, p] += steps[p]
     for i in range(size):
         locals_[1 + count - kept + i, :, i] += nudges[i]
-    predicted = forward.predict(hypothesis, thetas, locals_, blocks)
-    residual, tangent, starts = [], [], []
+    if residual is None:
+        here = forward.predict(hypothesis, theta[None], local[None], blocks)
+        residual = []
+        for b, values in zip(blocks, here, strict=True):
+            measured = forward.blocks[b].values  # nan where something was measured and the prediction failed
+            gap = _scaled(np.where(np.isfinite(measured), measured - values[0], 0.0), weights)
+            residual.append(_with_start(forward, b, gap, local[b]))
+    if len(thetas) > 1:
+        predicted = forward.predict(hypothesis, thetas, locals_, blocks, soft=soft)
+    else:
+        predicted = [forward.blocks[b].values[None] for b in blocks]  # nothing to derive by
+    tangent, starts = [], []
     for b, values in zip(blocks, predicted, strict=True):
-        measured = forward.blocks[b].values
-        seen = np.isfinite(measured)  # nan where something was measured and the prediction failed
-        residual.append(_scaled(np.where(seen, measured - values[0], 0.0), weights))
+        seen = np.isfinite(forward.blocks[b].values)
         slopes = _scaled(np.where(seen, values[1:] - values[0], 0.0), weights).T
-        scale = [f.scale for f in free[kept:count]]
-        tangent.append(slopes[:, : count - kept] * (scale / steps[kept:]))
-        starts.append(slopes[:, count - kept :] / nudges[:size])
+        columns = slopes[:, : count - kept] * ([f.scale for f in free[kept:count]] / steps[kept:])
+        tangent.append(np.concatenate([columns, np.zeros((forward.local, count - kept))]))
+        by = slopes[:, count - kept :] / nudges[:size]
+        starts.append(np.concatenate([by, np.diag(1.0 / forward.blocks[b].known)]) if size else by)
     if known is not None:
         return known.at(residual).beside(tangent, kept)
     return Linearisation.of(residual, tangent, starts)
+
+
+def _with_start(forward, b: int, gap: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """A whitened residual of a block, and after it that of its start."""
+    return np.concatenate([gap, -start / forward.blocks[b].known]) if forward.local else gap
 
 
 def start_steps(forward) -> np.ndarray:
@@ -243,18 +287,20 @@ def fit(
     known: Linearisation | None = None,
     kept: int = 0,
     begin: Linearisation | None = None,
+    exact: bool = False,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
-    Minimises the weighted squares of recorded minus predicted plus the squares of the departures from the priors,
-    within physical bounds, by Gauss-Newton steps of which several lengths are tried in one batch. The starts are
-    eliminated block by block. Derivatives are used again as long as the steps that they give keep what they promise.
+    Minimises the weighted squares of recorded minus predicted plus the squares of the departures from what is known,
+    within physical bounds, by Gauss-Newton steps that are shortened while they do not keep their promise. The starts
+    are eliminated block by block. Derivatives are used again as long as the steps that they give keep theirs.
 
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
         blocks: fit these only. fixed: keep theta and fit the starts only.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
         begin: residuals and all derivatives of the point where the fit begins.
+        exact: end with derivatives that are not those of softer panels.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
     free = (*forward.subject.nominals, *hypothesis.free)
@@ -263,52 +309,57 @@ def fit(
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = 0 if fixed else len(free)
 
-    def derived(theta, local, near: Linearisation | None) -> Linearisation:
-        return linearise(
-            forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, known=near, kept=kept if near else 0
-        )
+    def derived(theta, local, near: Linearisation | None, residual=None, level=ALL) -> Linearisation:
+        also = {"known": near, "kept": kept if near else 0, "residual": residual, "soft": level < SHARP}
+        return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
-    # which derivatives are those of the present point: by the hypothesis' own numbers, by all
     line = begin or derived(theta, local, known)
-    own, full, doubts = begin is None, begin is None and known is None, 0
-    best = sum(float(r @ r) for r in line.residual) + penalty(free, theta)
+    level = STALE if begin else ALL if known is None else OWN
+    top = SHARP if exact and forward.softness > 1.0 else ALL
+    best, doubts, sharp = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0, False
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     slowest = forward.step(hypothesis, theta) / SLOWEST
     floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
-    for n in range(most):
+    for n in range(most + SHARPENED * (top == SHARP)):
         assert theta is not None and local is not None
+        if n >= most and not sharp:
+            level, sharp = SHARP, True
+            line = derived(theta, local, None, line.residual, level)
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
         change, moves, promised = _proposed(forward, free, theta, local, blocks, line)
         enough = max(LITTLE, done * (best - floor))
-        if best - promised < enough and (own or not width):
+        whole, gain, found = best - promised, 0.0, None
+        if whole < enough and (sharp or top == ALL) and (level > STALE or not width):
             break
-        trying = STEPS if full or not n else CHORD
-        trials = np.stack([np.clip(theta + s * change * scale, lower, upper) for s in trying])
-        starts = np.stack([local + s * moves for s in trying])
-        if width and hypothesis.suspects:  # a strength far beyond what is needed can ask for very small steps
-            slow = np.array([forward.step(hypothesis, t) < slowest for t in trials])
-            trials, starts = (trials[~slow], starts[~slow]) if not np.all(slow) else (trials[-1:], starts[-1:])
-        predicted = forward.predict(hypothesis, trials, starts, blocks)
-        costs = misfits(forward, blocks, predicted, weights).sum(axis=1) + [penalty(free, t) for t in trials]
-        k = int(np.argmin(costs))
-        gain = max(best - float(costs[k]), 0.0)
-        faithful = gain > FAITHFUL * (best - promised)
-        if gain < enough and full:
+        trying = STEPS if level >= ALL or not n else CHORD
+        for part in trying if whole >= enough or level == STALE else ():
+            trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
+            # a strength far beyond what is needed can ask for very small steps of the solver
+            if width and hypothesis.suspects and part > trying[-1] and forward.step(hypothesis, trial) < slowest:
+                continue
+            predicted = forward.predict(hypothesis, trial[None], start[None], blocks)
+            cost = float(misfits(forward, blocks, predicted, weights).sum())
+            cost += penalty(free, trial) + departures(forward, blocks, start)
+            if best - cost > gain:
+                found, gain = (trial, start, predicted), best - cost
+            if best - cost > FAITHFUL * whole * part * (2.0 - part):
+                break
+        faithful, stuck = gain > FAITHFUL * whole, gain < enough
+        if stuck and (level == top or sharp):
             break
-        if gain > 0.0:
-            theta, local, best = trials[k], starts[k], float(costs[k])
-            gaps = [forward.blocks[b].values - v[k] for b, v in zip(blocks, predicted, strict=True)]
-            line = line.at([whitened(g, weights) for g in gaps])
-        if gain < enough or not faithful:  # first the hypothesis' own derivatives are renewed, then all
+        if found is not None:
+            (theta, local, predicted), best = found, best - gain
+            gaps = [whitened(forward.blocks[b].values - v[0], weights) for b, v in zip(blocks, predicted, strict=True)]
+            line = line.at([_with_start(forward, b, g, local[b]) for b, g in zip(blocks, gaps, strict=True)])
+        level = STALE
+        if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
-            full = not kept or doubts > 1
-            line, own = derived(theta, local, None if full else line), True
-        else:
-            own = full = False
-    if width and not own:  # the intervals are those of the place where the fit ended
-        line = derived(theta, local, line)
+            level = top if top == SHARP else OWN if kept and doubts == 1 else ALL
+            line, sharp = derived(theta, local, line if level == OWN else None, line.residual, level), level == SHARP
+    if width and level == STALE:  # the intervals are those of the place where the fit ended
+        line = derived(theta, local, line, line.residual)
     return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
 
 
@@ -348,7 +399,7 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) ->
     back = weights.deviation / np.sqrt(weights.part)
     residuals = []
     for n, b in enumerate(blocks):
-        r = line.residual[n].reshape(-1, dims) * back
+        r = line.residual[n][line.data(n)].reshape(-1, dims) * back
         residuals.append(np.where(np.isfinite(forward.blocks[b].values), r, np.nan))
     misfit = float(sum(r @ r for r in line.residual))
     scale = np.array([f.scale for f in free])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from origami_sim.diagnose.forward import stiff
 from origami_sim.diagnose.hypothesis import Suspect, scaled
 from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
@@ -94,7 +95,8 @@ class Projector:
 
     def __call__(self, parts: Sequence[np.ndarray]) -> np.ndarray:
         """Projected column (R + priors,) from one array [r] per block."""
-        cleared = np.concatenate([self.line.clear(n, p) for n, p in zip(self._index, parts, strict=True)])
+        full = [self.line.below(n, p) for n, p in zip(self._index, parts, strict=True)]
+        cleared = np.concatenate([self.line.clear(n, p) for n, p in zip(self._index, full, strict=True)])
         padded = np.concatenate([cleared, np.zeros(self._pad)])
         return padded - self._q @ (self._q.T @ padded)
 
@@ -124,9 +126,10 @@ def screen(
         blocks = [blocks[i] for i in np.round(np.linspace(0, len(blocks) - 1, most)).astype(int)]
     single = [s for s in suspects if not _together(s, suspects)]
     groups: list[list[Suspect]] = []
-    for s in sorted(single, key=lambda s: s.effect):
-        if groups and (len({t.effect for t in groups[-1]} | {s.effect}) <= CHUNK):
-            groups[-1].append(s)
+    for s in sorted(single, key=lambda s: (stiff(s.effect), s.effect)):
+        last = groups[-1] if groups else []
+        if last and stiff(last[0].effect) == stiff(s.effect) and len({t.effect for t in last} | {s.effect}) <= CHUNK:
+            last.append(s)
         else:
             groups.append([s])
     simulated: list[tuple[Suspect, float, list[np.ndarray]]] = []
@@ -276,16 +279,30 @@ def _admissible(s: Suspect, change: float) -> float:
 
 
 def _changes(forward, group, size, base: Fit, blocks) -> list[np.ndarray]:
-    """Per block, what each suspect changes in the predictions [S, n, D]; nan where the simulation fails."""
+    """Per block, what each suspect changes in the predictions [S, n, D]; nan where the simulation fails.
+
+    Suspects that need the same step of the solver, within a factor of two, are simulated together.
+    """
     rest = [np.array([f.start for f in s.free], float) for s in group]
     for values, z in zip(rest, size, strict=True):
         values[0] += z
-    thetas = [base.theta] + [np.concatenate([base.theta, v]) for v in rest]
-    hypotheses = [base.hypothesis] + [base.hypothesis.plus(s) for s in group]
-    local = np.repeat(base.local[None], len(thetas), axis=0)
-    predicted = forward.predict(hypotheses, thetas, local, blocks)
-    out = []
-    for b, v in zip(blocks, predicted, strict=True):
-        seen = np.isfinite(forward.blocks[b].values)
-        out.append(np.where(seen, v[1:] - v[0], 0.0))
+    thetas = [np.concatenate([base.theta, v]) for v in rest]
+    hypotheses = [base.hypothesis.plus(s) for s in group]
+    among = tuple(dict.fromkeys(e for h in hypotheses for e in h.effects))
+    steps = np.array([forward.step(h, t, soft=True) for h, t in zip(hypotheses, thetas, strict=True)])
+    pace = np.round(np.log2(steps / steps.max()))
+    out = [np.full((len(group), *forward.blocks[b].values.shape), np.nan) for b in blocks]
+    for p in np.unique(pace):
+        mine = np.flatnonzero(pace == p)
+        predicted = forward.predict(
+            [base.hypothesis, *(hypotheses[k] for k in mine)],
+            [base.theta, *(thetas[k] for k in mine)],
+            np.repeat(base.local[None], 1 + len(mine), axis=0),
+            blocks,
+            soft=True,
+            among=among,
+        )
+        for n, v in enumerate(predicted):
+            seen = np.isfinite(forward.blocks[blocks[n]].values)
+            out[n][mine] = np.where(seen, v[1:] - v[0], 0.0)
     return out

@@ -85,7 +85,7 @@ class CurveForward(Forward, ABC):
             values, noise = stacked(r)
             for part in np.array_split(np.arange(len(r.times)), min(pieces, len(r.times) // 2)):
                 times = r.times[part] - r.times[part[0]]
-                self.blocks.append(Block(index, int(part[0]), times, values[part], noise, pose, rates))
+                self.blocks.append(Block(index, int(part[0]), times, values[part], noise, pose, rates, np.zeros(0)))
 
     def _driven(self, recording: Recording) -> Recording:
         """The recording with the drives that the simulator knows."""
@@ -97,14 +97,17 @@ class CurveForward(Forward, ABC):
         theta: Sequence[np.ndarray] | np.ndarray,
         local: np.ndarray | None = None,
         blocks: Sequence[int] | None = None,
+        *,
+        soft: bool = False,
+        among: Sequence[str] = (),
     ) -> list[np.ndarray]:
         """Predicted channels of each block, a list of [K, n, D]; nan from where a world has no equilibrium.
 
-        See `Forward.predict`; there is nothing local to a block.
+        See `Forward.predict`; there is nothing local to a block, and nothing that softer panels would save.
         """
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
-        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
         worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
         curves = {}
         for r in sorted({self.blocks[b].recording for b in wanted}):
@@ -120,7 +123,10 @@ class CurveForward(Forward, ABC):
             out.append(np.moveaxis(curves[block.recording][rows], 2, 0))
         return out
 
-    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+    def soften(self) -> None:
+        """Statics takes no steps."""
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
         """Curves have no time step; raises InputError where a number is out of bounds, as building the world does."""
         self._world(hypothesis, theta, hypothesis.effects)
         return 1.0

@@ -237,29 +237,36 @@ WINDOW = 10
 """Frames over which residuals are averaged to tell structure from noise."""
 
 
+SHORT = 5
+"""Frames over which residuals are averaged to see their noise, which a tracker may have smoothed over some frames."""
+
+
 def structure(f: Fit, reference: Fit) -> tuple[float, float]:
     """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
 
-    Squares of window means in units of what white noise would give, less one each, summed; short segments are one
-    window. The white noise is that of the reference's fast residual (second differences), so that a noise level that
-    was stated wrongly does not matter.
+    Squares of window means in units of what noise would give, less one each, summed; short segments are one window.
+    The noise is that of the reference's residual (second differences of short means), so that a noise level that was
+    stated wrongly, or a tracker that smooths, does not matter.
     """
     total, count = 0.0, 0
-    fast = np.concatenate([np.diff(r, n=2, axis=0) for r in reference.residuals])
-    white = np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
-    for r in f.residuals:
-        seen = r[np.any(np.isfinite(r), axis=1)]
-        wide = min(WINDOW, len(seen))
-        n = len(seen) // wide if wide else 0
-        if not n:
-            continue
-        parts = seen[: n * wide].reshape(n, wide, -1)
-        known = np.isfinite(parts).sum(axis=1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            means = np.nansum(parts, axis=1) / np.sqrt(known) / white
-        total += float(np.nansum(means**2 - 1.0))
-        count += int(np.isfinite(means).sum())
+    with np.errstate(invalid="ignore", divide="ignore"):
+        short = SHORT if min(map(len, reference.residuals)) >= 4 * SHORT else 1  # points of a curve are independent
+        fast = np.concatenate([np.diff(_means(r, short), n=2, axis=0) for r in reference.residuals])
+        noise = np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
+        for r in f.residuals:
+            means = _means(r, WINDOW) / noise
+            total += float(np.nansum(means**2 - 1.0))
+            count += int(np.isfinite(means).sum())
     return total, float(np.sqrt(2.0 * max(count, 1)))
+
+
+def _means(residual: np.ndarray, frames: int) -> np.ndarray:
+    """Means [n, D] over so many frames, times the root of how many were seen; one of all if there are fewer."""
+    seen = residual[np.any(np.isfinite(residual), axis=1)]
+    wide = min(frames, len(seen))
+    n = len(seen) // wide if wide else 0
+    parts = seen[: n * wide].reshape(n, wide, -1)
+    return np.nansum(parts, axis=1) / np.sqrt(np.isfinite(parts).sum(axis=1))
 
 
 def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:
