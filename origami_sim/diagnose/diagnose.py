@@ -26,7 +26,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.prescribed import curves
-from origami_sim.diagnose.refit import Fit, Weights, fit, linearise
+from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
@@ -46,7 +46,7 @@ class Options:
         steps: solver steps that one pass over the data may take; longer recordings are sampled evenly.
         screened: segments that the screening uses at most.
         finalists: suspects that are refitted. most: effects that may be combined.
-        significance: of the look-elsewhere test. clear: ratio of the best probability that is a verdict, not a tie.
+        significance, level: of the look-elsewhere tests, against noise and against effects too small to be told.
         seed: of the null draws. threads: see `Batch`.
     """
 
@@ -58,7 +58,7 @@ class Options:
     finalists: int = 6
     most: int = 3
     significance: float = 0.01
-    clear: float = 0.9
+    level: float = 0.05
     draws: int = 999
     seed: int = 0
     threads: int | None = None
@@ -143,6 +143,7 @@ def diagnose(
     fits += alike_ones
     # with weights that do not count the effect itself as noise
     p_value = look_elsewhere(screening, o.draws, o.seed, fits)
+    p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=SMALL)
     lap("refit")
     tell("combine", 0.0)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
@@ -154,7 +155,7 @@ def diagnose(
     lap("combine")
     tell("verdict", 0.0)
     given = fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=4)
-    judged = words.judge(forward, given, base, free_start, fits, scores, screening, p_value, weights, o)
+    judged = words.judge(forward, given, base, free_start, fits, scores, screening, (p_value, p_small), weights, o)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
@@ -178,6 +179,8 @@ def diagnose(
         isolability=screening.overlap()[:12, :12].tolist(),
         places=places,
         p_value=p_value,
+        p_small=p_small,
+        structure=judged.structure,
         onset=judged.onset,
         traces=traces(forward, given, base, best, weights),
         correlations=correlations(forward, base, best),
@@ -338,19 +341,21 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
             forward, Hypothesis(), w, theta=base.theta, local=base.local, most=5, done=0.01, known=known, kept=kept
         )
     if not base.failed:
-        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local, begin=base.linear, exact=True)
+        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
-    # everything that follows rests on these derivatives
-    residual = None if base.linear is None else base.linear.residual
-    line = linearise(forward, Hypothesis(), base.free, base.theta, base.local, base.blocks, w, residual=residual)
-    return given.reweighted(first, w), replace(base, linear=line), w, Weights(noise, 1.0)
+    return given.reweighted(first, w), base, w, Weights(noise, 1.0)
 
 
-def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[Fit] = ()) -> float:
+SMALL, SHOWN = 3, 2.0
+"""Effects that are there in any device and too small to be told, and the score that each of them has."""
+
+
+def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[Fit] = (), *, small: int = 0) -> float:
     """Chance that noise alone gives any suspect so high a score: draws of white residuals, the same projection.
 
     Args:
+        small: so many suspects, drawn at random, act with a score of SHOWN each beside the noise.
         fits: the model without an effect, then those with one; what they gain counts if it is more than the screening
             saw, which knows small effects only.
     """
@@ -362,6 +367,9 @@ def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[F
     overlap = shapes @ shapes.T
     value, vector = np.linalg.eigh(overlap)
     draws_ = rng.normal(size=(draws, len(value))) * np.sqrt(np.maximum(value, 0.0)) @ vector.T
+    for _ in range(small):
+        sign = rng.choice([-SHOWN, SHOWN], size=(draws, 1))
+        draws_ += sign * overlap[rng.integers(len(overlap), size=draws)]
     highest = np.abs(draws_).max(axis=1)
     found = max(abs(s.score) for s in screening.signatures)
     for f in fits[1:]:
@@ -400,12 +408,12 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
             with the present weights.
     """
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
-    best = leader(fits, scores)
-    if best is None or len(best.hypothesis.suspects) != 1:
-        return []
+    good = [f for f in fits if id(f) in scores]
+    evidence = supported(good, scores)
+    near = [f for f, e in zip(good, evidence, strict=True) if e > max(evidence) - words.CLOSE]
     done = {f.hypothesis.label for f in fits}
-    mine = next(s for s in rough.signatures if s.suspect.label == best.hypothesis.label)
-    same = {s.suspect.label for s in rough.signatures if s.score and alike(s, mine)} - done
+    best = [s for f in near for s in rough.signatures if f.hypothesis.label == s.suspect.label]
+    same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)} - done
     again = [s for s in screening.signatures if s.suspect.label in same]
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
@@ -415,9 +423,6 @@ HOPELESS = 4.0
 
 CONTENDERS = 5
 """Fits that are refined, beside the model without any effect."""
-
-AGAIN = 2
-"""Of these, how many are also fitted anew from the starts that were recorded."""
 
 
 def settled(
@@ -432,14 +437,10 @@ def settled(
     least = HOPELESS * min(f.cost for f in out)
     order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < least]
     order.sort(key=lambda n: out[n].cost)
-    for place, n in enumerate([0, *order[:CONTENDERS]]):
+    for n in [0, *order[:CONTENDERS]]:
         f = out[n]
-        given = {"theta": f.theta, "blocks": f.blocks}
-        tried = [fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, exact=True, **given)]
-        if new is not weights and place <= AGAIN:
-            # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
-            tried.append(fit(forward, f.hypothesis, new, exact=True, **given))
-        out[n] = min(tried, key=lambda f: f.cost)
+        given = {"theta": f.theta, "local": f.local, "blocks": f.blocks, "begin": f.linear}
+        out[n] = fit(forward, f.hypothesis, new, **given)
     return reweighted(screening, out[0], weights, new), out, new
 
 
@@ -531,9 +532,9 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
         left = again(screening, best, without=best.hypothesis.effects)
         if not left.signatures:
             break
-        p = look_elsewhere(left, o.draws, o.seed)
+        p = look_elsewhere(left, o.draws, o.seed, small=SMALL)
         top = left.signatures[0]
-        if p > o.significance or top.score**2 < INEXACT * (base.cost - best.cost):
+        if p > o.level or top.score**2 < INEXACT * (base.cost - best.cost):
             break
         rivals = [g for g in left.signatures if g.suspect.effect == top.suspect.effect]  # the same at other sites
         tried = []

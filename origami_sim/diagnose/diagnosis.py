@@ -165,7 +165,10 @@ class Diagnosis:
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
+        structure: slow structure that the refitted nominal model leaves and that the best explanation leaves, in
+            standard deviations of what noise gives.
         p_value: of the best suspect's score among all that were tried, under the refitted nominal.
+        p_small: the same if small effects act beside the noise, each too weak to be told.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
         components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
@@ -183,6 +186,8 @@ class Diagnosis:
     isolability: list[list[float]]
     places: list[Place]
     p_value: float
+    p_small: float
+    structure: tuple[float, float]
     onset: float
     traces: list[Trace]
     correlations: list[Correlation]

@@ -56,12 +56,12 @@ def separation(forward: Forward, a: Fit, b: Fit, weights: Weights) -> float:
     """Expected separation d' of two fitted explanations in an experiment."""
     blocks = list(range(len(forward.blocks)))
     local = np.zeros((len(blocks), forward.local))
-    truth = forward.predict(a.hypothesis, a.theta[None], local[None])
+    truth = forward.predict(a.hypothesis, a.theta[None], local[None], soft=True)
     for n, v in enumerate(truth):
         if not np.all(np.isfinite(v[0])):
             return 0.0
         forward.blocks[n] = replace(forward.blocks[n], values=v[0])
-    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights)
+    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights, soft=True)
     rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
     scale = np.array([f.scale for f in b.free])

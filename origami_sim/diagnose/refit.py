@@ -23,12 +23,8 @@ SLOWEST = 2.5
 FAINT = 1e-7
 """Changes of a start that show so much less than others, and of which nothing else is known, are left alone."""
 
-STALE, OWN, ALL, SHARP = range(4)
-"""Which derivatives belong to the present point: none; those by the hypothesis' own numbers; all; all, of panels that
-are not softer."""
-
-SHARPENED = 4
-"""Steps that a fit may take with derivatives that are not of softer panels, after the others."""
+STALE, OWN, ALL = range(3)
+"""Which derivatives belong to the present point: none, those by the hypothesis' own numbers, all."""
 
 DONE = 3e-3
 """A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
@@ -207,7 +203,7 @@ def linearise(
     known: Linearisation | None = None,
     kept: int = 0,
     residual: list[np.ndarray] | None = None,
-    soft: bool = True,
+    soft: bool = False,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
@@ -215,7 +211,8 @@ def linearise(
         fixed: leave theta out (only the starts are to be fitted).
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
         residual: whitened residuals at this point, if they are known.
-        soft: take the derivatives with softer panels, see `Forward.soften`.
+        soft: of softer panels, see `Forward.soften`. Derivatives by starts and nominal numbers need to be exact to
+            the part that those which hardly show are of those that show most, to which softer panels are not.
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
@@ -229,12 +226,7 @@ def linearise(
     for i in range(size):
         locals_[1 + count - kept + i, :, i] += nudges[i]
     if residual is None:
-        here = forward.predict(hypothesis, theta[None], local[None], blocks)
-        residual = []
-        for b, values in zip(blocks, here, strict=True):
-            measured = forward.blocks[b].values  # nan where something was measured and the prediction failed
-            gap = _scaled(np.where(np.isfinite(measured), measured - values[0], 0.0), weights)
-            residual.append(_with_start(forward, b, gap, local[b]))
+        residual = residuals(forward, hypothesis, theta, local, blocks, weights, soft=soft)
     if len(thetas) > 1:
         predicted = forward.predict(hypothesis, thetas, locals_, blocks, soft=soft)
     else:
@@ -250,6 +242,17 @@ def linearise(
     if known is not None:
         return known.at(residual).beside(tangent, kept)
     return Linearisation.of(residual, tangent, starts)
+
+
+def residuals(forward, hypothesis: Hypothesis, theta, local, blocks, weights: Weights, *, soft: bool = False):
+    """Whitened residuals of the blocks, each with that of its start; nan where a prediction failed."""
+    out = []
+    predicted = forward.predict(hypothesis, theta[None], local[None], blocks, soft=soft)
+    for b, values in zip(blocks, predicted, strict=True):
+        measured = forward.blocks[b].values
+        gap = _scaled(np.where(np.isfinite(measured), measured - values[0], 0.0), weights)
+        out.append(_with_start(forward, b, gap, local[b]))
+    return out
 
 
 def _with_start(forward, b: int, gap: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -287,7 +290,6 @@ def fit(
     known: Linearisation | None = None,
     kept: int = 0,
     begin: Linearisation | None = None,
-    exact: bool = False,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
@@ -300,7 +302,6 @@ def fit(
         blocks: fit these only. fixed: keep theta and fit the starts only.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
         begin: residuals and all derivatives of the point where the fit begins.
-        exact: end with derivatives that are not those of softer panels.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
     free = (*forward.subject.nominals, *hypothesis.free)
@@ -309,32 +310,28 @@ def fit(
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = 0 if fixed else len(free)
 
-    def derived(theta, local, near: Linearisation | None, residual=None, level=ALL) -> Linearisation:
-        also = {"known": near, "kept": kept if near else 0, "residual": residual, "soft": level < SHARP}
+    def derived(theta, local, near: Linearisation | None, residual) -> Linearisation:
+        also = {"known": near, "kept": kept if near else 0, "residual": residual, "soft": near is not None}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
-    line = begin or derived(theta, local, known)
+    line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
     level = STALE if begin else ALL if known is None else OWN
-    top = SHARP if exact and forward.softness > 1.0 else ALL
-    best, doubts, sharp = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0, False
+    best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     slowest = forward.step(hypothesis, theta) / SLOWEST
     floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
-    for n in range(most + SHARPENED * (top == SHARP)):
+    for n in range(most):
         assert theta is not None and local is not None
-        if n >= most and not sharp:
-            level, sharp = SHARP, True
-            line = derived(theta, local, None, line.residual, level)
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
         change, moves, promised = _proposed(forward, free, theta, local, blocks, line)
         enough = max(LITTLE, done * (best - floor))
         whole, gain, found = best - promised, 0.0, None
-        if whole < enough and (sharp or top == ALL) and (level > STALE or not width):
+        if whole < enough and (level > STALE or not width):
             break
-        trying = STEPS if level >= ALL or not n else CHORD
-        for part in trying if whole >= enough or level == STALE else ():
+        trying = STEPS if level == ALL or not n else CHORD
+        for part in trying:
             trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
             if width and hypothesis.suspects and part > trying[-1] and forward.step(hypothesis, trial) < slowest:
@@ -347,7 +344,7 @@ def fit(
             if best - cost > FAITHFUL * whole * part * (2.0 - part):
                 break
         faithful, stuck = gain > FAITHFUL * whole, gain < enough
-        if stuck and (level == top or sharp):
+        if stuck and level == ALL:
             break
         if found is not None:
             (theta, local, predicted), best = found, best - gain
@@ -356,8 +353,8 @@ def fit(
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
-            level = top if top == SHARP else OWN if kept and doubts == 1 else ALL
-            line, sharp = derived(theta, local, line if level == OWN else None, line.residual, level), level == SHARP
+            level = OWN if kept and doubts == 1 else ALL
+            line = derived(theta, local, line if level == OWN else None, line.residual)
     if width and level == STALE:  # the intervals are those of the place where the fit ended
         line = derived(theta, local, line, line.residual)
     return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)

@@ -20,6 +20,9 @@ REMOVED = 0.6
 """Part of the slow structure of the residual that named physics must remove; with less it is UNKNOWN."""
 
 
+STRUCTURED = 8.0
+"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
+
 STRAINED = 3.0
 """Standard deviations from what was known that no number of a named explanation may be."""
 
@@ -33,6 +36,7 @@ class Judgement:
         removed: part of the removable squared error that it removes on held-out data. left: residual over noise after
             it.
         onset: first lasting departure of the refitted nominal [s]; nan: none. others: other explanations, best first.
+        structure: slow structure that the refitted nominal leaves, and the best fit, in standard deviations of noise.
     """
 
     verdict: str
@@ -46,10 +50,16 @@ class Judgement:
     onset: float
     notes: list[str] = field(default_factory=list)
     others: list[Fit] = field(default_factory=list)
+    structure: tuple[float, float] = (0.0, 0.0)
 
 
-def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, p_value, weights, o):
-    """Weighs all fits; see `docs/diagnosis.md` for the rules in words."""
+def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, chance, weights, o):
+    """Weighs all fits; see `docs/diagnosis.md` for the rules in words.
+
+    Args:
+        chance: that noise, and that noise and effects too small to be told, give so good a suspect.
+    """
+    p_value, p_small = chance
     sigma = noise.deviation
     rows = [f for f in fits if id(f) in scores]
     p = probabilities(supported(rows, scores))
@@ -62,10 +72,24 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
     removed = removable(rms_base, rms_best, sigma)
     begins = onset(forward, base, sigma, weights=weights).time
     others = [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)]
+    slow_before, scale = structure(base, best)
+    slow_after, _ = structure(best, best)
+    slow = (slow_before / scale, slow_after / scale)
 
     def result(verdict, sentence, probability, chosen, fit=best, tied=()):
         return Judgement(
-            verdict, sentence, float(probability), list(chosen), fit, list(tied), removed, left, begins, notes, others
+            verdict,
+            sentence,
+            float(probability),
+            list(chosen),
+            fit,
+            list(tied),
+            removed,
+            left,
+            begins,
+            notes,
+            others,
+            slow,
         )
 
     kept, total = credible(rows, p, order, scores)
@@ -76,8 +100,7 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             return result(
                 "UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base
             )
-        slow, chance = structure(base, base)
-        if slow < 8.0 * chance or over < 1.05:
+        if slow[0] < STRUCTURED or over < 1.05:
             probability = max(float(p[rows.index(base)]), chance_of_null(p_value))
             return _adequate_or_parameter(forward, given, base, weights, result, over, probability)
         if p_value <= o.significance and best is not base and p[rows.index(base)] < 0.5:
@@ -105,10 +128,9 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
     fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
     if over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
-    slow_before, chance = structure(base, best)
-    slow_after, _ = structure(best, best)
-    explained = 1.0 - slow_after / slow_before if slow_before > 5.0 * chance else 1.0
-    if explained < REMOVED and slow_after > 5.0 * chance:
+    small = p_small > o.level
+    explained = 1.0 - slow[1] / slow[0] if slow[0] > STRUCTURED else 1.0
+    if explained < REMOVED and slow[1] > STRUCTURED and left > 1.05:
         removed = min(removed, explained)
         return result(
             "UNKNOWN",
@@ -118,6 +140,8 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             [best.hypothesis.label],
         )
     strain, number = _strain(best)
+    if strain > STRAINED and small:
+        return _adequate_or_parameter(forward, given, base, weights, result, over, chance_of_null(p_small))
     if strain > STRAINED:
         return result(
             "UNKNOWN",
@@ -126,6 +150,9 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
             mechanism_p,
             [best.hypothesis.label],
         )
+    if small and base not in kept:
+        kept.append(base)
+        total = min(total + float(p[rows.index(base)]), 1.0)
     rivals = [f for f in kept if _effects(f) != _effects(best)]
     if rivals and all(kind(f) == "measurement" for f in kept):
         names = _distinct(kept)
@@ -237,36 +264,44 @@ WINDOW = 10
 """Frames over which residuals are averaged to tell structure from noise."""
 
 
-SHORT = 5
-"""Frames over which residuals are averaged to see their noise, which a tracker may have smoothed over some frames."""
+BAND = (1 / 20, 1 / 8)
+"""Frequencies per frame at which the noise of a residual is read: above most structure, below what trackers smooth."""
 
 
 def structure(f: Fit, reference: Fit) -> tuple[float, float]:
     """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
 
     Squares of window means in units of what noise would give, less one each, summed; short segments are one window.
-    The noise is that of the reference's residual (second differences of short means), so that a noise level that was
-    stated wrongly, or a tracker that smooths, does not matter.
+    The noise is that of the reference's residual, so that a noise level that was stated wrongly does not matter.
     """
-    total, count = 0.0, 0
-    with np.errstate(invalid="ignore", divide="ignore"):
-        short = SHORT if min(map(len, reference.residuals)) >= 4 * SHORT else 1  # points of a curve are independent
-        fast = np.concatenate([np.diff(_means(r, short), n=2, axis=0) for r in reference.residuals])
-        noise = np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
-        for r in f.residuals:
-            means = _means(r, WINDOW) / noise
-            total += float(np.nansum(means**2 - 1.0))
-            count += int(np.isfinite(means).sum())
+    total, count, noise = 0.0, 0, noise_of(reference.residuals)
+    for r in f.residuals:
+        seen = r[np.any(np.isfinite(r), axis=1)]
+        wide = min(WINDOW, len(seen))
+        n = len(seen) // wide if wide else 0
+        parts = seen[: n * wide].reshape(n, wide, -1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means = np.nansum(parts, axis=1) / np.sqrt(np.isfinite(parts).sum(axis=1)) / noise
+        total += float(np.nansum(means**2 - 1.0))
+        count += int(np.isfinite(means).sum())
     return total, float(np.sqrt(2.0 * max(count, 1)))
 
 
-def _means(residual: np.ndarray, frames: int) -> np.ndarray:
-    """Means [n, D] over so many frames, times the root of how many were seen; one of all if there are fewer."""
-    seen = residual[np.any(np.isfinite(residual), axis=1)]
-    wide = min(frames, len(seen))
-    n = len(seen) // wide if wide else 0
-    parts = seen[: n * wide].reshape(n, wide, -1)
-    return np.nansum(parts, axis=1) / np.sqrt(np.isfinite(parts).sum(axis=1))
+def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """(D,) standard deviation of the noise in residuals (n, D), were it white: the median of their spectra in a band.
+
+    Frames of a tracker that smooths are not independent. Points of short curves are: of those, second differences.
+    """
+    if min(map(len, residuals)) < 2 / BAND[0]:
+        fast = np.concatenate([np.diff(r, n=2, axis=0) for r in residuals])
+        return np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
+    powers = []
+    for r in residuals:
+        taper = np.hanning(len(r) + 2)[1:-1, None] * np.isfinite(r)
+        power = np.abs(np.fft.rfft(taper * np.nan_to_num(r), axis=0)) ** 2 / np.maximum((taper**2).sum(axis=0), 1e-300)
+        frequency = np.fft.rfftfreq(len(r))
+        powers.append(power[(frequency >= BAND[0]) & (frequency <= BAND[1])])
+    return np.sqrt(np.median(np.concatenate(powers), axis=0) / np.log(2.0))
 
 
 def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:

@@ -143,6 +143,8 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
         places=[place(middle, 0.93, rng), place(CREASES[0], 0.05, rng), place(CREASES[2], 0.015, rng),
                 place("shift x", 0.005, rng)],
         p_value=0.005,
+        p_small=0.02,
+        structure=(31.0, 0.4),
         onset=0.31,
         traces=traces,
         correlations=correlations,
