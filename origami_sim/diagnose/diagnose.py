@@ -347,7 +347,7 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
     return given.reweighted(first, w), base, w, Weights(noise, 1.0)
 
 
-SMALL, SHOWN = 3, 2.0
+SMALL, SHOWN = 4, 2.0
 """Effects that are there in any device and too small to be told, and the score that each of them has."""
 
 
@@ -424,6 +424,9 @@ HOPELESS = 4.0
 CONTENDERS = 5
 """Fits that are refined, beside the model without any effect."""
 
+AGAIN = 2
+"""Of these, how many are also fitted anew from the starts that were recorded."""
+
 
 def settled(
     forward: Forward, screening: Screening, fits: list[Fit], weights: Weights
@@ -437,10 +440,13 @@ def settled(
     least = HOPELESS * min(f.cost for f in out)
     order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < least]
     order.sort(key=lambda n: out[n].cost)
-    for n in [0, *order[:CONTENDERS]]:
+    for place, n in enumerate([0, *order[:CONTENDERS]]):
         f = out[n]
-        given = {"theta": f.theta, "local": f.local, "blocks": f.blocks, "begin": f.linear}
-        out[n] = fit(forward, f.hypothesis, new, **given)
+        given = {"theta": f.theta, "blocks": f.blocks}
+        out[n] = fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, **given)
+        if new is not weights and place <= AGAIN:
+            # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
+            out[n] = min(out[n], fit(forward, f.hypothesis, new, **given), key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new
 
 

@@ -10,18 +10,18 @@ from origami_sim.diagnose.compare import Score, Weights, difference, probabiliti
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import Fit, whitened
 from origami_sim.diagnose.screen import Screening
+from origami_sim.diagnose.trust import trust
 from origami_sim.effects import get
 from origami_sim.recording.units import quantity
 
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-REMOVED = 0.6
-"""Part of the slow structure of the residual that named physics must remove; with less it is UNKNOWN."""
-
-
-STRUCTURED = 8.0
+STRUCTURED = 5.0
 """Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
+
+INEXACT = 0.06
+"""Part of the slow structure that a named effect may leave, because real devices follow no law exactly."""
 
 STRAINED = 3.0
 """Standard deviations from what was known that no number of a named explanation may be."""
@@ -123,19 +123,18 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
         )
     # the same effects elsewhere, or with another that is not proven
     same = [f for f in rows if _effects(f) == _effects(best) or _labels(f) > _labels(best)]
-    mechanism_p = float(sum(p[rows.index(f)] for f in same))
+    trusted = trust(gain, len(best.hypothesis.suspects))
+    mechanism_p = trusted * float(sum(p[rows.index(f)] for f in same))
     kept = [f for f in kept if f is best or not _labels(f) > _labels(best)]
     fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
     if over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
     small = p_small > o.level
-    explained = 1.0 - slow[1] / slow[0] if slow[0] > STRUCTURED else 1.0
-    if explained < REMOVED and slow[1] > STRUCTURED and left > 1.05:
-        removed = min(removed, explained)
+    if slow[1] > max(STRUCTURED, INEXACT * slow[0]) and left > 1.05 and not small:
         return result(
             "UNKNOWN",
-            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, removes only "
-            f"{max(removed, 0.0):.0%} of the removable error; {fall}.",
+            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, leaves "
+            f"slow structure of {slow[1]:.0f} times what noise gives, of {slow[0]:.0f} before; {fall}.",
             mechanism_p,
             [best.hypothesis.label],
         )
@@ -153,6 +152,7 @@ def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screenin
     if small and base not in kept:
         kept.append(base)
         total = min(total + float(p[rows.index(base)]), 1.0)
+    total *= trusted
     rivals = [f for f in kept if _effects(f) != _effects(best)]
     if rivals and all(kind(f) == "measurement" for f in kept):
         names = _distinct(kept)

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
+from origami_sim.diagnose.trust import FILE as TRUST
 from origami_sim.errors import InputError
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -22,7 +23,7 @@ def state(truth: Path) -> dict:
     Args:
         truth: folder of the truth generator.
     """
-    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts]
+    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts] + [TRUST]
     case = PACKAGE / "prove" / "case.py"
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -1,0 +1,72 @@
+"""Fits the curve of `diagnose.trust` to development runs: `python -m origami_sim.prove.trust RUN [RUN ...]`."""
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from origami_sim.diagnose.trust import FILE, features
+from origami_sim.prove import DEVELOPMENT
+from origami_sim.prove.battery import RUN
+from origami_sim.prove.freeze import FROZEN
+from origami_sim.prove.score import judge
+
+RIDGE = np.array([0.0, 1.0, 1.0])
+"""Inverse variances of the coefficients: none is far from 0 without many cases."""
+
+
+def outcomes(run: Path) -> list[tuple[np.ndarray, bool]]:
+    """(features, whether the truth is among what was named) of all cases of a run in which something was named."""
+    out = []
+    for file in sorted((run / "cases").glob("*/diagnosis.json")):
+        found = json.loads(file.read_text())
+        row = judge(json.loads((run / "sealed" / f"{file.parent.name}.json").read_text()), found)
+        nominal = any(c == "nominal" for c in found.get("chosen", []))
+        if row["correct"] is None or nominal:
+            continue
+        best = max(found["candidates"], key=lambda c: c["probability"])
+        out.append((features(best["gain"], len(best["effects"])), row["correct"]))
+    return out
+
+
+def fitted(cases: list[tuple[np.ndarray, bool]]) -> np.ndarray:
+    """(3,) coefficients of the logistic curve of highest posterior."""
+    x, y = np.stack([c[0] for c in cases]), np.array([c[1] for c in cases], float)
+
+    def cost(w):
+        s = x @ w
+        return np.sum(np.logaddexp(0.0, s) - y * s) + 0.5 * RIDGE @ w**2
+
+    return minimize(cost, np.zeros(x.shape[1])).x
+
+
+def main() -> None:
+    runs = [Path(p) for p in sys.argv[1:]]
+    stored = [json.loads((r / RUN).read_text()) | json.loads((r / FROZEN).read_text()) for r in runs]
+    if not runs or any(s["seed"] >= DEVELOPMENT for s in stored):
+        sys.exit("runs of development seeds are needed")
+    cases = [c for r in runs for c in outcomes(r)]
+    w = fitted(cases)
+    keys = ("seed", "commit", "diagnosis", "truth")
+    FILE.write_text(
+        json.dumps(
+            {
+                "coefficients": [round(float(v), 3) for v in w],
+                "features": ["1", "log of the held-out gain", "several effects"],
+                "named": len(cases),
+                "right": int(sum(c[1] for c in cases)),
+                "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+                "batteries": [{k: s[k] for k in keys} for s in stored],
+            },
+            indent=1,
+        )
+        + "\n"
+    )
+    print(FILE.read_text())
+
+
+if __name__ == "__main__":
+    main()
