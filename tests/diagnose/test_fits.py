@@ -1,18 +1,22 @@
 """Fits that use derivatives again, weights that are replaced, held-out densities: against plain ways to the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from origami_sim.diagnose import Options
+from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import _predictive
-from origami_sim.diagnose.diagnose import alike, arranged, nominal_fits, prepared, settled
-from origami_sim.diagnose.forward import FINER, refined
+from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
+from origami_sim.diagnose.forward import FINER, local_line, refined
 from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
+from origami_sim.diagnose.trust import trust
+from origami_sim.diagnose.verdict import noise_of
 from origami_sim.solve.batch import Batch
-from tests.diagnose.strips import record, subject
+from tests.diagnose.strips import hanging, record, subject
 
 STIFFENING = {"crease_stiffening": {"cubic_stiffness": (4e-4, [1])}}
 SMALL = {"duration": 3.0, "panels": 3, "rate": 100}
@@ -23,6 +27,7 @@ def stiff():
     """The nominal fit of a strip with a stiffening crease."""
     recordings = prepared([record(STIFFENING, **SMALL)], 200.0)
     forward = arranged(subject(3), recordings, Options())
+    forward.soften()
     _, base, weights, _ = nominal_fits(forward)
     one = next(
         s
@@ -130,3 +135,90 @@ def test_only_smooth_drives_are_refined(wave, smooth):
         true = 0.02 * np.sin(15.0 * between)
         cut = np.abs(np.interp(between, times, wave(times)) - true).max()
         assert np.abs(np.interp(between, t, values) - true).max() < 0.2 * cut
+
+
+# --- starts
+
+
+def test_a_fit_does_not_depend_on_where_its_starts_begin():
+    heavy = {("crease_viscosity", "viscosity"): 30.0}  # rates of the start die at once: their directions hardly show
+    model, parameters = hanging(3)
+    parameters.set("crease_viscosity", "viscosity", 30.0 * parameters["crease_viscosity", "viscosity"])
+    known = Subject.from_model(model, parameters, None, [factor("crease.stiffness", 0.05)])
+    forward = arranged(known, prepared([record(factors=heavy, **SMALL)], 200.0), Options(start="fit"))
+    _, base, weights, _ = nominal_fits(forward)
+    away = base.local.copy()
+    away[:, forward.local // 2 :] += 2.0
+    for local in (None, away):
+        assert fit(forward, Hypothesis(), weights, local=local, most=20).cost == pytest.approx(base.cost, abs=0.5)
+
+
+def test_a_rate_is_known_as_well_as_the_recording_tells():
+    rng, times, sigma = np.random.default_rng(0), np.arange(200) / 200.0, 1e-3
+    found = []
+    for _ in range(200):
+        values = (0.3 * np.sin(4.0 * times) + sigma * rng.normal(size=200))[:, None]
+        _, slope, error = local_line(times, values, np.array([sigma]), 100)
+        found.append((slope[0] - 1.2 * np.cos(2.0)) / error[0])
+    assert np.std(found) == pytest.approx(1.0, rel=0.15) and abs(np.mean(found)) < 0.5
+
+
+# --- softer panels
+
+
+def test_softer_panels_take_longer_steps_to_the_same_derivatives(stiff):
+    forward, base, weights, one = stiff
+    assert forward.softness > 1.0
+    fast, slow = (
+        linearise(forward, Hypothesis((one,)), (*base.free, *one.free), theta, base.local, base.blocks, weights, soft=s)
+        for theta in [np.concatenate([base.theta, [0.0]])]
+        for s in (True, False)
+    )
+    steps = [forward.step(Hypothesis(), base.theta, soft=s) for s in (True, False)]
+    assert steps[0] > 2.0 * steps[1]
+    for a, b in ((fast.tangent, slow.tangent), (fast.slopes, slow.slopes)):
+        a, b = np.concatenate(a), np.concatenate(b)
+        size = np.linalg.norm(b, axis=0)
+        assert np.all(np.linalg.norm(a - b, axis=0) < 0.2 * size.max())
+    mine = [np.concatenate(t.tangent)[:, -1] for t in (fast, slow)]
+    assert mine[0] @ mine[1] > 0.95 * np.linalg.norm(mine[0]) * np.linalg.norm(mine[1])
+
+
+def test_panels_whose_stiffness_is_in_doubt_are_not_made_softer(stiff):
+    forward, base, *_ = stiff
+    panels = next(s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "panel_softness")
+    theta = np.concatenate([base.theta, [f.start for f in panels.free]])
+    assert forward.step(Hypothesis((panels,)), theta, soft=True) == forward.step(Hypothesis((panels,)), theta)
+    doubted = Subject.from_model(*hanging(3), None, [factor("panel_bending.stiffness", 0.1)])
+    other = arranged(doubted, forward.recordings, Options())
+    other.soften()
+    assert other.softness == 1.0
+
+
+# --- what is left
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("line", [0.0, 5.0])
+def test_the_noise_of_a_residual_is_seen_beside_structure_and_through_a_filter(smooth, line):
+    rng = np.random.default_rng(1)
+    noise = rng.normal(size=(16, 252, 2))
+    noise = 0.25 * noise[:, :-2] + 0.5 * noise[:, 1:-1] + 0.25 * noise[:, 2:] if smooth else noise[:, 1:-1]
+    slow = line * np.sin(2 * np.pi * np.arange(250) / 60.0)[:, None]
+    assert noise_of([0.1 * (n + slow) for n in noise]) == pytest.approx(0.1, rel=0.2)
+
+
+def test_small_effects_excuse_what_noise_does_not(stiff):
+    forward, base, weights, _ = stiff
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    found = screen(forward, [s for s in every if s.effect.startswith("crease")], base, weights)
+    scores = [replace(s, score=3.9) for s in found.signatures]
+    weak = replace(found, signatures=scores)
+    assert look_elsewhere(weak, 999, 0) < 0.01 < look_elsewhere(weak, 999, 0, small=4)
+    strong = replace(found, signatures=[replace(s, score=20.0) for s in scores])
+    assert look_elsewhere(strong, 999, 0, small=4) < 0.01
+
+
+def test_trust_grows_with_the_gain_and_is_never_certain():
+    assert 0.0 < trust(0.0, 1) < trust(10.0, 1) < trust(1000.0, 1) < 1.0
+    assert trust(100.0, 2) < trust(100.0, 1)

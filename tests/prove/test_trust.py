@@ -1,0 +1,55 @@
+"""The curve of trust: fitted to outcomes, from development runs only."""
+
+import json
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose.trust import FILE, features
+from origami_sim.prove import DEVELOPMENT
+from origami_sim.prove.trust import fitted, main, outcomes
+
+
+def test_the_curve_is_that_of_the_outcomes():
+    rng, w = np.random.default_rng(0), np.array([-1.0, 0.5, -0.7])
+    x = [
+        features(float(g), int(k))
+        for g, k in zip(np.exp(rng.uniform(0, 7, 4000)), rng.integers(1, 3, 4000), strict=True)
+    ]
+    cases = [(v, bool(rng.random() < 1 / (1 + np.exp(-v @ w)))) for v in x]
+    assert fitted(cases) == pytest.approx(w, abs=0.2)
+
+
+def test_few_cases_do_not_make_it_steep():
+    assert abs(fitted([(features(1000.0, 1), True), (features(1.0, 1), False)])[1]) < 1.0
+
+
+def run(folder, seed: int):
+    (folder / "cases" / "0000").mkdir(parents=True)
+    (folder / "run.json").write_text(json.dumps({"seed": seed}))
+    (folder / "frozen.json").write_text(json.dumps({"commit": "c", "diagnosis": "d", "truth": "t"}))
+    return folder
+
+
+def test_sealed_runs_are_refused(tmp_path, monkeypatch):
+    before = FILE.read_bytes()
+    monkeypatch.setattr("sys.argv", ["trust", str(run(tmp_path, DEVELOPMENT))])
+    with pytest.raises(SystemExit, match="development"):
+        main()
+    assert FILE.read_bytes() == before
+
+
+def test_a_case_that_names_nothing_teaches_nothing(tmp_path):
+    folder = run(tmp_path, 1)
+    (folder / "sealed").mkdir()
+    keys = ("case", "kind", "null", "structure", "mechanism", "site", "d_wanted", "d", "strength", "onset", "number")
+    answer = dict.fromkeys(keys, 0) | {"kind": "single", "names": ["crease_friction"], "site": "fold1"}
+    (folder / "sealed" / "0000.json").write_text(json.dumps(answer))
+    candidate = {"gain": 80.0, "effects": ["crease_friction"], "probability": 1.0, "numbers": []}
+    found = {"candidates": [candidate], "probability": 0.8, "error_before": [2.0], "error_after": [1.0]}
+    found |= {"error_refitted": [2.0], "noise": [1.0], "baselines": []}
+    for verdict, chosen, expected in (("ADEQUATE", [], 0), ("MECHANISM", ["crease_friction at fold1"], 1)):
+        file = folder / "cases" / "0000" / "diagnosis.json"
+        file.write_text(json.dumps(found | {"verdict": verdict, "chosen": chosen}))
+        got = outcomes(folder)
+        assert len(got) == expected and all(right for _, right in got)
