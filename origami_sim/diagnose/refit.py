@@ -357,6 +357,8 @@ def fit(
             line = derived(theta, local, line if level == OWN else None, line.residual)
     if width and level == STALE:  # the intervals are those of the place where the fit ended
         line = derived(theta, local, line, line.residual)
+    if not all(np.all(np.isfinite(t)) for t in line.tangent):
+        return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite where the fit ends")
     return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
 
 

@@ -137,6 +137,20 @@ def test_only_smooth_drives_are_refined(wave, smooth):
         assert np.abs(np.interp(between, t, values) - true).max() < 0.2 * cut
 
 
+def test_a_derivative_that_is_not_finite_where_a_fit_ends_is_said(stiff, monkeypatch):
+    forward, base, weights, one = stiff
+
+    def broken(*given, **also):
+        line = linearise(*given, **also)
+        return line if also["known"] is None else replace(line, tangent=[np.nan * t for t in line.tangent])
+
+    monkeypatch.setattr("origami_sim.diagnose.refit.linearise", broken)
+    line = linearise(forward, Hypothesis((one,)), (*base.free, *one.free), np.append(base.theta, 0.0), base.local,
+                     base.blocks, weights)  # fmt: skip
+    given = {"theta": np.append(base.theta, 0.0), "local": base.local, "known": base.linear, "kept": len(base.free)}
+    assert "not finite" in fit(forward, Hypothesis((one,)), weights, **given, begin=line).failed
+
+
 # --- starts
 
 
