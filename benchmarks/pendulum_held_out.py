@@ -53,7 +53,7 @@ def main():
     recordings = prepared([read_recording(file, _sidecar(file))], 200.0)
     subject = Subject.from_scene(scene_module("pendulum_chain"), read_calibration("pendulum_chain"), spreads=SPREADS)
     forward = arranged(subject, recordings, Options(steps=300_000, segment=2.0))
-    _, base, weights, _ = nominal_fits(forward)
+    _, base, weights = nominal_fits(forward)
     found = {s.label: s for s in suspects(forward.model, recordings, forward.drive, forward.parameters)}
     blocks = np.arange(len(forward.blocks))
     halves = [list(map(int, h)) for h in np.array_split(blocks, 2)]

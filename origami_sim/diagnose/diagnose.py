@@ -118,7 +118,7 @@ def diagnose(
     if unseen is not None:
         noted.append(unseen)
     tell("nominal", 0.0)
-    given, base, weights, free_start = nominal_fits(forward)
+    given, base, weights = nominal_fits(forward)
     lap("nominal")
     tell("screen", 0.0)
     every = suspects(forward.model, recordings, _union(forward), forward.parameters)
@@ -152,10 +152,12 @@ def diagnose(
         screening, fits, weights = settled(forward, screening, [*fits, *more], weights)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
+    best = leader(fits, scores)
+    noise = words.floor_of(forward, base if best is None else best)
     lap("combine")
     tell("verdict", 0.0)
     given = fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=4)
-    judged = words.judge(forward, given, base, free_start, fits, scores, screening, (p_value, p_small), weights, o)
+    judged = words.judge(forward, given, base, noise, fits, scores, screening, (p_value, p_small), weights, o)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
@@ -182,13 +184,13 @@ def diagnose(
         p_small=p_small,
         structure=judged.structure,
         onset=judged.onset,
-        traces=traces(forward, given, base, best, weights),
+        traces=traces(forward, given, base, best, weights, noise),
         correlations=correlations(forward, base, best),
         experiments=experiments,
         baselines=beside,
         components=list(forward.components),
         units=_units(recordings[0]),
-        noise=forward.blocks[0].noise.tolist(),
+        noise=noise.tolist(),
         error_before=_rms(given).tolist(),
         error_refitted=scores[id(base)].rms.tolist(),
         error_after=after.rms.tolist(),
@@ -316,8 +318,8 @@ def _union(forward: Forward):
 # --- stages
 
 
-def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
-    """The nominal model as given (only starts fitted) and refitted; the weights, and those of the noise alone."""
+def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights]:
+    """The nominal model as given (only starts fitted) and refitted, and the weights."""
     noise = forward.blocks[0].noise
     theta = np.array([f.start for f in forward.subject.nominals])
     rough = forward.predict(Hypothesis(), theta[None], np.zeros((1, len(forward.blocks), forward.local)))
@@ -344,7 +346,7 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights, Weights]:
         base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
-    return given.reweighted(first, w), base, w, Weights(noise, 1.0)
+    return given.reweighted(first, w), base, w
 
 
 SMALL, SHOWN = 4, 2.0
@@ -689,7 +691,7 @@ def _units(recording: Recording) -> list[str]:
     return [c.unit for c in recording.channels.values() for _ in range(1 if c.values.ndim == 1 else c.values.shape[1])]
 
 
-def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights) -> list[Trace]:
+def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights, noise: np.ndarray) -> list[Trace]:
     """Recorded and predicted components of each recording, segment after segment."""
     out = []
     units = _units(forward.recordings[0])
@@ -709,7 +711,7 @@ def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights)
                     recording.name,
                     name,
                     units[d],
-                    float(blocks[0].noise[d]),
+                    float(noise[d]),
                     times.tolist(),
                     recorded[:, d].tolist(),
                     *(p[:, d].tolist() for p in predictions),

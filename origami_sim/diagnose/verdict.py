@@ -1,5 +1,6 @@
 """The verdict: which explanation the recordings support, in one of eight words and one sentence."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -53,14 +54,14 @@ class Judgement:
     structure: tuple[float, float] = (0.0, 0.0)
 
 
-def judge(forward, given: Fit, base: Fit, noise: Weights, fits, scores, screening: Screening, chance, weights, o):
+def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, screening: Screening, chance, weights, o):
     """Weighs all fits; see `docs/diagnosis.md` for the rules in words.
 
     Args:
+        sigma: (D,) noise of the components [SI], see `floor_of`.
         chance: that noise, and that noise and effects too small to be told, give so good a suspect.
     """
     p_value, p_small = chance
-    sigma = noise.deviation
     rows = [f for f in fits if id(f) in scores]
     p = probabilities(supported(rows, scores))
     order = np.argsort(-p)
@@ -285,6 +286,26 @@ def structure(f: Fit, reference: Fit) -> tuple[float, float]:
         total += float(np.nansum(means**2 - 1.0))
         count += int(np.isfinite(means).sum())
     return total, float(np.sqrt(2.0 * max(count, 1)))
+
+
+def floor_of(forward, best: Fit) -> np.ndarray:
+    """(D,) noise of the components [SI]: as stated; where it was read from the data, at least what a fit leaves fast.
+
+    A tracker that smooths hides its noise from neighbouring frames, from which it was read. Fast is what scatters about
+    the mean of a window.
+    """
+    floor = forward.blocks[best.blocks[0]].noise.copy()
+    channels = forward.recordings[0].channels.values()
+    width = [1 if c.values.ndim == 1 else c.values.shape[1] for c in channels]
+    read = np.repeat([c.noise_report is not None and c.noise == c.noise_report.level for c in channels], width)
+    if min(map(len, best.residuals)) >= 2 * WINDOW:
+        parts = [r[: len(r) // WINDOW * WINDOW].reshape(-1, WINDOW, len(floor)) for r in best.residuals]
+        with np.errstate(invalid="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # windows without a value
+            fast = np.nanvar(np.concatenate(parts), axis=1, ddof=1)
+            scatter = np.sqrt(np.nanmean(fast, axis=0))
+        floor[read] = np.fmax(floor, scatter)[read]
+    return floor
 
 
 def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:

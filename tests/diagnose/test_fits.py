@@ -1,6 +1,7 @@
 """Fits that use derivatives again, weights that are replaced, held-out densities: against plain ways to the same."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.trust import trust
-from origami_sim.diagnose.verdict import noise_of
+from origami_sim.diagnose.verdict import floor_of, noise_of
+from origami_sim.recording import noise_report
+from origami_sim.recording.recording import Channel
 from origami_sim.solve.batch import Batch
 from tests.diagnose.strips import hanging, record, subject
 
@@ -28,7 +31,7 @@ def stiff():
     recordings = prepared([record(STIFFENING, **SMALL)], 200.0)
     forward = arranged(subject(3), recordings, Options())
     forward.soften()
-    _, base, weights, _ = nominal_fits(forward)
+    _, base, weights = nominal_fits(forward)
     one = next(
         s
         for s in suspects(forward.model, recordings, forward.drive)
@@ -160,7 +163,7 @@ def test_a_fit_does_not_depend_on_where_its_starts_begin():
     parameters.set("crease_viscosity", "viscosity", 30.0 * parameters["crease_viscosity", "viscosity"])
     known = Subject.from_model(model, parameters, None, [factor("crease.stiffness", 0.05)])
     forward = arranged(known, prepared([record(factors=heavy, **SMALL)], 200.0), Options(start="fit"))
-    _, base, weights, _ = nominal_fits(forward)
+    _, base, weights = nominal_fits(forward)
     away = base.local.copy()
     away[:, forward.local // 2 :] += 2.0
     for local in (None, away):
@@ -220,6 +223,23 @@ def test_the_noise_of_a_residual_is_seen_beside_structure_and_through_a_filter(s
     noise = 0.25 * noise[:, :-2] + 0.5 * noise[:, 1:-1] + 0.25 * noise[:, 2:] if smooth else noise[:, 1:-1]
     slow = line * np.sin(2 * np.pi * np.arange(250) / 60.0)[:, None]
     assert noise_of([0.1 * (n + slow) for n in noise]) == pytest.approx(0.1, rel=0.2)
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_the_noise_that_a_smoothing_tracker_hides_is_counted_unless_it_is_stated(stated):
+    rng, times = np.random.default_rng(2), np.arange(480) / 120.0
+    noise = 1e-3 * rng.normal(size=482)
+    noise = 0.25 * noise[:-2] + 0.5 * noise[1:-1] + 0.25 * noise[2:]
+    report = noise_report(times, noise + 0.2 * np.sin(9.0 * times))
+    level = 2e-4 if stated else report.level
+    channel = Channel("fold", "crease_angle", noise, "rad", level, noise_report=report)
+    forward = SimpleNamespace(
+        recordings=[SimpleNamespace(channels={"fold": channel})], blocks=[SimpleNamespace(noise=np.array([level]))]
+    )
+    slow = 3e-3 * np.sin(2 * np.pi * times / 1.5)  # what a fit leaves is not noise
+    left = SimpleNamespace(blocks=(0,), residuals=[(noise + slow)[:, None]])
+    found = floor_of(forward, left)
+    assert level < 3e-4 and found == pytest.approx(level if stated else np.std(noise), rel=0.25)
 
 
 def test_small_effects_excuse_what_noise_does_not(stiff):

@@ -152,8 +152,8 @@ def sudden(t0: float, change=None, kick=None, seed: int = 0, noise: float = 2e-3
 
 def dated(recording: Recording) -> Onset:
     forward = arranged(subject(3), prepared([recording], 200.0), Options())
-    _, base, _, noise = nominal_fits(forward)
-    return onset(forward, base, noise.deviation)
+    _, base, _ = nominal_fits(forward)
+    return onset(forward, base, forward.blocks[0].noise)
 
 
 SUDDEN = {
@@ -188,8 +188,8 @@ def test_a_crease_that_gives_way_on_a_curve_is_dated_to_a_step():
         settings = scene_settings(module).replace(stiffness=2e-3, rest_angle=0.3)
         coupon = Subject.from_scene(module, settings, spreads={"stiffness": 4e-4, "rest_angle": 0.02})
         forward = arranged(coupon, prepared([made], 200.0), Options())
-        _, base, weights, noise = nominal_fits(forward)
-        found = onset(forward, base, noise.deviation, weights=weights)
+        _, base, weights = nominal_fits(forward)
+        found = onset(forward, base, forward.blocks[0].noise, weights=weights)
         assert found.time == pytest.approx(step, abs=1.01, nan_ok=True)
 
 

@@ -46,7 +46,7 @@ def rubbing():
     """The nominal fit and the screening of a strip with dry friction at its second crease."""
     recordings = prepared([record(FRICTION, **SMALL)], 200.0)
     forward = arranged(subject(3), recordings, Options())
-    given, base, weights, _ = nominal_fits(forward)
+    given, base, weights = nominal_fits(forward)
     every = [s for s in suspects(forward.model, recordings, forward.drive) if s.effect in LOOPS]
     return forward, given, base, weights, screen(forward, every, base, weights)
 
