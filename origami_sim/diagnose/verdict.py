@@ -1,6 +1,5 @@
 """The verdict: which explanation the recordings support, in one of eight words and one sentence."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -292,19 +291,20 @@ def floor_of(forward, best: Fit) -> np.ndarray:
     """(D,) noise of the components [SI]: as stated; where it was read from the data, at least what a fit leaves fast.
 
     A tracker that smooths hides its noise from neighbouring frames, from which it was read. Fast is what scatters about
-    the mean of a window.
+    a parabola over a window.
     """
     floor = forward.blocks[best.blocks[0]].noise.copy()
     channels = forward.recordings[0].channels.values()
     width = [1 if c.values.ndim == 1 else c.values.shape[1] for c in channels]
     read = np.repeat([c.noise_report is not None and c.noise == c.noise_report.level for c in channels], width)
     if min(map(len, best.residuals)) >= 2 * WINDOW:
-        parts = [r[: len(r) // WINDOW * WINDOW].reshape(-1, WINDOW, len(floor)) for r in best.residuals]
-        with np.errstate(invalid="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # windows without a value
-            fast = np.nanvar(np.concatenate(parts), axis=1, ddof=1)
-            scatter = np.sqrt(np.nanmean(fast, axis=0))
-        floor[read] = np.fmax(floor, scatter)[read]
+        parts = np.concatenate([r[: len(r) // WINDOW * WINDOW].reshape(-1, WINDOW, len(floor)) for r in best.residuals])
+        q, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, WINDOW), 3))
+        fast = parts - np.einsum("ij,kj,nkd->nid", q, q, parts)  # nan where a frame of the window is missing
+        variance = np.sum(fast**2, axis=1) / (WINDOW - 3)
+        seen = np.isfinite(variance)
+        scatter = np.sqrt(np.sum(np.where(seen, variance, 0.0), axis=0) / np.maximum(seen.sum(axis=0), 1))
+        floor[read] = np.maximum(floor, scatter)[read]
     return floor
 
 

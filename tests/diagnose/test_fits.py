@@ -231,7 +231,7 @@ def test_the_noise_that_a_smoothing_tracker_hides_is_counted_unless_it_is_stated
     noise = 1e-3 * rng.normal(size=482)
     noise = 0.25 * noise[:-2] + 0.5 * noise[1:-1] + 0.25 * noise[2:]
     report = noise_report(times, noise + 0.2 * np.sin(9.0 * times))
-    level = 2e-4 if stated else report.level
+    level = 1.5e-4 if stated else report.level
     channel = Channel("fold", "crease_angle", noise, "rad", level, noise_report=report)
     forward = SimpleNamespace(
         recordings=[SimpleNamespace(channels={"fold": channel})], blocks=[SimpleNamespace(noise=np.array([level]))]
@@ -239,7 +239,11 @@ def test_the_noise_that_a_smoothing_tracker_hides_is_counted_unless_it_is_stated
     slow = 3e-3 * np.sin(2 * np.pi * times / 1.5)  # what a fit leaves is not noise
     left = SimpleNamespace(blocks=(0,), residuals=[(noise + slow)[:, None]])
     found = floor_of(forward, left)
-    assert level < 3e-4 and found == pytest.approx(level if stated else np.std(noise), rel=0.25)
+    assert level < 0.3 * np.std(noise)
+    if stated:
+        assert found == level
+    else:  # a parabola takes some of what is smooth
+        assert 0.65 * np.std(noise) < found < 1.05 * np.std(noise)
 
 
 def test_small_effects_excuse_what_noise_does_not(stiff):
