@@ -311,9 +311,10 @@ def floor_of(forward, best: Fit) -> np.ndarray:
 def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
     """(D,) standard deviation of the noise in residuals (n, D), were it white: the median of their spectra in a band.
 
-    Frames of a tracker that smooths are not independent. Points of short curves are: of those, second differences.
+    Frames of a tracker that smooths are not independent. Short segments, such as curves, have too few frequencies in
+    the band for that: of those, second differences.
     """
-    if min(map(len, residuals)) < 2 / BAND[0]:
+    if min(map(len, residuals)) < 4 / BAND[0]:
         fast = np.concatenate([np.diff(r, n=2, axis=0) for r in residuals])
         return np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
     powers = []
