@@ -134,7 +134,8 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
         return result(
             "UNKNOWN",
             f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, leaves "
-            f"{slow[1] / slow[0]:.0%} of the slow structure, {slow[1]:.0f} standard deviations of what noise gives; {fall}.",
+            f"{slow[1] / max(slow):.0%} of the slow structure, {slow[1]:.0f} standard deviations of what noise gives; "
+            f"{fall}.",
             mechanism_p,
             [best.hypothesis.label],
         )
