@@ -163,7 +163,7 @@ class Forward:
         rates = inverse @ (np.nan_to_num(slope) * weight)
         spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
         told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
-        spread = np.where(told, np.hypot(CAREFUL * spread, TRUSTED * rates), np.inf)
+        spread = np.where(told, np.maximum(np.hypot(CAREFUL * spread, TRUSTED * rates), 1e-9), np.inf)
         return pose, rates, np.concatenate([np.full(arm.size, np.inf), spread])
 
     def _placed(self, recording: Recording, level: np.ndarray) -> Pose:
