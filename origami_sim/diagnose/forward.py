@@ -236,7 +236,7 @@ class Forward:
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
         effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
-        softness = self.softness if soft and not any(map(stiff, effects)) else 1.0
+        softness = self._softness(soft, effects)
         worlds, impossible = [], []
         for k, (h, t) in enumerate(zip(each, theta, strict=True)):
             try:
@@ -273,22 +273,25 @@ class Forward:
 
     def _rigid(self) -> bool:
         """Whether no number of the model changes what keeps panels in shape."""
-        given = self.built(dict(zip((f.name for f in self.subject.nominals), self._given, strict=True)))[1]
-        for n, f in enumerate(self.subject.nominals):
-            theta = self._given.copy()
-            theta[n] += f.scale if theta[n] + f.scale <= f.upper else -f.scale
-            other = self.built(dict(zip((f.name for f in self.subject.nominals), theta, strict=True)))[1]
-            for owner, name in (STIFFNESS | VISCOSITY).items():
-                if (owner, name) in given and np.any(given[owner, name] != other[owner, name]):
-                    return False
+        kept = [k for k in (STIFFNESS | VISCOSITY).items() if k in self.parameters]
+        for f in self.subject.nominals:
+            other = self.built(
+                self.values | {f.name: f.start + (f.scale if f.start + f.scale <= f.upper else -f.scale)}
+            )[1]
+            if any(np.any(self.parameters[k] != other[k]) for k in kept):
+                return False
         return True
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
         """The solver's step for one world, a frame at most [s]; see `predict`."""
         frame = float(np.median(np.diff(self.recordings[0].times)))
         model, parameters = self._world(hypothesis, theta, hypothesis.effects)
-        softness = self.softness if soft and not any(map(stiff, hypothesis.effects)) else 1.0
-        return min(frame, stable_step(model, softened(model, parameters, softness)).dt)
+        eased = softened(model, parameters, self._softness(soft, hypothesis.effects))
+        return min(frame, stable_step(model, eased).dt)
+
+    def _softness(self, soft: bool, effects: Sequence[str]) -> float:
+        """By how much softer panels are in a program with these effects."""
+        return self.softness if soft and not any(map(stiff, effects)) else 1.0
 
     def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
         """The model with these effects, and the parameters of one world."""

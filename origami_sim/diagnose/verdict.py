@@ -280,6 +280,8 @@ def structure(f: Fit, reference: Fit) -> tuple[float, float]:
         seen = r[np.any(np.isfinite(r), axis=1)]
         wide = min(WINDOW, len(seen))
         n = len(seen) // wide if wide else 0
+        if not n:  # a gap as long as the segment
+            continue
         parts = seen[: n * wide].reshape(n, wide, -1)
         with np.errstate(invalid="ignore", divide="ignore"):
             means = np.nansum(parts, axis=1) / np.sqrt(np.isfinite(parts).sum(axis=1)) / noise
@@ -321,10 +323,11 @@ def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
     powers = []
     for r in residuals:
         taper = np.hanning(len(r) + 2)[1:-1, None] * np.isfinite(r)
-        power = np.abs(np.fft.rfft(taper * np.nan_to_num(r), axis=0)) ** 2 / np.maximum((taper**2).sum(axis=0), 1e-300)
+        size = (taper**2).sum(axis=0)
+        power = np.abs(np.fft.rfft(taper * np.nan_to_num(r), axis=0)) ** 2 / np.where(size > 0.0, size, np.nan)
         frequency = np.fft.rfftfreq(len(r))
         powers.append(power[(frequency >= BAND[0]) & (frequency <= BAND[1])])
-    return np.sqrt(np.median(np.concatenate(powers), axis=0) / np.log(2.0))
+    return np.sqrt(np.nanmedian(np.concatenate(powers), axis=0) / np.log(2.0))
 
 
 def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:

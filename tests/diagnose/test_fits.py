@@ -15,7 +15,7 @@ from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.trust import trust
-from origami_sim.diagnose.verdict import floor_of, noise_of
+from origami_sim.diagnose.verdict import floor_of, noise_of, structure
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel
 from origami_sim.solve.batch import Batch
@@ -223,6 +223,15 @@ def test_the_noise_of_a_residual_is_seen_beside_structure_and_through_a_filter(s
     noise = 0.25 * noise[:, :-2] + 0.5 * noise[:, 1:-1] + 0.25 * noise[:, 2:] if smooth else noise[:, 1:-1]
     slow = line * np.sin(2 * np.pi * np.arange(250) / 60.0)[:, None]
     assert noise_of([0.1 * (n + slow) for n in noise]) == pytest.approx(0.1, rel=0.2)
+
+
+def test_a_segment_without_a_value_has_no_structure():
+    rng = np.random.default_rng(0)
+    left = [rng.normal(size=(120, 2)) for _ in range(4)]
+    gap = [*left[:2], np.full((120, 2), np.nan), *left[2:]]
+    whole, gapped = (SimpleNamespace(residuals=r) for r in (left, gap))
+    assert structure(gapped, whole) == structure(whole, whole)
+    assert noise_of(gap) == pytest.approx(noise_of(left)), "nor does it tell of the noise"
 
 
 @pytest.mark.parametrize("stated", [False, True])
