@@ -183,6 +183,10 @@ class Drive:
         values = [np.asarray(self.signals[c](times[:, None])).reshape(len(times), -1) for c in channels]
         return times, np.stack(np.broadcast_arrays(*values))
 
+    def held(self, time: float) -> "Drive":
+        """The drive held at its value at one instant [s], one number for all worlds or for each."""
+        return self.replace(**{n: np.atleast_1d(np.squeeze(s(time))) for n, s in self.signals.items()})
+
     @property
     def worlds(self) -> int:
         """Number of worlds that the drive tells apart (1 if none differs)."""

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from origami_sim.distort import distorted
-from origami_sim.drive import Drive
+from origami_sim.drive import Drive, series
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
@@ -82,9 +82,7 @@ def observe_equilibria(
         angles=np.stack([e.angles for e in equilibria]),
         times=np.zeros(len(equilibria)),
         state=State.join([e.state for e in equilibria]),
-        drive=_held(
-            [distorted(model, parameters, applied_drive(recording, step=k), 0.0) for k in range(len(equilibria))]
-        ),
+        drive=_held(_reaching(model, parameters, recording)),
     )
     out = {}
     for name, channel in recording.channels.items():
@@ -107,11 +105,22 @@ def follow(
         options: of `origami_sim.solve.statics.equilibrium`, e.g. tolerance.
     """
     found: list[Equilibrium] = []
-    for step in range(recording.frame_count):
-        drive = applied_drive(recording, step=step)
-        found.append(equilibrium(model, parameters, drive, state=state, **options))
+    drives = _reaching(model, parameters, recording)
+    model = model.with_effects(without=tuple(e for e in model.effects if get(e).family == "drive"))
+    for drive in drives:
+        found.append(equilibrium(model, parameters.for_model(model), drive, state=state, **options))
         state = found[-1].state
     return found
+
+
+def _reaching(model: Model, parameters: Parameters, recording: Recording) -> list[Drive]:
+    """The drive of each load step as it reaches the device; what distorts it may remember earlier steps."""
+    steps = [applied_drive(recording, step=k) for k in range(recording.frame_count)]
+    levels = {n: np.array([np.ravel(d[n](0.0))[0] for d in steps]) for n in steps[0].signals}
+    clock = np.arange(len(steps), dtype=float)
+    path = steps[0].replace(**{n: series(clock, v) for n, v in levels.items() if np.any(v != v[0])})
+    reached = distorted(model, parameters, path, clock[-1])
+    return [reached.held(float(t)) for t in clock]
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,7 +384,7 @@ def _frames(trajectory: Trajectory, world: int) -> tuple[State, Drive]:
 
 def _held(drives: Sequence[Drive]) -> Drive:
     """One drive of as many worlds, each holding the value at time 0 of its own."""
-    return _of_values({n: np.array([float(d[n](0.0)) for d in drives]) for n in drives[0].signals})
+    return _of_values({n: np.array([np.ravel(d[n](0.0))[0] for d in drives]) for n in drives[0].signals})
 
 
 def _of_values(values: dict[str, np.ndarray]) -> Drive:

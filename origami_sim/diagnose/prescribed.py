@@ -11,7 +11,7 @@ from origami_sim.diagnose.diagnosis import Place
 from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.static import HOLD, PIECES, CurveForward, Static, held, onward, places
+from origami_sim.diagnose.static import HOLD, PIECES, CurveForward, Static, onward, places
 from origami_sim.distort import distorted
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, State
@@ -83,7 +83,7 @@ class Prescribed(CurveForward):
         rate = np.zeros_like(q) if recording.by_step else np.gradient(q, times, axis=1)
         drive = distorted(model, parameters, self._drives[r], float(times[-1]))
         if recording.by_step:
-            drive = held(drive)
+            drive = drive.held(0.0)
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
         batch = Batch(still, parameters, drive, state, threads=self.threads)

@@ -78,7 +78,7 @@ class CurveForward(Forward, ABC):
         self._arms = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
         self.local = 0
-        self._rested: dict[tuple[int, int], Drive] = {}
+        self._rested: dict[int, list[Drive]] = {}
         self.blocks: list[Block] = []
         pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
         for index, r in enumerate(self.recordings):
@@ -183,12 +183,16 @@ class CurveForward(Forward, ABC):
                 out[:, part] = effect.apply(read, at, **given)
         return out
 
-    def _resting(self, r: int, k: int) -> Drive:
-        """The drive of a load step, held."""
-        key = id(self._drives[r]), k
-        if key not in self._rested:
-            self._rested[key] = held(self._drives[r], float(k))
-        return self._rested[key]
+    def _resting(self, r: int, model: Model, parameters: Parameters) -> list[Drive]:
+        """The drive of each load step as it reaches the device, held; what distorts it may remember earlier steps."""
+        steps = len(self.recordings[r].times)
+        commanded = self._drives[r]
+        drive = distorted(model, parameters, commanded, float(steps - 1))
+        if drive is not commanded:
+            return [drive.held(float(k)) for k in range(steps)]
+        if id(commanded) not in self._rested:
+            self._rested[id(commanded)] = [commanded.held(float(k)) for k in range(steps)]
+        return self._rested[id(commanded)]
 
     @abstractmethod
     def locate(self, fit: Fit) -> list[Place]:
@@ -245,7 +249,7 @@ class Static(CurveForward):
         for w, (model, parameters) in enumerate(worlds):
             state = drive = None
             if any(c.kind == "force" for c in recording.channels.values()):
-                drive = joined([held(distorted(model, parameters, self._resting(r, k), 0.0)) for k in range(steps)])
+                drive = joined(self._resting(r, model, parameters))
                 state = State.at_rest(model, steps, position=np.moveaxis(x[:, w], 0, 1))
                 state.angles = angles[:, w].T.copy()
             poses = Poses(model, parameters, x[:, w], angles[:, w], np.zeros(steps), state, drive)
@@ -263,12 +267,13 @@ class Static(CurveForward):
         alive = np.ones(count, bool)
         xs, all_angles, found = [], [], []
         before = model.position
+        drives = self._resting(r, model, Parameters.join([p for _, p in worlds]))
         for k in range(steps):
             guess = state.x.copy()
             if path is not None:
                 guess += (path[k] - before)[:, None]
                 before = path[k]
-            search = _Step(self._system(model, worlds), worlds, self._resting(r, k), state, self.threads)
+            search = _Step(self._system(model, worlds), worlds, drives[k], state, self.threads)
             state, alive = search.settle(guess, alive)
             xs.append(np.moveaxis(state.x, 1, 0))
             all_angles.append(state.angles.T)
@@ -296,7 +301,7 @@ class Static(CurveForward):
             model, parameters = self._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
             model = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
             parameters = parameters.for_model(model)
-            drives = [held(distorted(model, parameters, self._resting(r, k), 0.0)) for k in range(q.shape[1])]
+            drives = self._resting(r, model, parameters)
             # the recorded angles, and each of them a little further, for the error of the moment
             moves = np.concatenate([np.zeros((1, len(q))), 1e-5 * np.eye(len(q))])
             moments = np.stack([self._moments(model, parameters, joined(drives), q + m[:, None]) for m in moves])
@@ -318,14 +323,17 @@ class Static(CurveForward):
 
 
 class _Step:
-    """Equilibria of all worlds in one load step, beginning with the state in which the last one left them."""
+    """Equilibria of all worlds in one load step, beginning with the state in which the last one left them.
+
+    Args:
+        drive: held, as it reaches the device.
+    """
 
     def __init__(self, system: _System, worlds, drive: Drive, state: State, threads: int | None):
         self.system, self.worlds, self.state, self.threads = system, worlds, state, threads
         self.model = worlds[0][0]
         self.parameters = Parameters.join([p for _, p in worlds])
-        changed = distorted(self.model, self.parameters, drive, 0.0)
-        self.drive = drive if changed is drive else held(changed)
+        self.drive = drive
         self.remembers = any(get(e).memory for e in self.model.laws)
         # held nodes: the integrator moves them as it is told, and laws with memory advance
         still = replace(self.model, free=np.zeros_like(self.model.free))
@@ -484,11 +492,6 @@ def onward(batch: Batch, velocity: np.ndarray, dt: float):
     batch._a.zero_()
     batch._status.fill_(-1)
     batch.advance(1, dt, np.inf)
-
-
-def held(drive: Drive, time: float = 0.0) -> Drive:
-    """The drive held at its value at one instant, one number for all worlds or for each."""
-    return drive.replace(**{n: np.atleast_1d(np.squeeze(s(time))) for n, s in drive.signals.items()})
 
 
 def joined(drives: Sequence[Drive]) -> Drive:
