@@ -112,6 +112,8 @@ def placed(o: dict, mechanism: str, place: int, extra: dict, outside: bool = Fal
         site = o["creases"][place]["name"]
     elif c.site == "panel":
         site = f"panel{place}"
+    elif c.site == "last panel":
+        site = f"panel{len(o['faces']) - 1}"
     return {"mechanism": mechanism, "place": place, "site": site, "extra": extra}
 
 

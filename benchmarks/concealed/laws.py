@@ -240,7 +240,7 @@ class Concealed:
 
     Attributes:
         law: its class. names: what the diagnosis may call it, the first being the exact name; empty: nothing fits.
-        site: "crease", "panel", all of them ("all panels") or "" (the whole object or its measurement).
+        site: "crease", "panel", "last panel", all of them ("all panels") or "" (the whole object or its measurement).
         first: strength to begin the search with, times the crease stiffness where `stiff`. largest: likewise.
         signed: either sign is possible. only: structures that it suits; empty: all.
         number: parameter of the catalogue's effect that means the same as the strength, if there is one.
@@ -283,7 +283,7 @@ INSIDE: dict[str, Concealed] = {
     ),
     "eccentric_weight": Concealed(Eccentric, ("eccentric_weight",), "panel", 1e-4, False, True, 0.01),
     "gravity_tilt": Concealed(Tilt, ("gravity_tilt",), "", 0.01, False, True, 0.5, number="tilt_x"),
-    "tether": Concealed(Tether, ("tether",), "", 0.01, False, largest=1.0, only=STRIPS),
+    "tether": Concealed(Tether, ("tether",), "last panel", 0.01, False, largest=1.0, only=STRIPS),
     "clock_rate": Concealed(ClockRate, ("clock_rate",), "", 2e-3, False, True, 0.1, number="clock_rate"),
     "clock_delay": Concealed(ClockDelay, ("clock_delay",), "", 2e-3, False, False, 0.1, DRIVEN, number="clock_delay"),
     "angle_scale": Concealed(Scale, ("angle_scale",), "", 5e-3, False, True, 0.3, number="angle_scale"),

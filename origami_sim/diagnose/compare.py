@@ -11,10 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from origami_sim.diagnose.hypothesis import Hypothesis
 from origami_sim.diagnose.refit import Fit, Weights
 
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
+
+PLAUSIBLE = 3.0
+"""Width of what is plausible for a number beside an effect's strength, over its typical value."""
 
 TEMPERATURE = 3.0
 """By which log evidence is divided before it becomes a probability; larger is more careful."""
@@ -27,7 +31,7 @@ class Score:
     Attributes:
         held_out: (B,) log score of each block, up to a constant shared by all hypotheses.
         rms: (D,) root mean square of the held-out residual [SI].
-        evidence: log evidence: minus half the cost, minus half the log of the effective sample size per number.
+        evidence: log evidence: minus half the cost, minus what the numbers cost, see `penalty_of`.
     """
 
     held_out: np.ndarray
@@ -118,12 +122,27 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     squares = np.concatenate([v[line.data(n)].reshape(-1, dims) ** 2 for n, v in enumerate(left)]) / weights.part
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
     rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation
-    extra = len(fit.hypothesis.free)
     n = max(effective_samples(forward, fit, weights), 2.0)
-    sites = float(
-        sum(np.log(s.sites) for s in fit.hypothesis.suspects)
-    )  # an effect is as likely at few sites as at many
-    return Score(held_out, rms, -0.5 * fit.cost - 0.5 * extra * np.log(n) - sites)
+    known = np.diag(np.linalg.qr(np.concatenate([*tangent, np.diag(prior)]), mode="r"))
+    price = penalty_of(fit.hypothesis, known[len(known) - len(fit.hypothesis.free) :], n)
+    return Score(held_out, rms, -0.5 * fit.cost - price)
+
+
+def penalty_of(hypothesis: Hypothesis, known: np.ndarray, samples: float) -> float:
+    """What the numbers of a hypothesis cost in log evidence: that of BIC, less for those of which the data tell little.
+
+    An effect is as likely at few sites as at many.
+
+    Args:
+        known: how precisely the data tell each number, given those before it [1 / scale]. samples: effective.
+    """
+    price, k = 0.0, 0
+    for s in hypothesis.suspects:
+        price += 0.5 * np.log(samples) + np.log(s.sites)
+        wide = 1.0 + (PLAUSIBLE * known[k + 1 : k + len(s.free)]) ** 2
+        price += 0.5 * float(np.sum(np.log(np.minimum(wide, samples))))
+        k += len(s.free)
+    return price
 
 
 def _predictive(residual: np.ndarray, tangent: np.ndarray, root: np.ndarray) -> float:

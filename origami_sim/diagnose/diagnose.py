@@ -121,9 +121,7 @@ def diagnose(
     given, base, weights = nominal_fits(forward)
     lap("nominal")
     tell("screen", 0.0)
-    every = suspects(forward.model, recordings, _union(forward), forward.parameters)
-    if isinstance(forward, CurveForward):
-        every = forward.admitted(every)
+    every = forward.admitted(suspects(forward.model, recordings, _union(forward), forward.parameters))
     if catalogue is not None:
         every = [s for s in every if s.effect in catalogue]
     screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
@@ -143,7 +141,7 @@ def diagnose(
     fits += alike_ones
     # with weights that do not count the effect itself as noise
     p_value = look_elsewhere(screening, o.draws, o.seed, fits)
-    p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=SMALL)
+    p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
     lap("refit")
     tell("combine", 0.0)
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
@@ -349,15 +347,11 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights]:
     return given.reweighted(first, w), base, w
 
 
-SMALL, SHOWN = 4, 2.0
-"""Effects that are there in any device and too small to be told, and the score that each of them has."""
-
-
 def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[Fit] = (), *, small: int = 0) -> float:
     """Chance that noise alone gives any suspect so high a score: draws of white residuals, the same projection.
 
     Args:
-        small: so many suspects, drawn at random, act with a score of SHOWN each beside the noise.
+        small: so many suspects, drawn at random, act with a score of `words.SHOWN` each beside the noise.
         fits: the model without an effect, then those with one; what they gain counts if it is more than the screening
             saw, which knows small effects only.
     """
@@ -370,7 +364,7 @@ def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[F
     value, vector = np.linalg.eigh(overlap)
     draws_ = rng.normal(size=(draws, len(value))) * np.sqrt(np.maximum(value, 0.0)) @ vector.T
     for _ in range(small):
-        sign = rng.choice([-SHOWN, SHOWN], size=(draws, 1))
+        sign = rng.choice([-words.SHOWN, words.SHOWN], size=(draws, 1))
         draws_ += sign * overlap[rng.integers(len(overlap), size=draws)]
     highest = np.abs(draws_).max(axis=1)
     found = max(abs(s.score) for s in screening.signatures)
@@ -527,10 +521,6 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     return [*out, both]
 
 
-INEXACT = 0.02
-"""Part of what an effect explains that an inexact law of it may leave; a further effect must explain more."""
-
-
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
     """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
     more: list[Fit] = []
@@ -540,9 +530,9 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
         left = again(screening, best, without=best.hypothesis.effects)
         if not left.signatures:
             break
-        p = look_elsewhere(left, o.draws, o.seed, small=SMALL)
+        p = look_elsewhere(left, o.draws, o.seed, small=words.SMALL)
         top = left.signatures[0]
-        if p > o.level or top.score**2 < INEXACT * (base.cost - best.cost):
+        if p > o.level or top.score**2 < words.INEXACT * (base.cost - best.cost):
             break
         rivals = [g for g in left.signatures if g.suspect.effect == top.suspect.effect]  # the same at other sites
         tried = []

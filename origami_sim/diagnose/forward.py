@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose.articulation import Articulation, Pose
 from origami_sim.diagnose.channels import depths, read
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, apply
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import get
@@ -46,6 +46,9 @@ ALIKE = 0.05
 STIFFNESS = {"bars": "stiffness", "panel_bending": "stiffness"}
 VISCOSITY = {"bar_viscosity": "viscosity", "panel_viscosity": "viscosity"}
 """What keeps panels in shape, and what calms them."""
+
+FASTEST = 3.0
+"""Frames below which a time constant is not told from none."""
 
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
@@ -252,6 +255,12 @@ class Forward:
                     out[b] = values
                     out[b][impossible] = np.nan
         return [out[b] for b in wanted]
+
+    def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
+        """The suspects that these recordings can be asked about; those with a time constant with several."""
+        frame = float(np.median(np.diff(self.recordings[0].times)))
+        longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
+        return at_several_times(every, FASTEST * frame, longest)
 
     def soften(self) -> None:
         """Finds how much softer panels may be for derivatives: at most so much that the motion stays the same.

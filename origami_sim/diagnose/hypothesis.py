@@ -226,6 +226,8 @@ def suspects(
         if not set(effect.drives) - {"time"} <= driven:
             continue
         sites = _sites(model, effect.family)
+        if any(p.name in ANCHORS for p in effect.parameters):
+            sites += _edges(model)
         if effect.family == "measurement":
             sites = _channel_sites(recordings[0], effect.channels)
         for site, kind, entities in sites:
@@ -288,6 +290,22 @@ def _sites(model: Model, family: str):
     return [("the body", "body", None)]
 
 
+def _edges(model: Model):
+    """Where something may be tied to each panel: its free nodes on the sheet's edge, those of no other panel if any."""
+    sides = np.sort(np.concatenate([model.triangles[:, k] for k in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    sides, count = np.unique(sides, axis=0, return_counts=True)
+    edge = np.intersect1d(sides[count == 1], np.flatnonzero(model.free.any(axis=1)))
+    panels = {
+        p: np.intersect1d(model.triangles[model.triangle_panel == p], edge) for p in np.unique(model.triangle_panel)
+    }
+    out = []
+    for p, mine in panels.items():
+        own = [n for n in mine if not any(n in nodes for q, nodes in panels.items() if q != p)]
+        if len(mine):
+            out.append((model.name("panel", p), "panel", tuple(map(int, own or mine))))
+    return out if len(out) > 1 else []
+
+
 def _free(effect: str, name: str, entities) -> Free:
     p = get(effect).parameter(name)
     assert p.typical is not None
@@ -302,6 +320,28 @@ def _free(effect: str, name: str, entities) -> Free:
         upper=p.bounds[1],
         entities=entities,
     )
+
+
+CONSTANTS = 4
+"""Time constants with which an effect that has one is suspected, evenly in their logarithm."""
+
+
+def at_several_times(every: Sequence[Suspect], shortest: float, longest: float) -> list[Suspect]:
+    """The suspects, those with a time constant several times: their signatures change with it altogether.
+
+    Args:
+        shortest, longest: between which the constants lie [s].
+    """
+    out = []
+    for s in every:
+        slow = [n for n, f in enumerate(s.free) if n and f.unit == "s"]
+        if not slow or get(s.effect).family in DISTORTIONS:
+            out.append(s)
+            continue
+        for time in np.geomspace(shortest, longest, CONSTANTS + 2)[1:-1]:
+            free = [replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)]
+            out.append(replace(s, free=tuple(free)))
+    return out
 
 
 def scaled(suspect: Suspect, scale: float) -> Suspect:

@@ -14,12 +14,12 @@ import warp as wp
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Curve, Place
 from origami_sim.diagnose.forward import Block, Forward, angle_mask, component_names, continuous, drive_of, stacked
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, at_several_times
 from origami_sim.diagnose.locate import BINS, PASSIVE, coordinates
 from origami_sim.diagnose.refit import Fit
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
-from origami_sim.effects import DISTORTIONS, get
+from origami_sim.effects import get
 from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
@@ -37,9 +37,6 @@ TIMED = ("clock_delay", "clock_rate", "exposure", "tracker_lag")
 
 SITES = 4
 """Creases that one channel may be asked to tell apart."""
-
-CONSTANTS = 4
-"""Time constants with which an effect that has one is suspected, evenly in their logarithm."""
 
 CLOSE = 1e-10
 """A Newton step shorter than this part of the device ends the search for an equilibrium."""
@@ -146,18 +143,7 @@ class CurveForward(Forward, ABC):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]
         low, high = min(float(t[2]) for t in spans), max(float(t[-1]) for t in spans)
-        out = []
-        for s in every:
-            slow = [n for n, f in enumerate(s.free) if n and f.unit == "s"]
-            if not slow or get(s.effect).family in DISTORTIONS:
-                out.append(s)
-                continue
-            for time in np.geomspace(low, high, CONSTANTS + 2)[1:-1]:
-                free = [
-                    replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)
-                ]
-                out.append(replace(s, free=tuple(free)))
-        return out
+        return at_several_times(every, low, high)
 
     @abstractmethod
     def _curve(self, r: int, worlds: list[tuple[Model, Parameters]]) -> np.ndarray:

@@ -17,11 +17,14 @@ from origami_sim.recording.units import quantity
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-STRUCTURED = 5.0
+STRUCTURED = 3.0
 """Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
 
 INEXACT = 0.06
-"""Part of the slow structure that a named effect may leave, because real devices follow no law exactly."""
+"""Part of what it explains that a named effect may leave, because real devices follow no law exactly."""
+
+SMALL, SHOWN = 4, 2.0
+"""Effects that are there in any device and too small to be told, and the score that each of them has."""
 
 STRAINED = 3.0
 """Standard deviations from what was known that no number of a named explanation may be."""
@@ -36,7 +39,8 @@ class Judgement:
         removed: part of the removable squared error that it removes on held-out data. left: residual over noise after
             it.
         onset: first lasting departure of the refitted nominal [s]; nan: none. others: other explanations, best first.
-        structure: slow structure that the refitted nominal leaves, and the best fit, in standard deviations of noise.
+        structure: slow structure that the refitted nominal leaves, and that the best fit leaves in more than one
+            segment, in standard deviations of noise.
     """
 
     verdict: str
@@ -72,9 +76,9 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     removed = removable(rms_base, rms_best, sigma)
     begins = onset(forward, base, sigma, weights=weights).time
     others = [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)]
-    slow_before, scale = structure(base, best)
-    slow_after, _ = structure(best, best)
-    slow = (slow_before / scale, slow_after / scale)
+    before, after = structure(base, best), structure(best, best)
+    slow = (before.score, after.repeated)
+    share = after.excess / max(before.excess, after.excess, 1e-300)
 
     def result(verdict, sentence, probability, chosen, fit=best, tied=()):
         return Judgement(
@@ -95,32 +99,20 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     kept, total = credible(rows, p, order, scores)
     gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
     holds = best is not base and any(reproducible(scores[id(f)], scores[id(base)]) for f in kept if f is not base)
-    if best is base or p_value > o.significance or not holds:
-        if not screening.signatures and over > FLOOR:
-            return result(
-                "UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base
-            )
-        if slow[0] < STRUCTURED or over < 1.05:
-            probability = max(float(p[rows.index(base)]), chance_of_null(p_value))
-            return _adequate_or_parameter(forward, given, base, weights, result, over, probability)
-        if p_value <= o.significance and best is not base and p[rows.index(base)] < 0.5:
-            names = _distinct([rows[i] for i in order])[:2]
-            return result(
-                "UNKNOWN",
-                f"The refitted model misses the recordings by {over:.1f} times the noise, and no suspect explains it "
-                f"reproducibly: the closest, {names[0]}, gains {gain:.1f} +- {error:.1f} in held-out log score.",
-                1 - p[rows.index(base)],
-                [],
-                base,
-            )
-        return result(
-            "UNKNOWN",
-            f"The refitted model misses the recordings by {over:.1f} times the noise, and nothing in the catalogue "
-            f"explains it (chance of so good a suspect under noise: {p_value:.2g}).",
-            p[rows.index(base)],
-            [],
-            base,
-        )
+    nothing = best is base or p_value > o.significance
+    if nothing and not screening.signatures and over > FLOOR:
+        return result("UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base)
+    if nothing and slow[0] < STRUCTURED:
+        probability = max(float(p[rows.index(base)]), chance_of_null(p_value))
+        return _adequate_or_parameter(forward, given, base, weights, result, over, probability)
+    if nothing or (not holds and slow[0] >= STRUCTURED):
+        text = f"The refitted model misses the recordings by {over:.2f} times the noise, "
+        if nothing or p[rows.index(base)] >= 0.5:
+            text += "and nothing in the catalogue explains it (chance of so good a suspect under noise: "
+            return result("UNKNOWN", text + f"{p_value:.2g}).", p[rows.index(base)], [], base)
+        name = _distinct([rows[i] for i in order])[0]
+        text += f"and no suspect explains it reproducibly: the closest, {name}, gains {gain:.1f} +- {error:.1f} in "
+        return result("UNKNOWN", text + "held-out log score.", 1 - p[rows.index(base)], [], base)
     # the same effects elsewhere, or with another that is not proven
     same = [f for f in rows if _effects(f) == _effects(best) or _labels(f) > _labels(best)]
     trusted = trust(gain, len(best.hypothesis.suspects))
@@ -129,12 +121,12 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
     if over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
-    small = p_small > o.level
-    if slow[1] > max(STRUCTURED, INEXACT * slow[0]) and left > 1.05 and not small:
+    small = p_small > o.level or not holds
+    if slow[1] > STRUCTURED and share > INEXACT and not small:
         return result(
             "UNKNOWN",
             f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, leaves "
-            f"{slow[1] / max(slow):.0%} of the slow structure, {slow[1]:.0f} standard deviations of what noise gives; "
+            f"{share:.0%} of the slow structure, {slow[1]:.0f} standard deviations of what noise gives; "
             f"{fall}.",
             mechanism_p,
             [best.hypothesis.label],
@@ -262,32 +254,82 @@ def removable(before: np.ndarray, after: np.ndarray, sigma: np.ndarray) -> float
 
 
 WINDOW = 10
-"""Frames over which residuals are averaged to tell structure from noise."""
-
+"""Frames about whose parabola the scatter of a residual is taken."""
 
 BAND = (1 / 20, 1 / 8)
 """Frequencies per frame at which the noise of a residual is read: above most structure, below what trackers smooth."""
 
+SHORT = 4 / BAND[0]
+"""Frames below which a segment has too few frequencies in the band."""
 
-def structure(f: Fit, reference: Fit) -> tuple[float, float]:
-    """Slow structure in the residuals of a fit, and the standard deviation that noise would give it.
+ALLOWED = SMALL * SHOWN**2
+"""Squares, in units of the noise, by which effects that are too small to be told may exceed it."""
 
-    Squares of window means in units of what noise would give, less one each, summed; short segments are one window.
-    The noise is that of the reference's residual, so that a noise level that was stated wrongly does not matter.
+
+@dataclass(frozen=True)
+class Structure:
+    """Squares of residuals at low frequencies, in units of what noise gives, by segment and octave.
+
+    Attributes:
+        power: [B, O] sums of squares. count: [B, O] how many. doubt: relative variance of the noise that they are
+            compared with.
     """
-    total, count, noise = 0.0, 0, noise_of(reference.residuals)
-    for r in f.residuals:
-        seen = r[np.any(np.isfinite(r), axis=1)]
-        wide = min(WINDOW, len(seen))
-        n = len(seen) // wide if wide else 0
-        if not n:  # a gap as long as the segment
-            continue
-        parts = seen[: n * wide].reshape(n, wide, -1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            means = np.nansum(parts, axis=1) / np.sqrt(np.isfinite(parts).sum(axis=1)) / noise
-        total += float(np.nansum(means**2 - 1.0))
-        count += int(np.isfinite(means).sum())
-    return total, float(np.sqrt(2.0 * max(count, 1)))
+
+    power: np.ndarray
+    count: np.ndarray
+    doubt: float
+
+    @property
+    def excess(self) -> float:
+        """Sum of squares beyond what noise gives."""
+        return float(np.sum(self.power - self.count))
+
+    @property
+    def score(self) -> float:
+        """Standard deviations of noise by which the worst octave exceeds it and small effects."""
+        return self._worst(self.power.sum(axis=0), self.count.sum(axis=0))
+
+    @property
+    def repeated(self) -> float:
+        """The same without the segment in which it is largest: what shows once only may be a mishap."""
+        if len(self.power) < 3:
+            return self.score
+        power, count = (v.sum(axis=0) - v for v in (self.power, self.count))
+        return min(self._worst(p, c) for p, c in zip(power, count, strict=True))
+
+    def _worst(self, power: np.ndarray, count: np.ndarray) -> float:
+        seen = count > 0
+        freedom = 2.0 / (2.0 / count[seen] + self.doubt)
+        ratio = np.maximum(power[seen] - ALLOWED, 0.0) / count[seen]
+        spread = 2.0 / (9.0 * freedom)  # the cube root is nearly normal (Wilson & Hilferty 1931)
+        return float(np.max((np.cbrt(ratio) - 1.0 + spread) / np.sqrt(spread), initial=0.0))
+
+
+def structure(f: Fit, reference: Fit) -> Structure:
+    """Slow structure in the residuals of a fit, below the frequencies at which the noise of another's is read.
+
+    The noise is read from residuals so that a level that was stated wrongly does not matter. What is missing often
+    shows in a narrow band, such as where the device swings, hence octaves.
+    """
+    noise = noise_of(reference.residuals)
+    short = min(map(len, f.residuals)) < SHORT
+    edge = BAND[1] if short else BAND[0]
+    octaves = 1 + int(np.ceil(np.log2(2.0 * edge * max(map(len, f.residuals)))))
+    power, count = np.zeros((2, len(f.residuals), octaves))
+    frames = np.zeros(len(noise))
+    for b, r in enumerate(f.residuals):
+        seen = np.isfinite(r)
+        frames += seen.sum(axis=0)
+        size = np.abs(np.fft.rfft(np.nan_to_num(r), axis=0)) ** 2 / np.maximum(seen.sum(axis=0), 1) / noise**2
+        frequency = np.fft.rfftfreq(len(r))
+        for k in np.flatnonzero(frequency <= edge):
+            octave = min(int(np.log2(edge / (frequency[k] or 0.5 / len(r)))), octaves - 1)
+            parts = 2.0 if 0.0 < frequency[k] < 0.5 else 1.0
+            power[b, octave] += parts * float(size[k].sum())
+            count[b, octave] += parts * seen.any(axis=0).sum()
+    # of second differences, or of the median of a spectrum
+    doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
+    return Structure(power, count, float(doubt.mean() / len(noise)))
 
 
 def floor_of(forward, best: Fit) -> np.ndarray:
@@ -317,7 +359,7 @@ def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
     Frames of a tracker that smooths are not independent. Short segments, such as curves, have too few frequencies in
     the band for that: of those, second differences.
     """
-    if min(map(len, residuals)) < 4 / BAND[0]:
+    if min(map(len, residuals)) < SHORT:
         fast = np.concatenate([np.diff(r, n=2, axis=0) for r in residuals])
         return np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
     powers = []

@@ -62,8 +62,11 @@ def relaxing(time_constant: float, share: float, seed=0) -> list[Recording]:
     return out
 
 
-def flap_curve(*, tilt=0.0, valley=0.0, seed=0) -> Recording:
-    """Fold angle of the magnetic flap against a field of both signs: (k + ka [th > 0]) th = m B cos(th + tilt)."""
+def flap_curve(*, tilt=0.0, valley=0.0, loop=0.0, seed=0) -> Recording:
+    """Fold angle of the magnetic flap against a field of both signs: (k + ka [th > 0]) th = m B cos(th + tilt).
+
+    The field that reaches it is up to `loop` [T] behind the one commanded.
+    """
     s = scene_settings(FLAP)
     dipole = s.remanence * s.length * s.width * s.thickness / MU0
 
@@ -71,7 +74,11 @@ def flap_curve(*, tilt=0.0, valley=0.0, seed=0) -> Recording:
         return (s.stiffness + valley * (angle > 0)) * angle - dipole * field * np.cos(angle + tilt)
 
     fields = np.concatenate([np.linspace(0.0, 0.15, 10), np.linspace(0.15, -0.15, 19)[1:]])
-    angles = np.array([brentq(balance, -2.0, 2.0, args=(b,), xtol=1e-14) for b in fields])
+    reaching, last = [], 0.0
+    for field in fields:
+        last = min(max(last, field - loop), field + loop)
+        reaching.append(last)
+    angles = np.array([brentq(balance, -2.0, 2.0, args=(b,), xtol=1e-14) for b in reaching])
     angles += ANGLE_NOISE * np.random.default_rng(seed).normal(size=len(angles))
     return curve({"fold": Channel("fold", "crease_angle", angles, "rad", ANGLE_NOISE, {"crease": 0})}, field=fields)
 
@@ -112,6 +119,25 @@ def suspected(forward):
     from origami_sim.diagnose.hypothesis import suspects
 
     return suspects(forward.model, forward.recordings, forward._drives[0])
+
+
+def test_what_distorts_the_drive_remembers_earlier_steps():
+    """A field that lags behind its current by a width, in the diagnosis and along the equilibria of the statics."""
+    width = 0.004
+    recording = flap_curve(loop=width)
+    forward = curves(flap(), [recording])
+    suspect = next(s for s in forward.admitted(suspected(forward)) if s.effect == "field_hysteresis")
+    nominal = [f.start for f in forward.subject.nominals]
+    predicted = forward.predict(Hypothesis((suspect,)), np.array([[*nominal, width]]))
+    angles = recording.channels["fold"].values
+    assert np.abs(np.concatenate([v[0, :, 0] for v in predicted]) - angles).max() < 5 * ANGLE_NOISE
+    without = np.concatenate([v[0, :, 0] for v in forward.predict(Hypothesis(), np.array([nominal]))])
+    assert np.abs(without - angles).max() > 10 * ANGLE_NOISE
+    model = forward.model.with_effects("field_hysteresis")
+    parameters = forward.parameters.for_model(model)
+    parameters.set("field_hysteresis", "coercive_field", width)
+    found = observe_equilibria(model, parameters, follow(model, parameters, recording), recording)["fold"]
+    assert np.abs(found - angles).max() < 5 * ANGLE_NOISE
 
 
 def test_chains_are_those_of_the_statics():

@@ -8,14 +8,14 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
-from origami_sim.diagnose.compare import _predictive
+from origami_sim.diagnose.compare import _predictive, penalty_of
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
 from origami_sim.diagnose.forward import FINER, local_line, refined
-from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.trust import trust
-from origami_sim.diagnose.verdict import floor_of, noise_of, structure
+from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel
 from origami_sim.solve.batch import Batch
@@ -230,8 +230,43 @@ def test_a_segment_without_a_value_has_no_structure():
     left = [rng.normal(size=(120, 2)) for _ in range(4)]
     gap = [*left[:2], np.full((120, 2), np.nan), *left[2:]]
     whole, gapped = (SimpleNamespace(residuals=r) for r in (left, gap))
-    assert structure(gapped, whole) == structure(whole, whole)
+    a, b = structure(gapped, whole), structure(whole, whole)
+    np.testing.assert_array_equal(a.power.sum(axis=0), b.power.sum(axis=0))
+    np.testing.assert_array_equal(a.count.sum(axis=0), b.count.sum(axis=0))
     assert noise_of(gap) == pytest.approx(noise_of(left)), "nor does it tell of the noise"
+
+
+@pytest.mark.parametrize(("length", "segments"), [(240, 8), (10, 12)])
+def test_structure_is_found_in_the_octave_where_it_lies(length, segments):
+    """White noise passes; a tone of ten standard deviations in all does not, nor is a drift of segments lost."""
+    rng = np.random.default_rng(3)
+    alarms = 0
+    for _ in range(100):
+        noise = SimpleNamespace(residuals=[rng.normal(size=(length, 2)) for _ in range(segments)])
+        alarms += structure(noise, noise).score > STRUCTURED
+    assert alarms <= 3
+    tone = np.sin(2 * np.pi * np.arange(length) / max(length / 3.0, 10.0))[:, None] * [1.0, 0.0]
+    size = 12.0 / np.sqrt(segments * np.sum(tone**2))
+    struck = SimpleNamespace(residuals=[r + size * tone for r in noise.residuals])
+    found = structure(struck, struck)
+    assert found.score > STRUCTURED
+    assert found.excess - structure(noise, struck).excess == pytest.approx(144.0, rel=0.4)
+    lifted = SimpleNamespace(residuals=[r + 12.0 / np.sqrt(segments * length * 2) for r in noise.residuals])
+    assert structure(lifted, lifted).score > STRUCTURED
+    once = SimpleNamespace(residuals=[struck.residuals[0] + 20.0, *noise.residuals[1:]])
+    assert structure(once, noise).score > 10.0 > STRUCTURED > structure(once, noise).repeated
+
+
+def test_numbers_of_which_nothing_is_known_cost_nothing():
+    angles = tuple(Free("turn", n, "rad", 0.0, 0.1, -1.0, 1.0) for n in "xyz")
+    turn = Suspect("turn", "the drive", "drive", angles)
+    strength = 0.5 * np.log(1000.0)
+    assert penalty_of(Hypothesis((turn,)), np.array([50.0, 0.0, 1e-4]), 1000.0) == pytest.approx(strength, abs=1e-6)
+    assert penalty_of(Hypothesis((turn,)), np.array([50.0, 1e3, 1e3]), 1000.0) == pytest.approx(3 * strength)
+    at = replace(turn, sites=4)
+    assert penalty_of(Hypothesis((at, at)), np.array([5.0, 0, 0, 5.0, 0, 0]), 1000.0) == pytest.approx(
+        2 * strength + 2 * np.log(4)
+    )
 
 
 @pytest.mark.parametrize("stated", [False, True])
