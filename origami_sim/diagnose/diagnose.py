@@ -440,7 +440,7 @@ def settled(
         f = out[n]
         given = {"theta": f.theta, "blocks": f.blocks}
         out[n] = fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, **given)
-        if new is not weights and place <= AGAIN:
+        if new is not weights and place <= AGAIN and forward.local:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
             out[n] = min(out[n], fit(forward, f.hypothesis, new, **given), key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new

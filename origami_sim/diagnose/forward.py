@@ -50,6 +50,9 @@ VISCOSITY = {"bar_viscosity": "viscosity", "panel_viscosity": "viscosity"}
 FASTEST = 3.0
 """Frames below which a time constant is not told from none."""
 
+NEAR = 4
+"""Frames from where a segment begins within which its start has to be seen."""
+
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
 
@@ -133,6 +136,9 @@ class Forward:
         firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1 - calm))
         if most is not None and len(firsts) > most:
             firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
+        if self.start == "fit":
+            told = [self._tells(recording, values, noise, int(first)) for first in firsts]
+            firsts = firsts[told] if any(told) else firsts
         blocks = []
         for first in firsts:
             part = slice(first, first + frames)
@@ -146,6 +152,16 @@ class Forward:
                 Block(index, int(first), times, compared, noise, pose, rates, known, seen_first(values[part]))
             )
         return blocks
+
+    def _tells(self, recording: Recording, values, noise, first: int) -> bool:
+        """Whether what was seen near a frame tells all coordinates that the channels can tell."""
+        near = np.isfinite(values[max(0, first - NEAR) : first + NEAR + 1]).any(axis=0)
+        ever = np.isfinite(values).any(axis=0)
+        if np.array_equal(near, ever):
+            return True
+        _, tangent = self._channel_tangent(recording, self.articulation.reference(), values[first])
+        by = tangent / noise[:, None]
+        return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
 
     def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray, np.ndarray]:
         """Pose and rates of the coordinates at a frame, from a local polynomial of the channels, and what is known."""

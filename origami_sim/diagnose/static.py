@@ -45,7 +45,7 @@ FAR = 0.1
 """Longest Newton step, as a part of the device."""
 
 ROUNDS = 12
-ITERATIONS = 6
+ITERATIONS = 12
 """Tangents of a load step, and Broyden's steps with each."""
 
 MOST_WORLDS = 4000

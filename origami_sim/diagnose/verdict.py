@@ -99,6 +99,7 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     kept, total = credible(rows, p, order, scores)
     gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
     holds = best is not base and any(reproducible(scores[id(f)], scores[id(base)]) for f in kept if f is not base)
+    holds = holds and float(np.sum((rms_best / sigma) ** 2)) < float(np.sum((rms_base / sigma) ** 2))
     nothing = best is base or p_value > o.significance
     if nothing and not screening.signatures and over > FLOOR:
         return result("UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base)
@@ -119,7 +120,9 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     mechanism_p = trusted * float(sum(p[rows.index(f)] for f in same))
     kept = [f for f in kept if f is best or not _labels(f) > _labels(best)]
     fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
-    if over > 1.1:
+    if left >= over:
+        fall = f"held-out error does not fall ({over:.2f} and {left:.2f} times the noise floor)"
+    elif over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
     small = p_small > o.level or not holds
     if slow[1] > STRUCTURED and share > INEXACT and not small:

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import _predictive, penalty_of
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
-from origami_sim.diagnose.forward import FINER, local_line, refined
+from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
@@ -210,6 +210,28 @@ def test_panels_whose_stiffness_is_in_doubt_are_not_made_softer(stiff):
     other = arranged(doubted, forward.recordings, Options())
     other.soften()
     assert other.softness == 1.0
+
+
+def test_no_segment_starts_where_its_start_is_not_seen():
+    given = prepared([record(STIFFENING, **SMALL)], 200.0)[0]
+    assert len(given.times) > 260
+    gap = slice(140, 240)
+
+    def starts(names):
+        channels = {
+            n: replace(c, values=np.where(np.isin(np.arange(len(c.values)), np.r_[gap]), np.nan, c.values))
+            if n in names
+            else c
+            for n, c in given.channels.items()
+        }
+        return [
+            b.first for b in arranged(subject(3), [replace(given, channels=channels)], Options(segment=0.25)).blocks
+        ]
+
+    whole, some = starts([]), starts(list(given.channels)[:1])
+    seen = [n for n in whole if not gap.start + NEAR < n < gap.stop - NEAR]
+    assert len(seen) < len(whole)
+    assert starts(given.channels) == some == seen, "each crease is told by its own channel only"
 
 
 # --- what is left
