@@ -125,7 +125,7 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
     elif over > 1.1:
         fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
     small = p_small > o.level or not holds
-    if slow[1] > STRUCTURED and share > INEXACT and not small:
+    if slow[1] > STRUCTURED and share > INEXACT:
         return result(
             "UNKNOWN",
             f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, leaves "
