@@ -161,12 +161,13 @@ class Diagnosis:
     """All that was found.
 
     Attributes:
-        verdict: one of VERDICTS. sentence: what opens the report. probability: of the chosen explanation (or set).
+        verdict: one of VERDICTS. sentence: what opens the report. probability: of the chosen explanation (or set); nan
+            for UNKNOWN, where the one that comes closest is chosen but not believed.
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
-        structure: slow structure that the refitted nominal model leaves and that the best explanation leaves, in
-            standard deviations of what noise gives.
+        structure: slow structure that the refitted nominal model leaves, and that the best explanation leaves in more
+            than one segment, in standard deviations of what noise gives.
         p_value: of the best suspect's score among all that were tried, under the refitted nominal.
         p_small: the same if small effects act beside the noise, each too weak to be told.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.

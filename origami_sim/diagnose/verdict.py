@@ -57,205 +57,6 @@ class Judgement:
     structure: tuple[float, float] = (0.0, 0.0)
 
 
-def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, screening: Screening, chance, weights, o):
-    """Weighs all fits; see `docs/diagnosis.md` for the rules in words.
-
-    Args:
-        sigma: (D,) noise of the components [SI], see `floor_of`.
-        chance: that noise, and that noise and effects too small to be told, give so good a suspect.
-    """
-    p_value, p_small = chance
-    rows = [f for f in fits if id(f) in scores]
-    p = probabilities(supported(rows, scores))
-    order = np.argsort(-p)
-    best = rows[order[0]]
-    notes = _notes(forward, rows, screening, sigma)
-    rms_base, rms_best = scores[id(base)].rms, scores[id(best)].rms
-    over = float(np.max(rms_base / sigma))
-    left = float(np.max(rms_best / sigma))
-    removed = removable(rms_base, rms_best, sigma)
-    begins = onset(forward, base, sigma, weights=weights).time
-    others = [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)]
-    before, after = structure(base, best), structure(best, best)
-    slow = (before.score, after.repeated)
-    share = after.excess / max(before.excess, after.excess, 1e-300)
-
-    def result(verdict, sentence, probability, chosen, fit=best, tied=()):
-        return Judgement(
-            verdict,
-            sentence,
-            float(probability),
-            list(chosen),
-            fit,
-            list(tied),
-            removed,
-            left,
-            begins,
-            notes,
-            others,
-            slow,
-        )
-
-    kept, total = credible(rows, p, order, scores)
-    gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
-    holds = best is not base and any(reproducible(scores[id(f)], scores[id(base)]) for f in kept if f is not base)
-    holds = holds and float(np.sum((rms_best / sigma) ** 2)) < float(np.sum((rms_base / sigma) ** 2))
-    nothing = best is base or p_value > o.significance
-    if nothing and not screening.signatures and over > FLOOR:
-        return result("UNTESTABLE", "None of the catalogue's suspects is excited by these recordings.", 1.0, [], base)
-    if nothing and slow[0] < STRUCTURED:
-        probability = max(float(p[rows.index(base)]), chance_of_null(p_value))
-        return _adequate_or_parameter(forward, given, base, weights, result, over, probability)
-    if nothing or (not holds and slow[0] >= STRUCTURED):
-        text = f"The refitted model misses the recordings by {over:.2f} times the noise, "
-        if nothing or p[rows.index(base)] >= 0.5:
-            text += "and nothing in the catalogue explains it (chance of so good a suspect under noise: "
-            return result("UNKNOWN", text + f"{p_value:.2g}).", p[rows.index(base)], [], base)
-        name = _distinct([rows[i] for i in order])[0]
-        text += f"and no suspect explains it reproducibly: the closest, {name}, gains {gain:.1f} +- {error:.1f} in "
-        return result("UNKNOWN", text + "held-out log score.", 1 - p[rows.index(base)], [], base)
-    # the same effects elsewhere, or with another that is not proven
-    same = [f for f in rows if _effects(f) == _effects(best) or _labels(f) > _labels(best)]
-    trusted = trust(gain, len(best.hypothesis.suspects))
-    mechanism_p = trusted * float(sum(p[rows.index(f)] for f in same))
-    kept = [f for f in kept if f is best or not _labels(f) > _labels(best)]
-    fall = f"held-out error falls from {over:.2f} to {left:.2f} times the noise floor"
-    if left >= over:
-        fall = f"held-out error does not fall ({over:.2f} and {left:.2f} times the noise floor)"
-    elif over > 1.1:
-        fall += f" (of what could be removed, {np.clip(removed, 0.0, 1.0):.0%} is)"
-    small = p_small > o.level or not holds
-    if slow[1] > STRUCTURED and share > INEXACT:
-        return result(
-            "UNKNOWN",
-            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, leaves "
-            f"{share:.0%} of the slow structure, {slow[1]:.0f} standard deviations of what noise gives; "
-            f"{fall}.",
-            mechanism_p,
-            [best.hypothesis.label],
-        )
-    strain, number = _strain(best)
-    if strain > STRAINED and small:
-        return _adequate_or_parameter(forward, given, base, weights, result, over, chance_of_null(p_small))
-    if strain > STRAINED:
-        return result(
-            "UNKNOWN",
-            f"Something real is missing that the catalogue does not name: the closest, {_say(best)}, needs {number} "
-            f"{strain:.1f} standard deviations from what is known of it; {fall}.",
-            mechanism_p,
-            [best.hypothesis.label],
-        )
-    if small and base not in kept:
-        kept.append(base)
-        total = min(total + float(p[rows.index(base)]), 1.0)
-    total *= trusted
-    rivals = [f for f in kept if _effects(f) != _effects(best)]
-    if rivals and all(kind(f) == "measurement" for f in kept):
-        names = _distinct(kept)
-        return result(
-            "MEASUREMENT",
-            "The measurement, not the device, explains the mismatch, and these recordings do not tell which of "
-            f"{_join(names)}: "
-            f"the best is {_say(best)}; {fall}.",
-            total,
-            names,
-            best,
-            kept,
-        )
-    if rivals:
-        names = _distinct(kept)
-        return result(
-            "TIE",
-            _tied(kept, [float(p[rows.index(f)]) for f in kept]) + f"; {fall}.",
-            total,
-            names,
-            best,
-            kept,
-        )
-    kinds = {kind(best)}
-    if len(best.hypothesis.suspects) > 1:
-        word = "SEVERAL"
-        text = f"{len(best.hypothesis.suspects)} effects are missing: {_say(best)} (p = {mechanism_p:.2f}); {fall}."
-    elif kinds == {"measurement"}:
-        word = "MEASUREMENT"
-        text = f"The measurement, not the device, explains the mismatch: {_say(best)} (p = {mechanism_p:.2f}); {fall}."
-    else:
-        word = "MECHANISM"
-        s = best.hypothesis.suspects[0]
-        where = "" if len(same) == 1 or p[rows.index(best)] > 0.9 * mechanism_p else " (the site is less certain)"
-        text = f"At {s.site} the model lacks {_say(best)}{where}, p = {mechanism_p:.2f}; {fall}."
-    return result(word, text, mechanism_p, [s.label for s in best.hypothesis.suspects])
-
-
-CLOSE = 6.0
-"""Log evidence up to which an explanation is in a tie if held-out data do not tell it from the best either."""
-
-
-def credible(
-    rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict[int, Score]
-) -> tuple[list[Fit], float]:
-    """The explanations that hold 95 % of the probability, and those that held-out data do not tell from the best."""
-    best, total, kept = rows[order[0]], 0.0, []
-    evidence = dict(zip((id(f) for f in rows), supported(rows, scores), strict=True))
-    for i in order:
-        f = rows[i]
-        d, error = difference(scores[id(best)], scores[id(f)]) if f is not best else (0.0, 1.0)
-        close = evidence[id(best)] - evidence[id(f)] < CLOSE and d < 2.0 * error
-        if total < 0.95 or close:
-            kept.append(f)
-            total += float(p[i])
-    return kept, min(total, 1.0)
-
-
-def chance_of_null(p_value: float) -> float:
-    """Probability that nothing is missing, from the look-elsewhere test (Sellke et al. 2001), prior 4 to 1."""
-    bound = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else 1.0
-    return float(4 * bound / (4 * bound + 1))
-
-
-def _adequate_or_parameter(forward, given: Fit, base: Fit, weights: Weights, result, over, probability):
-    count = len(base.free)
-    before = float(sum(whitened(r, weights) @ whitened(r, weights) for r in given.residuals))
-    better = before - base.misfit - base.penalty
-    deviation = np.array([f.spread for f in base.free])
-    moved = [(f, t) for f, t in zip(base.free, base.theta, strict=True)]
-    if count and better > chi2.ppf(0.99, count):
-        far = sorted(zip(moved, deviation, strict=True), key=lambda m: -abs(m[0][1] - m[0][0].start) / m[1])
-        (f, t), spread = far[0]
-        text = (
-            f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
-            f"{said(f.start, f.unit)} to {said(t, f.unit)}, "
-            f"{abs(t - f.start) / spread:.1f} standard deviations of what was known; "
-            f"held-out error is then {over:.2f} times the noise."
-        )
-        return result("PARAMETER", text, probability, [f.label for (f, t), s in far if abs(t - f.start) > s], base)
-    return result("ADEQUATE", _adequate(over), probability, [], base)
-
-
-def _adequate(over: float) -> str:
-    if over <= FLOOR:
-        return f"The model is adequate: held-out error is {over:.2f} times the noise."
-    return (
-        f"Nothing is found that the model lacks, although its held-out error is {over:.1f} times the noise: what is "
-        "left has no structure, as if the measurement were noisier than stated."
-    )
-
-
-def kind(f: Fit) -> str:
-    """nominal, mechanism or measurement."""
-    kinds = {s.kind for s in f.hypothesis.suspects}
-    if not kinds:
-        return "nominal"
-    return "measurement" if kinds == {"measurement"} else "mechanism"
-
-
-def removable(before: np.ndarray, after: np.ndarray, sigma: np.ndarray) -> float:
-    """(E0^2 - E1^2) / (E0^2 - sigma^2), components pooled in units of their noise."""
-    e0, e1 = float(np.sum((before / sigma) ** 2)), float(np.sum((after / sigma) ** 2))
-    excess = e0 - len(sigma)
-    return (e0 - e1) / excess if excess > 0 else 0.0
-
-
 WINDOW = 10
 """Frames about whose parabola the scatter of a residual is taken."""
 
@@ -306,6 +107,275 @@ class Structure:
         ratio = np.maximum(power[seen] - ALLOWED, 0.0) / count[seen]
         spread = 2.0 / (9.0 * freedom)  # the cube root is nearly normal (Wilson & Hilferty 1931)
         return float(np.max((np.cbrt(ratio) - 1.0 + spread) / np.sqrt(spread), initial=0.0))
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """All fits, weighed against each other.
+
+    Attributes:
+        rows: fits, p: (R,) their probabilities. best, base: the most probable; without an effect. kept: the credible
+            ones, of probability `total`. gain, error: held-out log score of the best over the base.
+        p_value, p_small: that noise, and that noise and effects too small to be told, give so good a suspect.
+        holds: whether the gain is reproducible. tested: whether any suspect could be.
+        over, left, removed: held-out error over the noise before and after; part of what can be removed that was.
+        before, after: structure of the residuals.
+    """
+
+    rows: list[Fit]
+    p: np.ndarray
+    best: Fit
+    base: Fit
+    kept: list[Fit]
+    total: float
+    gain: float
+    error: float
+    p_value: float
+    p_small: float
+    significance: float
+    level: float
+    holds: bool
+    tested: bool
+    over: float
+    left: float
+    removed: float
+    before: Structure
+    after: Structure
+
+    def probability(self, f: Fit) -> float:
+        return float(self.p[self.rows.index(f)])
+
+    @property
+    def nothing(self) -> bool:
+        """Whether no suspect stands out of noise."""
+        return self.best is self.base or self.p_value > self.significance
+
+    @property
+    def small(self) -> bool:
+        """Whether the best may be due to small effects, or to a part of the data only."""
+        return self.p_small > self.level or not self.holds
+
+    @property
+    def share(self) -> float:
+        """Part of the slow structure that the best leaves."""
+        return self.after.excess / max(self.before.excess, self.after.excess, 1e-300)
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the best leaves more structure than an inexact law does."""
+        return self.after.repeated > STRUCTURED and self.share > INEXACT
+
+    @property
+    def fall(self) -> str:
+        """What becomes of the held-out error, in words."""
+        if self.left >= self.over:
+            return f"held-out error does not fall ({self.over:.2f} and {self.left:.2f} times the noise floor)"
+        text = f"held-out error falls from {self.over:.2f} to {self.left:.2f} times the noise floor"
+        if self.over > 1.1:
+            text += f" (of what could be removed, {np.clip(self.removed, 0.0, 1.0):.0%} is)"
+        return text
+
+
+@dataclass(frozen=True)
+class _Said:
+    """A verdict: word, sentence, probability, what is chosen, the fit to show and those in a tie."""
+
+    verdict: str
+    sentence: str
+    probability: float
+    chosen: list[str]
+    fit: Fit
+    tied: list[Fit] = field(default_factory=list)
+
+
+def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, screening: Screening, chance, weights, o):
+    """Weighs all fits; see `docs/diagnosis.md` for the rules in words.
+
+    Args:
+        sigma: (D,) noise of the components [SI], see `floor_of`.
+        chance: that noise, and that noise and effects too small to be told, give so good a suspect.
+    """
+    rows = [f for f in fits if id(f) in scores]
+    p = probabilities(supported(rows, scores))
+    order = np.argsort(-p)
+    best = rows[order[0]]
+    kept, total = credible(rows, p, order, scores)
+    gain, error = difference(scores[id(best)], scores[id(base)]) if best is not base else (0.0, np.inf)
+    before, after = (scores[id(f)].rms / sigma for f in (base, best))
+    repeats = any(reproducible(scores[id(f)], scores[id(base)]) for f in kept if f is not base)
+    w = _Weighed(
+        rows=rows,
+        p=p,
+        best=best,
+        base=base,
+        kept=kept,
+        total=total,
+        gain=gain,
+        error=error,
+        p_value=chance[0],
+        p_small=chance[1],
+        significance=o.significance,
+        level=o.level,
+        holds=repeats and bool(after @ after < before @ before),
+        tested=bool(screening.signatures),
+        over=float(before.max()),
+        left=float(after.max()),
+        removed=removable(before, after),
+        before=structure(base, best),
+        after=structure(best, best),
+    )
+    found = _unnamed(w)
+    if found is None:
+        found = _adequate_or_parameter(w, given, weights) if _quiet(w) else _refuted(w) or _named(w)
+    return Judgement(
+        found.verdict,
+        found.sentence,
+        found.probability,
+        found.chosen,
+        found.fit,
+        found.tied,
+        w.removed,
+        w.left,
+        onset(forward, base, sigma, weights=weights).time,
+        _notes(forward, screening),
+        [rows[i] for i in order[1:] if _effects(rows[i]) != _effects(best)],
+        (w.before.score, w.after.repeated),
+    )
+
+
+def _unnamed(w: _Weighed) -> _Said | None:
+    """Where no suspect stands out: untestable, or unknown if the residual has structure."""
+    if w.nothing and not w.tested and w.over > FLOOR:
+        text = "None of the catalogue's suspects is excited by these recordings."
+        return _Said("UNTESTABLE", text, 1.0, [], w.base)
+    if w.before.score < STRUCTURED or (w.holds and not w.nothing):
+        return None
+    text = f"The refitted model misses the recordings by {w.over:.2f} times the noise, and "
+    if w.nothing or w.probability(w.base) >= 0.5:
+        text += f"nothing in the catalogue explains it (chance of so good a suspect under noise: {w.p_value:.2g})."
+    else:
+        text += f"no suspect explains it reproducibly: the closest, {w.best.hypothesis.label}, gains {w.gain:.1f} +- "
+        text += f"{w.error:.1f} in held-out log score."
+    return _Said("UNKNOWN", text, np.nan, [], w.base)
+
+
+def _refuted(w: _Weighed) -> _Said | None:
+    """Unknown where the best explanation leaves structure, or needs a number that is known to be different."""
+    strain, number = _strain(w.best)
+    if w.leaves:
+        but = f"leaves {w.share:.0%} of the slow structure, {w.after.repeated:.0f} standard deviations of noise"
+    elif strain > STRAINED:
+        but = f"needs {number} {strain:.1f} standard deviations from what is known of it"
+    else:
+        return None
+    text = f"Something real is missing that the catalogue does not name: the closest, {_say(w.best)}, {but}; {w.fall}."
+    return _Said("UNKNOWN", text, np.nan, [w.best.hypothesis.label], w.best)
+
+
+def _quiet(w: _Weighed) -> bool:
+    """Whether there is nothing to name: no suspect stands out, or one that may be small and needs a bent prior."""
+    return w.nothing or (w.small and not w.leaves and _strain(w.best)[0] > STRAINED)
+
+
+def _named(w: _Weighed) -> _Said:
+    """What the credible explanations say: one effect, several, or a tie."""
+    trusted = trust(w.gain, len(w.best.hypothesis.suspects))
+    kept = [f for f in w.kept if f is w.best or not _labels(f) > _labels(w.best)]
+    total = w.total
+    if w.small and w.base not in kept:
+        kept.append(w.base)
+        total = min(total + w.probability(w.base), 1.0)
+    names = _distinct(kept)
+    if any(_effects(f) != _effects(w.best) for f in kept):
+        if all(kind(f) == "measurement" for f in kept):
+            text = "The measurement, not the device, explains the mismatch, and these recordings do not tell which of "
+            text += f"{_join(names)}: the best is {_say(w.best)}"
+            return _Said("MEASUREMENT", f"{text}; {w.fall}.", total * trusted, names, w.best, kept)
+        text = _tied(kept, [w.probability(f) for f in kept])
+        return _Said("TIE", f"{text}; {w.fall}.", total * trusted, names, w.best, kept)
+    # the same effects elsewhere, or with another that is not proven
+    same = [f for f in w.rows if _effects(f) == _effects(w.best) or _labels(f) > _labels(w.best)]
+    probability = trusted * sum(map(w.probability, same))
+    suspects = w.best.hypothesis.suspects
+    if len(suspects) > 1:
+        word, text = "SEVERAL", f"{len(suspects)} effects are missing: {_say(w.best)} (p = {probability:.2f})"
+    elif kind(w.best) == "measurement":
+        word, text = "MEASUREMENT", f"The measurement, not the device, explains the mismatch: {_say(w.best)}"
+        text += f" (p = {probability:.2f})"
+    else:
+        where = "" if len(same) == 1 or w.probability(w.best) > 0.9 * probability else " (the site is less certain)"
+        site = w.best.hypothesis.suspects[0].site
+        word, text = "MECHANISM", f"At {site} the model lacks {_say(w.best)}{where}, p = {probability:.2f}"
+    return _Said(word, f"{text}; {w.fall}.", probability, [s.label for s in suspects], w.best)
+
+
+CLOSE = 6.0
+"""Log evidence up to which an explanation is in a tie if held-out data do not tell it from the best either."""
+
+
+def credible(
+    rows: Sequence[Fit], p: np.ndarray, order: np.ndarray, scores: dict[int, Score]
+) -> tuple[list[Fit], float]:
+    """The explanations that hold 95 % of the probability, and those that held-out data do not tell from the best."""
+    best, total, kept = rows[order[0]], 0.0, []
+    evidence = dict(zip((id(f) for f in rows), supported(rows, scores), strict=True))
+    for i in order:
+        f = rows[i]
+        d, error = difference(scores[id(best)], scores[id(f)]) if f is not best else (0.0, 1.0)
+        close = evidence[id(best)] - evidence[id(f)] < CLOSE and d < 2.0 * error
+        if total < 0.95 or close:
+            kept.append(f)
+            total += float(p[i])
+    return kept, min(total, 1.0)
+
+
+def chance_of_null(p_value: float) -> float:
+    """Probability that nothing is missing, from the look-elsewhere test (Sellke et al. 2001), prior 4 to 1."""
+    bound = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else 1.0
+    return float(4 * bound / (4 * bound + 1))
+
+
+def _adequate_or_parameter(w: _Weighed, given: Fit, weights: Weights) -> _Said:
+    """Where nothing is missing: whether numbers of the model differ from what was known of them."""
+    probability = chance_of_null(w.p_small)
+    if w.nothing:
+        probability = max(w.probability(w.base), chance_of_null(w.p_value))
+    base, count = w.base, len(w.base.free)
+    before = float(sum(whitened(r, weights) @ whitened(r, weights) for r in given.residuals))
+    if not count or before - base.misfit - base.penalty <= chi2.ppf(0.99, count):
+        return _Said("ADEQUATE", _adequate(w.over), probability, [], base)
+    far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
+    f, t = far[0]
+    text = (
+        f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
+        f"{said(f.start, f.unit)} to {said(t, f.unit)}, {abs(t - f.start) / f.spread:.1f} standard deviations of what "
+        f"was known; held-out error is then {w.over:.2f} times the noise."
+    )
+    return _Said("PARAMETER", text, probability, [f.label for f, t in far if abs(t - f.start) > f.spread], base)
+
+
+def _adequate(over: float) -> str:
+    if over <= FLOOR:
+        return f"The model is adequate: held-out error is {over:.2f} times the noise."
+    return (
+        f"Nothing is found that the model lacks, although its held-out error is {over:.1f} times the noise: what is "
+        "left has no structure, as if the measurement were noisier than stated."
+    )
+
+
+def kind(f: Fit) -> str:
+    """nominal, mechanism or measurement."""
+    kinds = {s.kind for s in f.hypothesis.suspects}
+    if not kinds:
+        return "nominal"
+    return "measurement" if kinds == {"measurement"} else "mechanism"
+
+
+def removable(before: np.ndarray, after: np.ndarray) -> float:
+    """(E0^2 - E1^2) / (E0^2 - 1) of errors (D,) over their noise, components pooled."""
+    e0, e1 = float(before @ before), float(after @ after)
+    excess = e0 - len(before)
+    return (e0 - e1) / excess if excess > 0 else 0.0
 
 
 def structure(f: Fit, reference: Fit) -> Structure:
@@ -407,7 +477,7 @@ def distrust(f: Fit, forward) -> str:
     return "; ".join(out)
 
 
-def _notes(forward, rows: Sequence[Fit], screening: Screening, sigma) -> list[str]:
+def _notes(forward, screening: Screening) -> list[str]:
     notes = []
     if len({b.recording for b in forward.blocks}) == 1:
         notes.append("One recording only: held-out data are stretches of the same recording, which share its errors.")

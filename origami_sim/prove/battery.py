@@ -137,7 +137,8 @@ def do(work: Work) -> str:
         made = followed(folder, answer, found)
         if made:
             told += f"; after '{made}' {_said(diagnosed(folder / SUGGESTED))}"
-    return f"case {work.index}: {told} (p = {found.get('probability') or 0:.2f})"
+    sure = found.get("probability")
+    return f"case {work.index}: {told}" + (f" (p = {sure:.2f})" if sure is not None else "")
 
 
 def _said(found: dict) -> str:
