@@ -279,6 +279,22 @@ def test_structure_is_found_in_the_octave_where_it_lies(length, segments):
     assert structure(once, noise).score > 10.0 > STRUCTURED > structure(once, noise).repeated
 
 
+def test_a_tether_is_suspected_at_the_edge_of_each_panel_and_relaxation_at_several_times(stiff):
+    forward = stiff[0]
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive))
+    leads = {s.site: s.entities for s in every if s.effect == "tether"}
+    assert leads.pop("the body") is None
+    lowest = forward.model.position[:, 2].min()
+    *_, last = (np.array(n) for n in leads.values())
+    assert len(leads) == 2, "nothing that is held is tied"
+    assert forward.model.position[last, 2] == pytest.approx(lowest)
+    assert len(last) == 2
+    slow = [s.free[1].start for s in every if s.effect == "crease_relaxation" and s.entities == (1,)]
+    span = forward.recordings[0].times[-1] - forward.recordings[0].times[0]
+    assert len(slow) == 4 and 0.03 < slow[0] and slow[-1] < span
+    assert np.diff(np.log(slow)) == pytest.approx(np.log(slow[1] / slow[0]))
+
+
 def test_numbers_of_which_nothing_is_known_cost_nothing():
     angles = tuple(Free("turn", n, "rad", 0.0, 0.1, -1.0, 1.0) for n in "xyz")
     turn = Suspect("turn", "the drive", "drive", angles)
