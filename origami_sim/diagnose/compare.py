@@ -11,14 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.diagnose.hypothesis import Hypothesis
+from origami_sim.diagnose.hypothesis import PLAUSIBLE, Hypothesis
 from origami_sim.diagnose.refit import Fit, Weights
 
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
-
-PLAUSIBLE = 3.0
-"""Width of what is plausible for a number beside an effect's strength, over its typical value."""
 
 TEMPERATURE = 3.0
 """By which log evidence is divided before it becomes a probability; larger is more careful."""
@@ -134,13 +131,14 @@ def penalty_of(hypothesis: Hypothesis, known: np.ndarray, samples: float) -> flo
     An effect is as likely at few sites as at many.
 
     Args:
-        known: how precisely the data tell each number, given those before it [1 / scale]. samples: effective.
+        known: how precisely each number is known, prior included, given those before it [1 / scale].
+        samples: effective number of samples.
     """
     price, k = 0.0, 0
     for s in hypothesis.suspects:
         price += 0.5 * np.log(samples) + np.log(s.sites)
-        wide = 1.0 + (PLAUSIBLE * known[k + 1 : k + len(s.free)]) ** 2
-        price += 0.5 * float(np.sum(np.log(np.minimum(wide, samples))))
+        narrowed = (PLAUSIBLE * known[k + 1 : k + len(s.free)]) ** 2
+        price += 0.5 * float(np.sum(np.log(np.clip(narrowed, 1.0, samples))))
         k += len(s.free)
     return price
 

@@ -388,12 +388,20 @@ def alike(a: Signature, b: Signature) -> bool:
 def chosen(screening: Screening, most: int) -> list[Signature]:
     """The best suspects, at most so many; of those that look the same, the best only."""
     out: list[Signature] = []
-    for s in screening.signatures:
+    for s in distinct(screening.signatures):
         if len(out) >= most or abs(s.score) < 2.0:
             break
         if not any(alike(s, t) for t in out):
             out.append(s)
     return out
+
+
+def distinct(found: Sequence[Signature]) -> list[Signature]:
+    """Of signatures of one suspect, with several time constants, the first."""
+    first: dict[str, Signature] = {}
+    for s in found:
+        first.setdefault(s.suspect.label, s)
+    return list(first.values())
 
 
 def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequence[Fit], weights: Weights) -> list[Fit]:
@@ -410,7 +418,7 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     done = {f.hypothesis.label for f in fits}
     best = [s for f in near for s in rough.signatures if f.hypothesis.label == s.suspect.label]
     same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)} - done
-    again = [s for s in screening.signatures if s.suspect.label in same]
+    again = [s for s in distinct(screening.signatures) if s.suspect.label in same]
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
@@ -489,7 +497,7 @@ def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, scree
 
 def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
     """The best pair of suspects by the screening, if it promises much more than the best single one."""
-    top = screening.signatures[:12]
+    top = distinct(screening.signatures)[:12]
     if len(top) < 2 or o.most < 2:
         return []
     r = screening.residual
@@ -534,7 +542,7 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
         top = left.signatures[0]
         if p > o.level or top.score**2 < words.INEXACT * (base.cost - best.cost):
             break
-        rivals = [g for g in left.signatures if g.suspect.effect == top.suspect.effect]  # the same at other sites
+        rivals = [g for g in distinct(left.signatures) if g.suspect.effect == top.suspect.effect]  # at other sites
         tried = []
         for g in [g for g in rivals if g.score**2 > 0.7 * top.score**2][:3]:
             f = refit(forward, best, g, weights, screening)

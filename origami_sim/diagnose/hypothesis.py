@@ -145,6 +145,9 @@ def factor(name: str, spread: float) -> Free:
     return Free(NOMINAL, name, "-", 1.0, 0.3 * spread, 0.0, np.inf, spread)
 
 
+PLAUSIBLE = 3.0
+"""How far a number beside an effect's strength may plausibly be from its typical value, in units of that."""
+
 ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
 """Parameters of a node that stand for its reference position."""
 
@@ -310,14 +313,16 @@ def _free(effect: str, name: str, entities) -> Free:
     p = get(effect).parameter(name)
     assert p.typical is not None
     strength = name == get(effect).fitted[0]
+    scale = abs(p.typical) or abs(get(effect).parameter(get(effect).fitted[0]).typical or 1.0)
     return Free(
         effect,
         name,
         p.unit,
         start=0.0 if strength else p.typical,
-        scale=abs(p.typical) or abs(get(effect).parameter(get(effect).fitted[0]).typical or 1.0),
+        scale=scale,
         lower=p.bounds[0],
         upper=p.bounds[1],
+        spread=np.inf if strength else PLAUSIBLE * scale,
         entities=entities,
     )
 
@@ -339,7 +344,8 @@ def at_several_times(every: Sequence[Suspect], shortest: float, longest: float) 
             out.append(s)
             continue
         for time in np.geomspace(shortest, longest, CONSTANTS + 2)[1:-1]:
-            free = [replace(f, start=float(time), scale=float(time)) if n in slow else f for n, f in enumerate(s.free)]
+            given = {"start": float(time), "scale": float(time), "spread": PLAUSIBLE * float(time)}
+            free = [replace(f, **given) if n in slow else f for n, f in enumerate(s.free)]
             out.append(replace(s, free=tuple(free)))
     return out
 

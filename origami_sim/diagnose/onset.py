@@ -288,6 +288,8 @@ def bend(earlier: Sequence[Stretch], s: Stretch, stop: int) -> tuple[float, floa
             good = value > 1e-9
             gain = (1.0 - lost) * float(np.sum((vector.T @ along)[good] ** 2 / value[good]))
             trials.append((total - gain + np.log(len(y)) * np.count_nonzero(good), k))
+    if not trials:  # a segment of a few frames, such as a piece of a short curve
+        return float("nan"), float("nan")
     best, frame = min(trials)
     close = [k for left, k in trials if left < best + 4.0]
     step = float(np.median(np.diff(s.times)))

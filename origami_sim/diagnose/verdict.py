@@ -66,6 +66,12 @@ BAND = (1 / 20, 1 / 8)
 SHORT = 4 / BAND[0]
 """Frames below which a segment has too few frequencies in the band."""
 
+COLOUR = 0.1
+"""Part by which the noise of trackers may differ below the band in which it is read."""
+
+MOST = 0.75
+"""Part of the structure that a suspect must leave to be refuted where it may itself be small."""
+
 ALLOWED = SMALL * SHOWN**2
 """Squares, in units of the noise, by which effects that are too small to be told may exceed it."""
 
@@ -162,8 +168,8 @@ class _Weighed:
 
     @property
     def leaves(self) -> bool:
-        """Whether the best leaves more structure than an inexact law does."""
-        return self.after.repeated > STRUCTURED and self.share > INEXACT
+        """Whether the best leaves more structure than an inexact law does; one that may be small, most of it."""
+        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else INEXACT)
 
     @property
     def fall(self) -> str:
@@ -402,7 +408,7 @@ def structure(f: Fit, reference: Fit) -> Structure:
             count[b, octave] += parts * seen.any(axis=0).sum()
     # of second differences, or of the median of a spectrum
     doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
-    return Structure(power, count, float(doubt.mean() / len(noise)))
+    return Structure(power, count, COLOUR**2 + float(doubt.mean() / len(noise)))
 
 
 def floor_of(forward, best: Fit) -> np.ndarray:
