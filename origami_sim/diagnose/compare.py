@@ -17,6 +17,9 @@ from origami_sim.diagnose.refit import Fit, Weights
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
 
+SIMPLER = 1.0
+"""Log evidence that a number beside an effect's strength costs at least."""
+
 TEMPERATURE = 3.0
 """By which log evidence is divided before it becomes a probability; larger is more careful."""
 
@@ -138,7 +141,7 @@ def penalty_of(hypothesis: Hypothesis, known: np.ndarray, samples: float) -> flo
     for s in hypothesis.suspects:
         price += 0.5 * np.log(samples) + np.log(s.sites)
         narrowed = (PLAUSIBLE * known[k + 1 : k + len(s.free)]) ** 2
-        price += 0.5 * float(np.sum(np.log(np.clip(narrowed, 1.0, samples))))
+        price += 0.5 * float(np.sum(np.log(np.clip(narrowed, np.exp(2.0 * SIMPLER), samples))))
         k += len(s.free)
     return price
 

@@ -8,10 +8,10 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
-from origami_sim.diagnose.compare import _predictive, penalty_of
+from origami_sim.diagnose.compare import SIMPLER, _predictive, penalty_of
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
 from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
-from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, suspects
+from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.trust import trust
@@ -295,16 +295,19 @@ def test_a_tether_is_suspected_at_the_edge_of_each_panel_and_relaxation_at_sever
     assert np.diff(np.log(slow)) == pytest.approx(np.log(slow[1] / slow[0]))
 
 
-def test_numbers_of_which_nothing_is_known_cost_nothing():
+def test_numbers_of_which_nothing_is_known_cost_little():
     angles = tuple(Free("turn", n, "rad", 0.0, 0.1, -1.0, 1.0) for n in "xyz")
     turn = Suspect("turn", "the drive", "drive", angles)
     strength = 0.5 * np.log(1000.0)
-    assert penalty_of(Hypothesis((turn,)), np.array([50.0, 0.0, 1e-4]), 1000.0) == pytest.approx(strength, abs=1e-6)
+    nothing = np.array([50.0, 1 / PLAUSIBLE, 1 / PLAUSIBLE])  # the prior alone
+    assert penalty_of(Hypothesis((turn,)), nothing, 1000.0) == pytest.approx(strength + 2 * SIMPLER)
     assert penalty_of(Hypothesis((turn,)), np.array([50.0, 1e3, 1e3]), 1000.0) == pytest.approx(3 * strength)
-    at = replace(turn, sites=4)
-    assert penalty_of(Hypothesis((at, at)), np.array([5.0, 0, 0, 5.0, 0, 0]), 1000.0) == pytest.approx(
-        2 * strength + 2 * np.log(4)
+    assert penalty_of(Hypothesis((turn,)), np.array([50.0, 3.0, 1e3]), 1000.0) == pytest.approx(
+        2 * strength + np.log(3 * PLAUSIBLE)
     )
+    at = replace(turn, sites=4)
+    both = penalty_of(Hypothesis((at, at)), np.concatenate([nothing, nothing]), 1000.0)
+    assert both == pytest.approx(2 * (strength + 2 * SIMPLER) + 2 * np.log(4))
 
 
 @pytest.mark.parametrize("stated", [False, True])
