@@ -45,8 +45,9 @@ def si_unit(unit: str) -> str:
 
 def with_prefix(value: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which `value` (SI) reads between 1 and 1000, e.g. (1e3, 'mrad') for 0.0081 rad."""
-    if unit in ("1", "K") or not np.isfinite(value) or value == 0.0:
-        return 1.0, unit
+    first = unit.split("/")[0].split(" ")[0]
+    if first in ("1", "K", "kg") or "^" in first or not np.isfinite(value) or value == 0.0:
+        return 1.0, unit  # nothing that takes a prefix, or a power of it
     prefixes = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
     exponent = int(np.clip(3 * np.floor(np.log10(abs(value)) / 3), -9, 9))
     if unit == "rad":

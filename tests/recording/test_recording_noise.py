@@ -61,6 +61,9 @@ def test_a_noiseless_signal_has_rounding_noise_only():
         (4200.0, "rad", "4200 rad"),
         (3000.0, "V", "3.0 kV"),
         (0.0, "N", "0 N"),
+        (0.52, "1/s", "0.52 1/s"),
+        (8.1e-4, "kg m^2", "0.00081 kg m^2"),
+        (3e-4, "N m/rad", "300 µN m/rad"),
     ],
 )
 def test_quantities_read_well(value, unit, text):
