@@ -268,14 +268,17 @@ def _unnamed(w: _Weighed) -> _Said | None:
 def _refuted(w: _Weighed) -> _Said | None:
     """Unknown where the best explanation leaves structure, or needs a number that is known to be different."""
     strain, number = _strain(w.best)
-    if w.leaves:
-        but = f"leaves {w.share:.0%} of the slow structure, {w.after.repeated:.0f} standard deviations of noise"
+    text = f"Something real is missing that the catalogue does not name: the closest, {_say(w.best)}, "
+    left = f"{w.share:.0%} of the slow structure, {w.after.repeated:.0f} standard deviations of noise"
+    if w.leaves and not w.small and w.share < MOST:
+        text = f"The catalogue explains a part, by {_say(w.best)}. Something real is left that it does not name: {left}"
+    elif w.leaves:
+        text += f"leaves {left}"
     elif strain > STRAINED:
-        but = f"needs {number} {strain:.1f} standard deviations from what is known of it"
+        text += f"needs {number} {strain:.1f} standard deviations from what is known of it"
     else:
         return None
-    text = f"Something real is missing that the catalogue does not name: the closest, {_say(w.best)}, {but}; {w.fall}."
-    return _Said("UNKNOWN", text, np.nan, [w.best.hypothesis.label], w.best)
+    return _Said("UNKNOWN", f"{text}; {w.fall}.", np.nan, [w.best.hypothesis.label], w.best)
 
 
 def _quiet(w: _Weighed) -> bool:
