@@ -145,7 +145,7 @@ def factor(name: str, spread: float) -> Free:
     return Free(NOMINAL, name, "-", 1.0, 0.3 * spread, 0.0, np.inf, spread)
 
 
-PLAUSIBLE = 3.0
+PLAUSIBLE = 10.0
 """How far a number beside an effect's strength may plausibly be from its typical value, in units of that."""
 
 ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
