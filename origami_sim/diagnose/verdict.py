@@ -497,7 +497,7 @@ def _notes(forward, screening: Screening) -> list[str]:
 
 
 def _strain(f: Fit) -> tuple[float, str]:
-    """The largest departure of a number of the model from what was known of it, in standard deviations, and its name."""
+    """The largest departure of a number of the model from what was known of it [standard deviations], and its name."""
     own = len(f.free) - len(f.hypothesis.free)
     known = zip(f.free[:own], f.theta, strict=False)
     return max(((abs(t - n.start) / n.spread, n.label) for n, t in known), default=(0.0, ""))
