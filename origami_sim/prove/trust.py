@@ -17,6 +17,10 @@ from origami_sim.prove.score import judge
 RIDGE = np.array([0.0, 1.0, 1.0])
 """Inverse variances of the coefficients: none is far from 0 without many cases."""
 
+EXPECTED, WORTH = 0.75, 8.0
+"""Share that is expected to be right on cases that nobody has seen, and how many cases this expectation is worth: a
+development battery is looked at while the method is made."""
+
 
 def outcomes(run: Path) -> list[tuple[np.ndarray, bool]]:
     """(features, whether the truth is among what was named) of all cases of a run in which something was named."""
@@ -33,14 +37,17 @@ def outcomes(run: Path) -> list[tuple[np.ndarray, bool]]:
 
 
 def fitted(cases: list[tuple[np.ndarray, bool]]) -> np.ndarray:
-    """(3,) coefficients of the logistic curve of highest posterior."""
+    """(3,) coefficients of the logistic curve of highest posterior; trust does not fall with the gain."""
     x, y = np.stack([c[0] for c in cases]), np.array([c[1] for c in cases], float)
+    x, y = np.vstack([x, x.mean(axis=0)]), np.append(y, EXPECTED)
+    worth = np.append(np.ones(len(cases)), WORTH)
 
     def cost(w):
         s = x @ w
-        return np.sum(np.logaddexp(0.0, s) - y * s) + 0.5 * RIDGE @ w**2
+        return worth @ (np.logaddexp(0.0, s) - y * s) + 0.5 * RIDGE @ w**2
 
-    return minimize(cost, np.zeros(x.shape[1])).x
+    free = (None, None)
+    return minimize(cost, np.zeros(x.shape[1]), bounds=[free, (0.0, None), free]).x
 
 
 def main() -> None:

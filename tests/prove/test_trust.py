@@ -24,6 +24,13 @@ def test_few_cases_do_not_make_it_steep():
     assert abs(fitted([(features(1000.0, 1), True), (features(1.0, 1), False)])[1]) < 1.0
 
 
+def test_trust_does_not_fall_with_the_gain_and_some_doubt_is_kept():
+    cases = [(features(10.0, 1), True)] * 20 + [(features(1000.0, 1), False)] * 5
+    w = fitted(cases)
+    assert w[1] == 0.0
+    assert 0.75 < 1 / (1 + np.exp(-features(100.0, 1) @ fitted([c for c in cases if c[1]]))) < 0.95
+
+
 def run(folder, seed: int):
     (folder / "cases" / "0000").mkdir(parents=True)
     (folder / "run.json").write_text(json.dumps({"seed": seed}))
