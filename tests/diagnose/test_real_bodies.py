@@ -244,8 +244,10 @@ def test_flights_are_a_matter_of_the_measurement(tosses, tmp_path):
     subject = replace(subject, nominals=tuple(f for f in subject.nominals if f.name == "gravity"))
     catalogue = ("length_scale", "clock_rate", "gravity_tilt", "mass_damping", "body_drag")
     found = diagnose(subject, flights, Options(segment=FLIGHT, start="fit"), catalogue=catalogue)
-    assert found.verdict in ("TIE", "MEASUREMENT", "SEVERAL")
-    assert {c.split(" at ")[0] for c in found.chosen} & {"length_scale", "clock_rate"}
+    # x and y keep something that neither explains, so that it may be UNKNOWN beside them
+    assert found.verdict in ("TIE", "MEASUREMENT", "UNKNOWN")
+    assert found.chosen and {c.split(" at ")[0] for c in found.chosen} <= {"length_scale", "clock_rate"}
+    assert sorted(e for c in found.candidates[:2] for e in c.effects) == ["clock_rate", "length_scale"]
     scale = next(c for c in found.candidates if c.effects == ["length_scale"])
     number = next(n for n in scale.numbers if "length_scale" in n.label)
     assert number.value == pytest.approx(-0.021, abs=0.006)
