@@ -540,7 +540,8 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
             break
         p = look_elsewhere(left, o.draws, o.seed, small=words.SMALL)
         top = left.signatures[0]
-        if p > o.level or top.score**2 < words.INEXACT * (base.cost - best.cost):
+        inexact = top.score**2 < words.INEXACT * (base.cost - best.cost)
+        if p > o.level or (inexact and words.structure(best, best).repeated < words.STRUCTURED):
             break
         rivals = [g for g in distinct(left.signatures) if g.suspect.effect == top.suspect.effect]  # at other sites
         tried = []
