@@ -107,8 +107,9 @@ def follow(
     found: list[Equilibrium] = []
     drives = _reaching(model, parameters, recording)
     model = model.with_effects(without=tuple(e for e in model.effects if get(e).family == "drive"))
+    parameters = parameters.for_model(model)
     for drive in drives:
-        found.append(equilibrium(model, parameters.for_model(model), drive, state=state, **options))
+        found.append(equilibrium(model, parameters, drive, state=state, **options))
         state = found[-1].state
     return found
 

@@ -82,8 +82,6 @@ class Prescribed(CurveForward):
         times = recording.times - recording.times[0]
         rate = np.zeros_like(q) if recording.by_step else np.gradient(q, times, axis=1)
         drive = distorted(model, parameters, self._drives[r], float(times[-1]))
-        if recording.by_step:
-            drive = drive.held(0.0)
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
         batch = Batch(still, parameters, drive, state, threads=self.threads)
@@ -94,7 +92,7 @@ class Prescribed(CurveForward):
                 onward(batch, (x[:, k] - x[:, k - 1]) / dt, dt)
             velocity = np.einsum("mnwa,m->nwa", jacobian[:, :, k], rate[:, k])
             batch._v.assign(batch._upload(velocity, wp.vec3d))
-            force = batch.total_force(0.0 if recording.by_step else float(times[k]))
+            force = batch.total_force(float(times[k]))
             moments[:, k] = -np.einsum("mnwa,nwa->mw", jacobian[:, :, k], force)
         rows = [self._row(c) for c in recording.channels.values()]
         return moments[rows].swapaxes(0, 1)

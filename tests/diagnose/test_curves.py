@@ -101,6 +101,19 @@ def test_prescribed_moments():
     assert np.abs(predicted - K * (q - REST)).max() < 1e-15
 
 
+def test_prescribed_moments_know_the_drive_of_their_step():
+    """The torque that holds the magnetic flap at angles while the field rises: k th - m B cos th."""
+    s = scene_settings(FLAP)
+    dipole = s.remanence * s.length * s.width * s.thickness / MU0
+    q, field = np.linspace(0.0, 1.0, 12), np.linspace(0.0, 0.1, 12)
+    moment = Channel("moment", "moment", s.stiffness * q - dipole * field * np.cos(q), "N m", 1e-6, {"crease": 0})
+    recording = curve({"moment": moment}, angle=q, field=field)
+    forward = curves(flap(), [recording])
+    nominal = np.array([[f.start for f in forward.subject.nominals]])
+    predicted = np.concatenate([v[0, :, 0] for v in forward.predict(Hypothesis(), nominal)])
+    assert np.abs(predicted - moment.values).max() < 1e-12 * np.abs(moment.values).max() + 1e-15
+
+
 def test_prescribed_relaxation_is_exact():
     """The exponential update gives the closed form of ramp and hold at the frames, however far they are apart."""
     recording = relaxing(20.0, 0.5)[0]
