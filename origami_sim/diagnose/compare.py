@@ -30,13 +30,14 @@ class Score:
 
     Attributes:
         held_out: (B,) log score of each block, up to a constant shared by all hypotheses.
-        rms: (D,) root mean square of the held-out residual [SI].
+        rms: (D,) root mean square of the held-out residual [SI]. squares: (B,) its whitened sum of each block.
         evidence: log evidence: minus half the cost, minus what the numbers cost, see `penalty_of`.
     """
 
     held_out: np.ndarray
     rms: np.ndarray
     evidence: float
+    squares: np.ndarray
 
 
 def weights_from(forward, fits: Sequence[Fit], *, floor: bool = True) -> Weights:
@@ -125,7 +126,8 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     n = max(effective_samples(forward, fit, weights), 2.0)
     known = np.diag(np.linalg.qr(np.concatenate([*tangent, np.diag(prior)]), mode="r"))
     price = penalty_of(fit.hypothesis, known[len(known) - len(fit.hypothesis.free) :], n)
-    return Score(held_out, rms, -0.5 * fit.cost - price)
+    whole = np.array([float(v[line.data(n)] @ v[line.data(n)]) for n, v in enumerate(left)])
+    return Score(held_out, rms, -0.5 * fit.cost - price, whole)
 
 
 def penalty_of(hypothesis: Hypothesis, known: np.ndarray, samples: float) -> float:
@@ -176,6 +178,15 @@ def reproducible(a: Score, b: Score) -> bool:
     d = a.held_out - b.held_out
     enough = np.count_nonzero(d > 1.0) >= min(2, len(d))
     return bool(d.sum() > 4.0 and enough and -d[d < 0].sum() < 0.5 * d[d > 0].sum())
+
+
+def nearer(a: Score, b: Score) -> bool:
+    """Whether a predicts held-out data with a smaller error than b, but for the block that it misses most.
+
+    A number that mostly one block tells is badly known when that block is left out.
+    """
+    rest = np.arange(len(a.squares)) != np.argmax(a.squares - b.squares) if len(a.squares) > 2 else slice(None)
+    return bool(a.squares[rest].sum() < b.squares[rest].sum())
 
 
 def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:

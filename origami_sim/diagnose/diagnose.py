@@ -27,7 +27,7 @@ from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import Fit, Weights, fit
-from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen
+from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.errors import InputError
@@ -148,6 +148,7 @@ def diagnose(
     more = combine(forward, fits, scores, screening, weights, o, tell)
     if alike_ones or more:
         screening, fits, weights = settled(forward, screening, [*fits, *more], weights)
+    fits = [f if f.failed else replace(f, wider=widened(screening, f)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
     best = leader(fits, scores)
@@ -420,6 +421,11 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)} - done
     again = [s for s in distinct(screening.signatures) if s.suspect.label in same]
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
+
+
+def widened(screening: Screening, f: Fit) -> np.ndarray:
+    """How effects that are too small to be told, and what a fit leaves of structure, widen its intervals (P,)."""
+    return widening(screening, f, words.ALLOWED + max(words.structure(f, f).excess, 0.0))
 
 
 HOPELESS = 4.0

@@ -56,6 +56,9 @@ NEAR = 4
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
 
+STEADY, GENTLE, UNDONE = 64, 1e-3, 6
+"""Frames after which a measurement shows a steady motion's rate; part of the rate that is tried; passes to undo it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -67,6 +70,8 @@ class Block:
         noise: (D,) their standard deviations.
         pose, rates: what the recording says about the start: coordinates and their rates [m].
         known: (L,) standard deviations of that: of the coordinates (of which the data themselves say more), the rates.
+        line: (2, D) value and rate of the components at the first frame, and towards: [m, D] from these rates to those
+            of the coordinates; nothing where the start is not read from the recording.
         begin: (D,) what was measured at the first frame, which tells the turn of angles.
     """
 
@@ -78,6 +83,8 @@ class Block:
     pose: Pose
     rates: np.ndarray
     known: np.ndarray
+    line: np.ndarray | None = None
+    towards: np.ndarray | None = None
     begin: np.ndarray | None = None
 
 
@@ -139,19 +146,20 @@ class Forward:
         if self.start == "fit":
             told = [self._tells(recording, values, noise, int(first)) for first in firsts]
             firsts = firsts[told] if any(told) else firsts
-        blocks = []
-        for first in firsts:
-            part = slice(first, first + frames)
-            pose, rates, known = self.articulation.reference(), np.zeros(self.articulation.size), np.zeros(0)
-            if self.start == "fit":
-                pose, rates, known = self._initial(recording, values, noise, int(first))
-            times = recording.times[part] - recording.times[first]
-            compared = values[part].copy()
-            compared[:calm] = np.nan
-            blocks.append(
-                Block(index, int(first), times, compared, noise, pose, rates, known, seen_first(values[part]))
-            )
-        return blocks
+        return [self.segment(index, int(first), frames) for first in firsts]
+
+    def segment(self, index: int, first: int, frames: int) -> Block:
+        """The segment of so many frames of a recording that begins at a frame."""
+        recording = self.recordings[index]
+        values, noise = stacked(recording)
+        part = slice(first, first + frames)
+        begun: tuple = (self.articulation.reference(), np.zeros(self.articulation.size), np.zeros(0))
+        if self.start == "fit":
+            begun = self._initial(recording, values, noise, first)
+        times = recording.times[part] - recording.times[first]
+        compared = values[part].copy()
+        compared[: self._calm[index]] = np.nan
+        return Block(index, first, times, compared, noise, *begun, begin=seen_first(values[part]))
 
     def _tells(self, recording: Recording, values, noise, first: int) -> bool:
         """Whether what was seen near a frame tells all coordinates that the channels can tell."""
@@ -163,8 +171,8 @@ class Forward:
         by = tangent / noise[:, None]
         return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
 
-    def _initial(self, recording: Recording, values, noise, first: int) -> tuple[Pose, np.ndarray, np.ndarray]:
-        """Pose and rates of the coordinates at a frame, from a local polynomial of the channels, and what is known."""
+    def _initial(self, recording: Recording, values, noise, first: int) -> tuple:
+        """From pose to towards of a `Block`, from a local polynomial of the channels."""
         level, slope, error = local_line(recording.times, values, noise, first)
         arm, pose = self.articulation, self._placed(recording, level)
         for _ in range(30):
@@ -183,7 +191,8 @@ class Forward:
         spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
         told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
         spread = np.where(told, np.maximum(np.hypot(CAREFUL * spread, TRUSTED * rates), 1e-9), np.inf)
-        return pose, rates, np.concatenate([np.full(arm.size, np.inf), spread])
+        line = np.nan_to_num(np.stack([level, slope]))
+        return pose, rates, np.concatenate([np.full(arm.size, np.inf), spread]), line, inverse * weight
 
     def _placed(self, recording: Recording, level: np.ndarray) -> Pose:
         """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
@@ -218,6 +227,37 @@ class Forward:
         now = values[:, 0]
         now = now + np.where(turning, 2 * np.pi * np.round((np.nan_to_num(near) - now) / (2 * np.pi)), 0.0)
         return now, (plus - minus - jump) / (2 * step)
+
+    def told(self, hypothesis: Hypothesis, theta: np.ndarray) -> np.ndarray:
+        """[B, L] the starts that recordings tell if they were measured as a hypothesis says, as shifts from their own.
+
+        A scale of the measurement scales the recorded rates too; it is undone by fixed-point steps.
+        """
+        out = np.zeros((len(self.blocks), self.local))
+        distort = [e for e in hypothesis.effects if get(e).family == "measurement"]
+        if not (distort and self.local):
+            return out
+        try:
+            model, parameters = self._world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return out
+        for r, recording in enumerate(self.recordings):
+            mine = [b for b in range(len(self.blocks)) if self.blocks[b].recording == r]
+            lines = np.stack([self.blocks[b].line for b in mine], axis=2)  # type: ignore[arg-type]  # [2, D, W]
+            x = np.concatenate([self.articulation.positions(self.blocks[b].pose) for b in mine], axis=1)
+            deep = depths(self.model, recording, x[None])
+            grid = np.arange(STEADY + 2) * float(np.median(np.diff(recording.times)))
+            all_alike = Parameters.join([parameters], repeat=len(mine))
+            rate = lines[1].copy()
+            for _ in range(UNDONE):
+                motion = lines[0] + GENTLE * rate * (grid[:, None, None] - grid[STEADY // 2])
+                motion = np.concatenate([motion, np.repeat(deep, len(grid), axis=0)], axis=1)
+                seen = self._measured(model, all_alike, recording, distort, [hypothesis], grid, motion, grid)
+                half = STEADY // 2
+                rate += lines[1] - (seen[half + 1] - seen[half - 1]) / (grid[half + 1] - grid[half - 1]) / GENTLE
+            for n, b in enumerate(mine):
+                out[b, self.local // 2 :] = self.blocks[b].towards @ rate[:, n] - self.blocks[b].rates
+        return out
 
     # --- predictions
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from origami_sim.diagnose.forward import Block, seen_first, stacked
 from origami_sim.diagnose.refit import Fit, Linearisation, Weights, fit, linearise
 
 ALARM = 0.01
@@ -145,15 +144,8 @@ def _around(forward, found: Fit, r: int, frame: int):
     old = [b for b in found.blocks if forward.blocks[b].recording == r]
     longest = max(len(forward.blocks[b].times) for b in old)
     first = max(0, frame - int(BEFORE * longest))
-    part = slice(first, min(frame + AFTER + 1, len(recording.times)))
-    values, noise = stacked(recording)
-    block = forward.blocks[old[0]]
     if forward.start == "fit":
-        pose, rates, known = forward._initial(recording, values, noise, first)
-        compared = values[part].copy()
-        compared[: forward._calm.get(r, 0)] = np.nan
-        times = recording.times[part] - recording.times[first]
-        block = Block(r, first, times, compared, noise, pose, rates, known, seen_first(values[part]))
+        block = forward.segment(r, first, min(frame + AFTER + 1, len(recording.times)) - first)
         earlier = [b for b in old if forward.blocks[b].first + len(forward.blocks[b].times) <= first + 1]
     else:  # it starts from rest, once
         block = next(b for b in (forward.blocks[i] for i in old) if b.first <= frame < b.first + len(b.times))

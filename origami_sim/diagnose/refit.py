@@ -59,6 +59,7 @@ class Fit:
         covariance: [P, P] of theta [SI], given the weights.
         at_bound: (P,) whether a number lies on a bound.
         failed: why the fit could not be made, or "".
+        wider: (P,) by how much effects that are too small to be told widen what is known of theta; None: not asked.
     """
 
     hypothesis: Hypothesis
@@ -73,6 +74,7 @@ class Fit:
     at_bound: np.ndarray
     failed: str = ""
     linear: "Linearisation | None" = None
+    wider: np.ndarray | None = None
 
     @property
     def cost(self) -> float:
@@ -80,7 +82,7 @@ class Fit:
 
     def deviations(self) -> np.ndarray:
         """(P,) standard deviations of theta."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)
 
     def reweighted(self, old: Weights, new: Weights) -> "Fit":
         """The same numbers, judged with other weights."""
@@ -174,9 +176,12 @@ def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
     )
 
 
-def departures(forward, blocks, local: np.ndarray) -> float:
+def departures(forward, hypothesis: Hypothesis, theta: np.ndarray, blocks, local: np.ndarray) -> float:
     """Sum of squares of the departures of the starts [B, L] from what the recordings say of them."""
-    return float(sum(np.sum((local[b] / forward.blocks[b].known) ** 2) for b in blocks)) if forward.local else 0.0
+    if not forward.local:
+        return 0.0
+    away = local - forward.told(hypothesis, theta)
+    return float(sum(np.sum((away[b] / forward.blocks[b].known) ** 2) for b in blocks))
 
 
 def misfits(forward, blocks, predicted: list[np.ndarray], weights: Weights) -> np.ndarray:
@@ -231,12 +236,15 @@ def linearise(
         predicted = forward.predict(hypothesis, thetas, locals_, blocks, soft=soft)
     else:
         predicted = [forward.blocks[b].values[None] for b in blocks]  # nothing to derive by
+    told = _told(forward, hypothesis, thetas[: 1 + count - kept])
     tangent, starts = [], []
     for b, values in zip(blocks, predicted, strict=True):
         seen = np.isfinite(forward.blocks[b].values)
         slopes = _scaled(np.where(seen, values[1:] - values[0], 0.0), weights).T
-        columns = slopes[:, : count - kept] * ([f.scale for f in free[kept:count]] / steps[kept:])
-        tangent.append(np.concatenate([columns, np.zeros((forward.local, count - kept))]))
+        columns = slopes[:, : count - kept]
+        if forward.local:
+            columns = np.concatenate([columns, -((told[1:, b] - told[0, b]) / forward.blocks[b].known).T])
+        tangent.append(columns * ([f.scale for f in free[kept:count]] / steps[kept:]))
         by = slopes[:, count - kept :] / nudges[:size]
         starts.append(np.concatenate([by, np.diag(1.0 / forward.blocks[b].known)]) if size else by)
     if known is not None:
@@ -251,13 +259,23 @@ def residuals(forward, hypothesis: Hypothesis, theta, local, blocks, weights: We
     for b, values in zip(blocks, predicted, strict=True):
         measured = forward.blocks[b].values
         gap = _scaled(np.where(np.isfinite(measured), measured - values[0], 0.0), weights)
-        out.append(_with_start(forward, b, gap, local[b]))
-    return out
+        out.append(gap)
+    return _with_starts(forward, hypothesis, theta, blocks, out, local)
 
 
-def _with_start(forward, b: int, gap: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """A whitened residual of a block, and after it that of its start."""
-    return np.concatenate([gap, -start / forward.blocks[b].known]) if forward.local else gap
+def _with_starts(forward, hypothesis: Hypothesis, theta: np.ndarray, blocks, gaps, local: np.ndarray):
+    """Whitened residuals of blocks, each with that of its start."""
+    if not forward.local:
+        return gaps
+    away = local - forward.told(hypothesis, theta)
+    return [np.concatenate([g, -away[b] / forward.blocks[b].known]) for b, g in zip(blocks, gaps, strict=True)]
+
+
+def _told(forward, hypothesis: Hypothesis, thetas: np.ndarray) -> np.ndarray:
+    """[K, B, L] what recordings tell of the starts, for several theta."""
+    if not forward.local:
+        return np.zeros((len(thetas), 0, 0))
+    return np.stack([forward.told(hypothesis, t) for t in thetas])
 
 
 def start_steps(forward) -> np.ndarray:
@@ -338,7 +356,7 @@ def fit(
                 continue
             predicted = forward.predict(hypothesis, trial[None], start[None], blocks)
             cost = float(misfits(forward, blocks, predicted, weights).sum())
-            cost += penalty(free, trial) + departures(forward, blocks, start)
+            cost += penalty(free, trial) + departures(forward, hypothesis, trial, blocks, start)
             if best - cost > gain:
                 found, gain = (trial, start, predicted), best - cost
             if best - cost > FAITHFUL * whole * part * (2.0 - part):
@@ -349,7 +367,7 @@ def fit(
         if found is not None:
             (theta, local, predicted), best = found, best - gain
             gaps = [whitened(forward.blocks[b].values - v[0], weights) for b, v in zip(blocks, predicted, strict=True)]
-            line = line.at([_with_start(forward, b, g, local[b]) for b, g in zip(blocks, gaps, strict=True)])
+            line = line.at(_with_starts(forward, hypothesis, theta, blocks, gaps, local))
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1

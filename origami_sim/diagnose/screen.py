@@ -104,6 +104,27 @@ class Projector:
         return self([self.line.residual[n] for n in self._index])
 
 
+def widening(screening: Screening, f: Fit, squares: float) -> np.ndarray:
+    """(P,) by how much more uncertain a hypothesis' numbers are, because other effects act that are not in the fit.
+
+    Args:
+        squares: d'^2 of these effects together. Any suspect is as likely to be among them as any other.
+    """
+    out = np.ones(len(f.free))
+    assert f.linear is not None
+    own = len(f.free) - len(f.hypothesis.free)
+    if not (screening.signatures and len(f.hypothesis.free)):
+        return out
+    index = [f.blocks.index(b) for b in screening.blocks]
+    prior = np.diag([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])[:own]
+    tangent = np.concatenate([*(f.linear.clear(n, f.linear.tangent[n]) for n in index), prior])
+    towards = np.linalg.pinv(tangent, rcond=1e-10)[own:]  # what a change of the data does to each number
+    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-300)
+    shapes = np.stack([s.shape for s in screening.signatures])
+    out[own:] = np.sqrt(1.0 + squares * np.mean((towards @ shapes.T) ** 2, axis=1))
+    return out
+
+
 def screen(
     forward,
     suspects: Sequence[Suspect],

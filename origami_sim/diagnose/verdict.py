@@ -2,11 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import chi2
 
-from origami_sim.diagnose.compare import Score, Weights, difference, probabilities, reproducible, supported
+from origami_sim.diagnose.compare import (
+    Score,
+    Weights,
+    difference,
+    nearer,
+    probabilities,
+    reproducible,
+    supported,
+)
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import Fit, whitened
 from origami_sim.diagnose.screen import Screening
@@ -69,6 +78,12 @@ SHORT = 4 / BAND[0]
 COLOUR = 0.1
 """Part by which the noise of trackers may differ below the band in which it is read."""
 
+FAST = (1 / 4, 3 / 8, 1 / 2)
+"""Frequencies per frame of two bands in which noise that is white has the same power."""
+
+WHITE, TINTED = 0.8, 0.35
+"""Ratio of the powers in these bands from which on noise counts as white, and the part that it may still differ by."""
+
 MOST = 0.75
 """Part of the structure that a suspect must leave to be refuted where it may itself be small."""
 
@@ -81,13 +96,13 @@ class Structure:
     """Squares of residuals at low frequencies, in units of what noise gives, by segment and octave.
 
     Attributes:
-        power: [B, O] sums of squares. count: [B, O] how many. doubt: relative variance of the noise that they are
-            compared with.
+        power: [B, O] sums of squares. count: [B, O] how many. doubt: (O,) relative variance of the noise that they
+            are compared with.
     """
 
     power: np.ndarray
     count: np.ndarray
-    doubt: float
+    doubt: np.ndarray
 
     @property
     def excess(self) -> float:
@@ -109,7 +124,7 @@ class Structure:
 
     def _worst(self, power: np.ndarray, count: np.ndarray) -> float:
         seen = count > 0
-        freedom = 2.0 / (2.0 / count[seen] + self.doubt)
+        freedom = 2.0 / (2.0 / count[seen] + self.doubt[seen])
         ratio = np.maximum(power[seen] - ALLOWED, 0.0) / count[seen]
         spread = 2.0 / (9.0 * freedom)  # the cube root is nearly normal (Wilson & Hilferty 1931)
         return float(np.max((np.cbrt(ratio) - 1.0 + spread) / np.sqrt(spread), initial=0.0))
@@ -222,7 +237,7 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
         p_small=chance[1],
         significance=o.significance,
         level=o.level,
-        holds=repeats and bool(after @ after < before @ before),
+        holds=repeats and nearer(scores[id(best)], scores[id(base)]),
         tested=bool(screening.signatures),
         over=float(before.max()),
         left=float(after.max()),
@@ -391,27 +406,32 @@ def structure(f: Fit, reference: Fit) -> Structure:
     """Slow structure in the residuals of a fit, below the frequencies at which the noise of another's is read.
 
     The noise is read from residuals so that a level that was stated wrongly does not matter. What is missing often
-    shows in a narrow band, such as where the device swings, hence octaves.
+    shows in a narrow band, such as where the device swings, hence octaves. The band in which noise is read is itself
+    compared with the fastest frequencies, if noise looks white there: what shakes a device may fill it.
     """
     noise = noise_of(reference.residuals)
     short = min(map(len, f.residuals)) < SHORT
     edge = BAND[1] if short else BAND[0]
     octaves = 1 + int(np.ceil(np.log2(2.0 * edge * max(map(len, f.residuals)))))
-    power, count = np.zeros((2, len(f.residuals), octaves))
+    white = np.full(len(noise), np.nan) if short else white_of(reference.residuals)
+    power, count = np.zeros((2, len(f.residuals), octaves + 1))  # the last one is the band
     frames = np.zeros(len(noise))
     for b, r in enumerate(f.residuals):
         seen = np.isfinite(r)
         frames += seen.sum(axis=0)
-        size = np.abs(np.fft.rfft(np.nan_to_num(r), axis=0)) ** 2 / np.maximum(seen.sum(axis=0), 1) / noise**2
+        size = np.abs(np.fft.rfft(np.nan_to_num(r), axis=0)) ** 2 / np.maximum(seen.sum(axis=0), 1)
         frequency = np.fft.rfftfreq(len(r))
-        for k in np.flatnonzero(frequency <= edge):
-            octave = min(int(np.log2(edge / (frequency[k] or 0.5 / len(r)))), octaves - 1)
+        for k in np.flatnonzero(frequency <= BAND[1]):
+            slow = frequency[k] <= edge
+            octave = min(int(np.log2(edge / (frequency[k] or 0.5 / len(r)))), octaves - 1) if slow else octaves
+            scaled = size[k] / (noise if slow else white) ** 2
             parts = 2.0 if 0.0 < frequency[k] < 0.5 else 1.0
-            power[b, octave] += parts * float(size[k].sum())
-            count[b, octave] += parts * seen.any(axis=0).sum()
+            power[b, octave] += parts * float(np.nansum(scaled))
+            count[b, octave] += parts * (seen.any(axis=0) & np.isfinite(scaled)).sum()
     # of second differences, or of the median of a spectrum
     doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
-    return Structure(power, count, COLOUR**2 + float(doubt.mean() / len(noise)))
+    slow = COLOUR**2 + float(doubt.mean() / len(noise))
+    return Structure(power, count, np.append(np.full(octaves, slow), TINTED**2))
 
 
 def floor_of(forward, best: Fit) -> np.ndarray:
@@ -444,14 +464,26 @@ def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
     if min(map(len, residuals)) < SHORT:
         fast = np.concatenate([np.diff(r, n=2, axis=0) for r in residuals])
         return np.sqrt(np.nanmean(fast**2, axis=0) / 6.0)
+    return np.sqrt(np.nanmedian(_spectrum(residuals, *BAND), axis=0) / np.log(2.0))
+
+
+def white_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """(D,) the same from the fastest frequencies; nan if the noise of all components together is not white there."""
+    lower, upper = (np.nanmean(_spectrum(residuals, a, b), axis=0) for a, b in pairwise(FAST))
+    white = np.nanmean(upper / lower) > WHITE
+    return np.sqrt((lower + upper) / 2.0) if white else np.full(len(lower), np.nan)
+
+
+def _spectrum(residuals: Sequence[np.ndarray], low: float, high: float) -> np.ndarray:
+    """[K, D] powers at the frequencies of a band [1 / frame], of all segments; 1 for white noise of unit variance."""
     powers = []
     for r in residuals:
         taper = np.hanning(len(r) + 2)[1:-1, None] * np.isfinite(r)
         size = (taper**2).sum(axis=0)
         power = np.abs(np.fft.rfft(taper * np.nan_to_num(r), axis=0)) ** 2 / np.where(size > 0.0, size, np.nan)
         frequency = np.fft.rfftfreq(len(r))
-        powers.append(power[(frequency >= BAND[0]) & (frequency <= BAND[1])])
-    return np.sqrt(np.nanmedian(np.concatenate(powers), axis=0) / np.log(2.0))
+        powers.append(power[(frequency >= low) & (frequency <= high)])
+    return np.concatenate(powers)
 
 
 def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:

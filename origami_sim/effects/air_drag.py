@@ -20,10 +20,14 @@ def force(
     double_area = wp.cross(x2 - x1, x3 - x1)
     n = wp.normalize(double_area)
     c = scalar(-0.25) * air_density * drag_coefficient * wp.length(double_area) / scalar(3.0)
-    u1 = wp.dot(v1, n)
-    u2 = wp.dot(v2, n)
-    u3 = wp.dot(v3, n)
-    return corner_rows(c * wp.abs(u1) * u1 * n, c * wp.abs(u2) * u2 * n, c * wp.abs(u3) * u3 * n)
+    # at the middles of the sides, whose forces go to both ends: exact for a panel that turns about one of its edges
+    u12 = wp.dot(v1 + v2, n) / scalar(2.0)
+    u23 = wp.dot(v2 + v3, n) / scalar(2.0)
+    u31 = wp.dot(v3 + v1, n) / scalar(2.0)
+    f12 = c * wp.abs(u12) * u12 / scalar(2.0)
+    f23 = c * wp.abs(u23) * u23 / scalar(2.0)
+    f31 = c * wp.abs(u31) * u31 / scalar(2.0)
+    return corner_rows((f12 + f31) * n, (f12 + f23) * n, (f23 + f31) * n)
 
 
 EFFECT = Effect(
@@ -35,7 +39,7 @@ EFFECT = Effect(
         Parameter("drag_coefficient", "Cd", "-", 0.0, (0.0, 5.0), "about 1.2 for a plate across the flow", typical=1.2),
     ),
     fitted=("drag_coefficient",),
-    formula="f = -(1/2) rho Cd A |vn| vn n, a third at each corner",
+    formula="f = -(1/2) rho Cd A |vn| vn n, a third at the middle of each side",
     source="drag equation for a flat plate",
     matters="0.07 % of the crawler's weight; first-order for light paper",
     confused_with="crease viscosity (linear in rate)",

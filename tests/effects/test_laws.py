@@ -326,6 +326,16 @@ def test_air_drag_of_a_plate():
     assert r.forces["air_drag"].sum(0)[0] == pytest.approx([0, 0, 0.5 * 1.2 * 1.1 * 0.03 * 9], rel=1e-13)
 
 
+def test_air_drag_of_a_flap_that_turns_about_its_edge():
+    """Moment 1/8 rho Cd w L^4 rate^2, and force 1/6 rho Cd w L^3 rate^2."""
+    wide, long, rate = 0.3, 0.2, 7.0
+    x = np.array([[0, 0, 0], [wide, 0, 0], [wide, long, 0], [0, long, 0]])
+    flap = make_model(x, triangles=[(0, 1, 2), (0, 2, 3)])
+    f = report(flap, under("air_drag", drag_coefficient=1.1), v=rate * x[:, [0, 0, 1]] * [0, 0, 1]).forces["air_drag"]
+    assert f.sum(0)[0, 2] == pytest.approx(-1.2 * 1.1 * wide * long**3 * rate**2 / 6, rel=1e-12)
+    assert np.cross(x, f.reshape(4, 3)).sum(0)[0] == pytest.approx(-1.2 * 1.1 * wide * long**4 * rate**2 / 8, rel=1e-12)
+
+
 def test_loads_weights_and_mass_damping():
     model = make_model([[0, 0, 0.0]])
     values = {
