@@ -57,7 +57,7 @@ class Options:
     screened: int = 8
     finalists: int = 6
     most: int = 3
-    significance: float = 0.01
+    significance: float = 0.05
     level: float = 0.05
     draws: int = 999
     seed: int = 0

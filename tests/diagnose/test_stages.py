@@ -148,7 +148,7 @@ def test_two_effects_are_found_together():
 
 @pytest.mark.slow
 def test_false_alarms_are_counted_over_a_hundred_nulls():
-    """Half of them with parameters drawn from their priors. At most 5 % at a nominal 1 %, plus two standard errors."""
+    """Half of them with parameters drawn from their priors. At most 5 %, which is nominal, plus two standard errors."""
     alarms = []
     for seed in range(100):
         rng = np.random.default_rng([seed, 7])
