@@ -68,7 +68,8 @@ def prove(
         cases, seed: how many, and which. structures, kinds: only these (default: all).
         jobs: cases at a time. cluster: dask instead, see `workers`.
         follow: make the experiment that a tie proposes, and diagnose again with it.
-        nearest: find out which other effect is hardest to tell from a single one. draw_only: no diagnosis.
+        nearest: find out which other effect of the catalogue is hardest to tell from each single one, also outside.
+        draw_only: no diagnosis.
 
     Returns:
         the scoreboard, see `score.report`; with `draw_only` what was chosen.
@@ -161,13 +162,13 @@ def drawn(index: int, folder: Path, answer: Path, choice: dict) -> str | None:
 
 
 def compared(answer: Path) -> None:
-    """Which other effect is hardest to tell from a single one, in the folder of the answers.
+    """Which effect of the catalogue is hardest to tell from a single one, in the folder of the answers.
 
     Raises:
         InputError: the truth cannot run.
     """
     into = answer.with_suffix(NEAREST)
-    if into.exists() or json.loads(answer.read_text())["kind"] != "single":
+    if into.exists() or json.loads(answer.read_text())["kind"] not in ("single", "outside"):
         return
     ran = _run([sys.executable, str(generator()), "--nearest", "--answer", str(answer), "--into", str(into)])
     if ran is not None:

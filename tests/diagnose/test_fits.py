@@ -13,9 +13,9 @@ from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nomin
 from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects
 from origami_sim.diagnose.refit import Weights, fit, linearise
-from origami_sim.diagnose.screen import Signature, screen
+from origami_sim.diagnose.screen import Signature, screen, widening
 from origami_sim.diagnose.trust import trust
-from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure
+from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure, white_of
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel
 from origami_sim.solve.batch import Batch
@@ -180,6 +180,21 @@ def test_a_rate_is_known_as_well_as_the_recording_tells():
     assert np.std(found) == pytest.approx(1.0, rel=0.15) and abs(np.mean(found)) < 0.5
 
 
+@pytest.mark.parametrize("effect", ["angle_scale", "clock_rate", "angle_offset"])
+def test_a_start_is_read_as_a_hypothesis_says_that_it_was_measured(effect):
+    """A scale of 0.7 in angles, or a clock that runs at 0.7, has scaled the recorded rates too; an offset has not."""
+    forward = arranged(subject(3), prepared([record(**SMALL)], 200.0), Options(start="fit"))
+    assert not np.any(forward.told(Hypothesis(), np.ones(3)))
+    one = next(s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == effect)
+    value = {"angle_scale": -0.3, "clock_rate": -0.15, "angle_offset": 0.1}[effect]
+    moved = forward.told(Hypothesis((one,)), np.array([1.0, 1.0, 1.0, value]))
+    half = forward.local // 2
+    rates = np.array([b.rates for b in forward.blocks])
+    true = rates if effect == "angle_offset" else rates / (1.0 + value)
+    assert not np.any(moved[:, :half])
+    np.testing.assert_allclose(rates + moved[:, half:], true, rtol=1e-3, atol=1e-3)
+
+
 # --- softer panels
 
 
@@ -258,6 +273,21 @@ def test_a_segment_without_a_value_has_no_structure():
     assert noise_of(gap) == pytest.approx(noise_of(left)), "nor does it tell of the noise"
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_what_shakes_a_device_in_the_band_of_the_noise_is_found_if_noise_is_white(smooth):
+    rng, alarms = np.random.default_rng(5), 0
+    for trial in range(20):
+        noise = rng.normal(size=(8, 242, 2))
+        noise = 0.25 * noise[:, :-2] + 0.5 * noise[:, 1:-1] + 0.25 * noise[:, 2:] if smooth else noise[:, 1:-1]
+        left = SimpleNamespace(residuals=list(noise))
+        alarms += structure(left, left).score > STRUCTURED
+        assert np.all(np.isnan(white_of(left.residuals))) == smooth, trial
+    assert alarms <= 1
+    band = sum(np.sin(2 * np.pi * f * np.arange(240) + 9.0 * f) for f in np.linspace(0.055, 0.12, 16))
+    shaken = SimpleNamespace(residuals=[r + 0.4 * band[:, None] for r in left.residuals])
+    assert smooth or structure(shaken, shaken).repeated > STRUCTURED
+
+
 @pytest.mark.parametrize(("length", "segments"), [(240, 8), (10, 12)])
 def test_structure_is_found_in_the_octave_where_it_lies(length, segments):
     """White noise passes; a tone of ten standard deviations in all does not, nor is a drift of segments lost."""
@@ -329,6 +359,20 @@ def test_the_noise_that_a_smoothing_tracker_hides_is_counted_unless_it_is_stated
         assert found == level
     else:  # a parabola takes some of what is smooth
         assert 0.65 * np.std(noise) < found < 1.05 * np.std(noise)
+
+
+def test_an_interval_is_wider_by_what_other_effects_could_do_to_it(stiff):
+    forward, base, weights, one = stiff
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    found = screen(forward, [s for s in every if s.effect.startswith("crease_")], base, weights)
+    mine = next(s for s in found.signatures if s.suspect.label == one.label)
+    f = fit(forward, Hypothesis((one,)), weights, theta=np.concatenate([base.theta, [4e-4]]), local=base.local)
+    alone = replace(found, signatures=[mine])
+    # the effect itself, again, at d' 3: three standard deviations, but that its signature was taken elsewhere
+    assert 2.8 < widening(alone, f, 9.0)[-1] < np.sqrt(10.0)
+    wider = widening(found, f, 9.0)
+    assert np.all(wider[:-1] == 1.0) and 1.0 < wider[-1] < np.sqrt(10.0)
+    assert replace(f, wider=wider).deviations() == pytest.approx(f.deviations() * wider)
 
 
 def test_small_effects_excuse_what_noise_does_not(stiff):

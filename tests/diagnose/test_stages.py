@@ -130,6 +130,13 @@ def test_an_offset_of_one_encoder_is_the_measurement():
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_offset at channel fold1"
 
 
+def test_a_large_error_of_the_scale_is_the_measurement():
+    found = diagnose(subject(3), [record(scale=0.7, **SMALL)], catalogue=(*LOOPS, "angle_scale"))
+    assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_scale at the measurement"
+    scale = next(n for n in found.candidates[0].numbers if n.label == "angle_scale.angle_scale")
+    assert scale.low < -0.3 < scale.high and scale.value == pytest.approx(-0.3, abs=0.02)
+
+
 def test_more_loss_at_one_crease_is_found_where_the_model_has_that_loss():
     r = record({"crease_viscosity": {"viscosity": (1.2e-5, [1])}}, **SMALL)
     found = diagnose(subject(3), [r], catalogue=("crease_viscosity", "crease_friction", "mass_damping"))
