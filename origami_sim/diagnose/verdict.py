@@ -15,6 +15,7 @@ from origami_sim.diagnose.compare import (
     probabilities,
     reproducible,
     supported,
+    together,
 )
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import Fit, whitened
@@ -34,6 +35,9 @@ INEXACT = 0.06
 
 SMALL, SHOWN = 4, 2.0
 """Effects that are there in any device and too small to be told, and the score that each of them has."""
+
+CANCELLED = 0.4
+"""Several named effects must do so much together of what each does: two that cancel are a third with another law."""
 
 STRAINED = 3.0
 """Standard deviations from what was known that no number of a named explanation may be."""
@@ -291,6 +295,8 @@ def _refuted(w: _Weighed) -> _Said | None:
         text += f"leaves {left}"
     elif strain > STRAINED:
         text += f"needs {number} {strain:.1f} standard deviations from what is known of it"
+    elif len(w.best.hypothesis.suspects) > 1 and together(w.best) < CANCELLED:
+        text += "are effects that mostly cancel each other, as if both stood for one with another law"
     else:
         return None
     return _Said("UNKNOWN", f"{text}; {w.fall}.", np.nan, [w.best.hypothesis.label], w.best)

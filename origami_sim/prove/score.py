@@ -25,6 +25,8 @@ CLEAR = 4.5
 TOLD = 5.0
 """d' from another effect from which on the recordings tell a single one from all others."""
 
+BOARD = "scoreboard.json"
+
 SOON = 2.0
 """Frames within which an onset counts as found."""
 
@@ -449,7 +451,7 @@ def report(out: Path, cases: int, say: Callable[[str], None] = print) -> dict:
     if (out / FROZEN).exists():
         board["frozen"] = json.loads((out / FROZEN).read_text())
     board |= {"failed": sum(bool(r["failed"]) for r in rows), **scores(rows), "rows": rows}
-    write_json(out / "scoreboard.json", board)
+    write_json(out / BOARD, board)
     text = text_of(board)
     (out / "scoreboard.txt").write_text(text)
     if rows:

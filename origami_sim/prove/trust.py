@@ -1,4 +1,8 @@
-"""Fits the curve of `diagnose.trust` to development runs: `python -m origami_sim.prove.trust RUN [RUN ...]`."""
+"""Fits the curve of `diagnose.trust` to runs: `python -m origami_sim.prove.trust RUN [RUN ...]`.
+
+Development runs, and sealed runs that were scored: once opened, they are spent, and tell how often the diagnosis was
+right on cases that nobody had seen.
+"""
 
 import json
 import sys
@@ -12,7 +16,7 @@ from origami_sim.diagnose.trust import FILE, features
 from origami_sim.prove import DEVELOPMENT
 from origami_sim.prove.battery import RUN
 from origami_sim.prove.freeze import FROZEN
-from origami_sim.prove.score import judge
+from origami_sim.prove.score import BOARD, judge
 
 RIDGE = np.array([0.0, 1.0, 1.0])
 """Inverse variances of the coefficients: none is far from 0 without many cases."""
@@ -53,8 +57,10 @@ def fitted(cases: list[tuple[np.ndarray, bool]]) -> np.ndarray:
 def main() -> None:
     runs = [Path(p) for p in sys.argv[1:]]
     stored = [json.loads((r / RUN).read_text()) | json.loads((r / FROZEN).read_text()) for r in runs]
-    if not runs or any(s["seed"] >= DEVELOPMENT for s in stored):
-        sys.exit("runs of development seeds are needed")
+    if not runs or any(
+        s["seed"] >= DEVELOPMENT and not (r / BOARD).exists() for r, s in zip(runs, stored, strict=True)
+    ):
+        sys.exit("runs of development seeds, or sealed ones that were scored, are needed")
     cases = [c for r in runs for c in outcomes(r)]
     w = fitted(cases)
     keys = ("seed", "commit", "diagnosis", "truth")

@@ -8,11 +8,11 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
-from origami_sim.diagnose.compare import SIMPLER, _predictive, penalty_of
+from origami_sim.diagnose.compare import SIMPLER, _predictive, penalty_of, together
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
 from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects
-from origami_sim.diagnose.refit import Weights, fit, linearise
+from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, screen, widening
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure, white_of
@@ -323,6 +323,17 @@ def test_a_tether_is_suspected_at_the_edge_of_each_panel_and_relaxation_at_sever
     span = forward.recordings[0].times[-1] - forward.recordings[0].times[0]
     assert len(slow) == 4 and 0.03 < slow[0] and slow[-1] < span
     assert np.diff(np.log(slow)) == pytest.approx(np.log(slow[1] / slow[0]))
+
+
+@pytest.mark.parametrize(("cosine", "left"), [(0.0, 1.0), (-0.8, 0.2), (0.6, 1.6)])
+def test_effects_that_cancel_leave_little_together(cosine, left):
+    one, other = np.eye(5)[0], cosine * np.eye(5)[0] + np.sqrt(1 - cosine**2) * np.eye(5)[1]
+    tangent = np.stack([np.eye(5)[2], one + 3.0 * np.eye(5)[2], other], axis=1)  # the nominal number takes up a part
+    line = Linearisation([np.zeros(5)], [tangent], [np.zeros((5, 0))], [np.zeros((5, 0))], [np.zeros((0, 0))])
+    a, b = (Suspect(n, "here", "drive", (Free(n, "size", "N", 0.0, 2.0, -9.0, 9.0),)) for n in "ab")
+    free = (Free("inertia", "mass", "-", 1.0, 0.1, 0.5, 2.0), *a.free, *b.free)
+    f = SimpleNamespace(linear=line, free=free, hypothesis=Hypothesis((a, b)), theta=np.array([1.1, 6.0, 6.0]))
+    assert together(f) == pytest.approx(left)
 
 
 def test_numbers_of_which_nothing_is_known_cost_little():
