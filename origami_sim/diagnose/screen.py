@@ -34,7 +34,8 @@ class Signature:
         size: that change [SI], signed.
         shape: (R,) the same less what nominals and starts could explain, all blocks together; unit norm, for a growing
             strength. norm: its norm for `size`. raw: the norm before the projection.
-        score: z of the matched filter, signed; 0 where physics forbids the sign. strength: estimate from it [SI].
+        score: z of the matched filter, signed, within the bounds: 0 where physics forbids the sign. strength: estimate
+            from it [SI].
         error: standard deviation of that estimate.
         status: "", or why the suspect cannot be tested.
     """
@@ -218,11 +219,11 @@ def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fi
             why = "these recordings do not excite it" if raw < SILENT else "nominal parameters can take its place"
             found.append(Signature(s, parts, size, nothing, norm, raw, 0.0, 0.0, np.inf, why))
             continue
-        score = float(shape @ residual / norm) * np.sign(size)
-        strength = float(shape @ residual / norm**2) * size
-        p = s.free[0]
-        if not p.lower - 1e-12 <= p.start + strength <= p.upper + 1e-12:
-            score, strength = 0.0, 0.0
+        best, p = float(shape @ residual / norm**2) * size, s.free[0]
+        strength = float(np.clip(best, p.lower - p.start, p.upper - p.start))
+        # what is explained by as much of it as the bounds allow
+        explained = (best**2 - (best - strength) ** 2) * (norm / size) ** 2
+        score = float(np.sign(strength) * np.sqrt(max(explained, 0.0)))
         shape = shape / norm * np.sign(size)
         found.append(Signature(s, parts, size, shape, norm, raw, score, strength, abs(size) / norm))
     tested = sorted((s for s in found if not s.status), key=lambda s: -abs(s.score))
