@@ -30,7 +30,9 @@ class Score:
 
     Attributes:
         held_out: (B,) log score of each block, up to a constant shared by all hypotheses.
-        rms: (D,) root mean square of the held-out residual [SI]. squares: (B,) its whitened sum of each block.
+        rms: (D,) root mean square of the held-out residual [SI].
+        squares: (B,) whitened sum of squares of each block, if only the stretch of its recording that it lies in is
+            held out.
         evidence: log evidence: minus half the cost, minus what the numbers cost, see `penalty_of`.
     """
 
@@ -83,8 +85,17 @@ def folds(forward, blocks: Sequence[int]) -> list[list[int]]:
     distinct = sorted(set(recordings))
     if len(distinct) > 1:
         return [[n for n, r in enumerate(recordings) if r == d] for d in distinct]
-    count = min(FOLDS, len(blocks))
-    return [list(map(int, part)) for part in np.array_split(np.arange(len(blocks)), count)] if count > 1 else []
+    return stretches(forward, blocks)
+
+
+def stretches(forward, blocks: Sequence[int]) -> list[list[int]]:
+    """Positions (within `blocks`) of contiguous stretches of each recording; none if there is one block only."""
+    recordings = np.array([forward.blocks[b].recording for b in blocks])
+    out = []
+    for r in sorted(set(recordings.tolist())):
+        mine = np.flatnonzero(recordings == r)
+        out += [list(map(int, part)) for part in np.array_split(mine, min(FOLDS, len(mine)))]
+    return out if len(out) > 1 else []
 
 
 def score(forward, fit: Fit, weights: Weights) -> Score:
@@ -106,19 +117,29 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     high = (np.array([f.upper for f in fit.free]) - fit.theta) / scale
     tangent = [line.clear(n, t) for n, t in enumerate(line.tangent)]
     cleared = [line.clear(n, r) for n, r in enumerate(line.residual)]
-    held_out = np.array([-0.5 * float(c @ c) for c in cleared])
-    left = [c.copy() for c in cleared]
-    for part in folds(forward, fit.blocks) if len(fit.free) else []:
+
+    def without(part: list[int]) -> tuple[np.ndarray, np.ndarray]:
+        """A change of theta / scale that leaves out a fold, and the root of the numbers' precision."""
         rows = [tangent[n] for n in range(len(tangent)) if n not in part]
         right = [cleared[n] for n in range(len(tangent)) if n not in part]
         a = np.concatenate([*rows, np.diag(prior)])
         a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
         y = np.concatenate([*right, prior * away / scale, np.zeros(len(scale))])
         q, r = np.linalg.qr(a)
-        step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+        return lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, r
+
+    held_out = np.array([-0.5 * float(c @ c) for c in cleared])
+    left, near = [c.copy() for c in cleared], [c.copy() for c in cleared]
+    several = len({forward.blocks[b].recording for b in fit.blocks}) > 1
+    for part in folds(forward, fit.blocks) if len(fit.free) else []:
+        step, root = without(part)
         for n in part:
             left[n] = cleared[n] - tangent[n] @ step
-            held_out[n] = _predictive(left[n], tangent[n], r)
+            held_out[n] = _predictive(left[n], tangent[n], root)
+    for part in stretches(forward, fit.blocks) if several and len(fit.free) else []:
+        step, _ = without(part)
+        for n in part:
+            near[n] = cleared[n] - tangent[n] @ step
     dims = len(weights.deviation)
     squares = np.concatenate([v[line.data(n)].reshape(-1, dims) ** 2 for n, v in enumerate(left)]) / weights.part
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
@@ -126,7 +147,7 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     n = max(effective_samples(forward, fit, weights), 2.0)
     known = np.diag(np.linalg.qr(np.concatenate([*tangent, np.diag(prior)]), mode="r"))
     price = penalty_of(fit.hypothesis, known[len(known) - len(fit.hypothesis.free) :], n)
-    whole = np.array([float(v[line.data(n)] @ v[line.data(n)]) for n, v in enumerate(left)])
+    whole = np.array([float(v[line.data(n)] @ v[line.data(n)]) for n, v in enumerate(near if several else left)])
     return Score(held_out, rms, -0.5 * fit.cost - price, whole)
 
 
@@ -181,9 +202,9 @@ def reproducible(a: Score, b: Score) -> bool:
 
 
 def nearer(a: Score, b: Score) -> bool:
-    """Whether a predicts held-out data with a smaller error than b, but for the block that it misses most.
+    """Whether a predicts held-out stretches with a smaller error than b, but for the block that it misses most.
 
-    A number that mostly one block tells is badly known when that block is left out.
+    A number that mostly one block, or one recording, tells is badly known when that is left out.
     """
     rest = np.arange(len(a.squares)) != np.argmax(a.squares - b.squares) if len(a.squares) > 2 else slice(None)
     return bool(a.squares[rest].sum() < b.squares[rest].sum())

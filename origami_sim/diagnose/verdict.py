@@ -76,7 +76,7 @@ WINDOW = 10
 BAND = (1 / 20, 1 / 8)
 """Frequencies per frame at which the noise of a residual is read: above most structure, below what trackers smooth."""
 
-SHORT = 4 / BAND[0]
+SHORT = 3 / BAND[0]
 """Frames below which a segment has too few frequencies in the band."""
 
 COLOUR = 0.1
