@@ -8,12 +8,12 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
-from origami_sim.diagnose.compare import SIMPLER, _predictive, penalty_of, together
+from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
 from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
-from origami_sim.diagnose.screen import Signature, screen, widening
+from origami_sim.diagnose.screen import Signature, rated, screen, widening
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure, white_of
 from origami_sim.recording import noise_report
@@ -384,6 +384,35 @@ def test_an_interval_is_wider_by_what_other_effects_could_do_to_it(stiff):
     wider = widening(found, f, 9.0)
     assert np.all(wider[:-1] == 1.0) and 1.0 < wider[-1] < np.sqrt(10.0)
     assert replace(f, wider=wider).deviations() == pytest.approx(f.deviations() * wider)
+
+
+def test_a_gain_holds_if_other_stretches_of_the_same_recording_predict_it(stiff):
+    """Of two recordings one tells the effect: the other cannot predict it, another stretch of the first can."""
+    forward, base, weights, one = stiff
+    twice = SimpleNamespace(blocks=[replace(b, recording=n % 2) for n, b in enumerate(forward.blocks)])
+    known = [0, 2, 4, 6]  # what the second recording says of the number is taken away
+    f = fit(forward, Hypothesis((one,)), weights, theta=np.concatenate([base.theta, [4e-4]]), local=base.local)
+    tangent = [t if n in known else t * [1, 1, 1, 0] for n, t in enumerate(f.linear.tangent)]
+    f = replace(f, linear=replace(f.linear, tangent=tangent))
+    a, b = score(twice, f, weights), score(twice, base, weights)
+    assert nearer(a, b) and not nearer(b, a)
+    assert score(forward, base, weights).squares == pytest.approx(b.squares, rel=0.05)
+
+
+def test_a_strength_beyond_the_bounds_counts_with_what_they_allow(stiff):
+    forward, base, weights, one = stiff
+    found = screen(forward, [one], base, weights).signatures[0]
+    size, parts = found.size, found.parts
+
+    def scored(upper):
+        first = replace(one.free[0], lower=0.0, upper=upper)
+        return rated([(replace(one, free=(first, *one.free[1:])), size, parts)], base, list(base.blocks)).signatures[0]
+
+    free, half, none = scored(1.0), scored(found.strength / 2), scored(1e-12)
+    assert free.score == pytest.approx(found.score)
+    assert half.strength == pytest.approx(found.strength / 2)
+    assert half.score == pytest.approx(found.score * np.sqrt(0.75))
+    assert abs(none.score) < 0.01 * found.score
 
 
 def test_small_effects_excuse_what_noise_does_not(stiff):
