@@ -257,8 +257,8 @@ class Concealed:
     number: str = ""
 
 
-DRIVEN = ("magnetic_strip", "box")
-ELASTIC = ("hanging_strip", "magnetic_strip", "box")
+DRIVEN = ("magnetic_strip", "box", "bi_fold")
+ELASTIC = ("hanging_strip", *DRIVEN)
 STRIPS = ("hanging_strip", "pendulum_chain", "magnetic_strip")
 
 INSIDE: dict[str, Concealed] = {

@@ -9,7 +9,7 @@ Fold angles are positive towards the side from which a face runs counter-clockwi
 
 import numpy as np
 
-STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box")
+STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold")
 
 
 def strip(lengths, width: float) -> tuple[list, list]:
@@ -31,6 +31,13 @@ def box(base: float, reach: float, width: float) -> tuple[list, list]:
         square += [k, k + 1, k + 2]
         flaps.append([k + 1, k + 4, k + 3, k + 2])
     return vertices, [square, *flaps]
+
+
+def corner(side: float) -> tuple[list, list]:
+    """Vertices and faces of three squares around a corner, flat: the second folds about y, on it the third about x."""
+    places = [(-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1), (0, 2), (1, 2)]
+    vertices = [[side * x, side * y, 0.0] for x, y in places]
+    return vertices, [[0, 1, 4, 3], [1, 2, 5, 4], [4, 5, 7, 6]]
 
 
 def creases(pairs, stiffness: float, viscosity: float) -> list[dict]:
@@ -76,6 +83,12 @@ def draw(structure: str, rng: np.random.Generator) -> dict:
             o |= {"thickness": 1.5e-3, "density": 2200.0, "channels": "crease_angle"}
             moments = [(p, [0.0, 0.0, 1.0 if p % 2 else -1.0], 0.02) for p in (1, 2, 3)]
             stiffness, axis = 5e-4, [1.0, 0.0, 0.0]
+        elif structure == "bi_fold":
+            vertices, faces = corner(0.02 * vary(0.05))
+            pairs = [(0, 1), (1, 2)]
+            o |= {"thickness": 1.5e-3, "density": 2200.0, "channels": "crease_angle"}
+            moments = [(1, [1.0, 0.0, 0.0], 0.02), (2, [0.0, 1.0, 0.0], 0.02)]
+            stiffness, axis = 1e-3, [0.0, 0.0, 1.0]
         else:
             vertices, faces = box(0.03, 0.02, 0.02)
             pairs = [(0, p) for p in (1, 2, 3, 4)]

@@ -23,7 +23,7 @@ DEVELOPMENT = 1000
 """Seeds below this are for development; a seed from here on is sealed: it counts once."""
 
 KINDS = ("single", "null", "outside", "confounded", "double")
-STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "mae_cantilever", "de_bender")
+STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold", "mae_cantilever", "de_bender")
 """As the truth names them."""
 
 

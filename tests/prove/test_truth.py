@@ -101,7 +101,7 @@ def test_a_concealed_couple_of_magnets_conserves_energy(truth):
     assert np.ptp(energies[:, 0]) < 0.01 * np.ptp(energies[:, 1])
 
 
-@pytest.mark.parametrize("structure", ["hanging_strip", "pendulum_chain", "magnetic_strip", "box"])
+@pytest.mark.parametrize("structure", ["hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold"])
 def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
     """Rigid bodies in MuJoCo and panels of bars move alike, within the half step by which MuJoCo's velocities lag."""
     from origami_sim.diagnose.articulation import Articulation
