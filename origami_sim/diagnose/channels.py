@@ -47,6 +47,34 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
     )
 
 
+def component_names(recording: Recording) -> list[str]:
+    """Names of all components of all channels, in order."""
+    out = []
+    for c in recording.channels.values():
+        width = 1 if c.values.ndim == 1 else c.values.shape[1]
+        out += [c.name] if width == 1 else [f"{c.name}.{'xyz'[i]}" for i in range(width)]
+    return out
+
+
+def stacked(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """All components of all channels (n, D), and their noise (D,)."""
+    columns = [c.values.reshape(len(recording.times), -1) for c in recording.channels.values()]
+    noise = [np.full(v.shape[1], c.noise) for c, v in zip(recording.channels.values(), columns, strict=True)]
+    return np.concatenate(columns, axis=1), np.concatenate(noise)
+
+
+def angle_mask(recording: Recording) -> np.ndarray:
+    """(D,) whether a component is an angle."""
+    return np.concatenate(
+        [np.full(1 if c.values.ndim == 1 else c.values.shape[1], c.is_angle, bool) for c in recording.channels.values()]
+    )
+
+
+def channel_values(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """All components [F, D, W] at positions [F, N, W, 3] (and continuous angles [F, C, W])."""
+    return np.concatenate([read(model, c, x, angles) for c in recording.channels.values()], axis=1)
+
+
 def depths(model: Model, recording: Recording, x: np.ndarray) -> np.ndarray:
     """How far each marker in a picture is before its plane, [F, k, W] at positions x [F, N, W, 3]."""
     pictured = [c for c in recording.channels.values() if c.kind == "marker_2d"]

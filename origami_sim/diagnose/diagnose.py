@@ -22,6 +22,7 @@ from origami_sim.diagnose.diagnosis import Candidate, Correlation, Diagnosis, Nu
 from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.forward import Forward, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
+from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.observed import unobserved
@@ -199,6 +200,7 @@ def diagnose(
         patch=patch(best),
         subject=subject.name,
         recordings=[r.name for r in recordings],
+        impulses=[] if isinstance(forward, CurveForward) else impulses(forward, base),
     )
     tell("done", 1.0)
     return out

@@ -107,6 +107,25 @@ class Place:
 
 
 @dataclass
+class Impulse:
+    """What a contact does to the device in a blow.
+
+    Attributes:
+        recording, time: which [s]. site: node that is lowest. recorded, predicted: impulse on the device (x, y, z)
+            [N s], of the motion that was recorded and of the refitted model's. error: (3) deviation of either.
+        apart: their difference [standard deviations].
+    """
+
+    recording: str
+    time: float
+    site: str
+    recorded: list[float]
+    predicted: list[float]
+    error: list[float]
+    apart: float
+
+
+@dataclass
 class Trace:
     """One component of one recording: times [s], recorded, predicted before, refitted and after; band is +-2 sd."""
 
@@ -166,6 +185,7 @@ class Diagnosis:
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
+        impulses: of contacts, if nothing holds the device.
         structure: slow structure that the refitted nominal model leaves, and that the best explanation leaves in more
             than one segment, in standard deviations of what noise gives.
         p_value: of the best suspect's score among all that were tried, under the refitted nominal.
@@ -206,6 +226,7 @@ class Diagnosis:
     patch: dict[str, float]
     subject: str = ""
     recordings: list[str] = field(default_factory=list)
+    impulses: list[Impulse] = field(default_factory=list)
 
     @property
     def exit_code(self) -> int:

@@ -6,17 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
-from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose.articulation import Articulation, Pose
-from origami_sim.diagnose.channels import depths, read
+from origami_sim.diagnose.channels import angle_mask, channel_values, component_names, depths, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times
+from origami_sim.diagnose.track import coordinates, placed
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.observe import body_point
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import gradient_norms, stable_step
@@ -174,7 +173,7 @@ class Forward:
     def _initial(self, recording: Recording, values, noise, first: int) -> tuple:
         """From pose to towards of a `Block`, from a local polynomial of the channels."""
         level, slope, error = local_line(recording.times, values, noise, first)
-        arm, pose = self.articulation, self._placed(recording, level)
+        arm, pose = self.articulation, placed(self.model, self.articulation, recording, level)
         for _ in range(30):
             now, tangent = self._channel_tangent(recording, pose, level)
             weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
@@ -193,26 +192,6 @@ class Forward:
         spread = np.where(told, np.maximum(np.hypot(CAREFUL * spread, TRUSTED * rates), 1e-9), np.inf)
         line = np.nan_to_num(np.stack([level, slope]))
         return pose, rates, np.concatenate([np.full(arm.size, np.inf), spread]), line, inverse * weight
-
-    def _placed(self, recording: Recording, level: np.ndarray) -> Pose:
-        """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
-
-        From there the pose is found in small turns, however far the device has turned.
-        """
-        pose, row = self.articulation.reference(), 0
-        points, places = [], []
-        for channel in recording.channels.values():
-            width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
-            if channel.kind == "marker" and np.all(np.isfinite(level[row : row + width])):
-                points.append(body_point(self.model, self.model.position[None], channel)[0])
-                places.append(level[row : row + width])
-            row += width
-        if not self.articulation.floating or len(points) < 3:
-            return pose
-        here, there = np.array(points), np.array(places)
-        turn = Rotation.align_vectors(there - there.mean(0), here - here.mean(0))[0].as_matrix()
-        centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
-        return Pose(turn[None], centre[None], pose.angles)
 
     def _channel_tangent(self, recording: Recording, pose: Pose, near: np.ndarray):
         """Channels (D,) of a pose, turned as in `near`, and their derivatives by the coordinates [D, m]."""
@@ -651,34 +630,6 @@ def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
     return groups
 
 
-def component_names(recording: Recording) -> list[str]:
-    """Names of all components of all channels, in order."""
-    out = []
-    for c in recording.channels.values():
-        width = 1 if c.values.ndim == 1 else c.values.shape[1]
-        out += [c.name] if width == 1 else [f"{c.name}.{'xyz'[i]}" for i in range(width)]
-    return out
-
-
-def stacked(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """All components of all channels (n, D), and their noise (D,)."""
-    columns = [c.values.reshape(len(recording.times), -1) for c in recording.channels.values()]
-    noise = [np.full(v.shape[1], c.noise) for c, v in zip(recording.channels.values(), columns, strict=True)]
-    return np.concatenate(columns, axis=1), np.concatenate(noise)
-
-
-def angle_mask(recording: Recording) -> np.ndarray:
-    """(D,) whether a component is an angle."""
-    return np.concatenate(
-        [np.full(1 if c.values.ndim == 1 else c.values.shape[1], c.is_angle, bool) for c in recording.channels.values()]
-    )
-
-
-def channel_values(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
-    """All components [F, D, W] at positions [F, N, W, 3] (and continuous angles [F, C, W])."""
-    return np.concatenate([read(model, c, x, angles) for c in recording.channels.values()], axis=1)
-
-
 def continuous(channels: np.ndarray, turning: np.ndarray, first: np.ndarray) -> None:
     """Makes angles [F, D, W] continuous in time, in place, starting in the turn of `first` [D, W]."""
     a = np.unwrap(np.nan_to_num(channels[:, turning]), axis=0)
@@ -784,44 +735,3 @@ def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> D
         values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
         changed[name] = series(local, np.tile(values, (1, repeat)))
     return drive.replace(**changed)
-
-
-def coordinates(forward: Forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Coordinates [m, n] of all frames of a recording and their noise (m,); None if the channels do not give them."""
-    recording, arm = forward.recordings[index], forward.articulation
-    if arm.floating or not arm.size:
-        return None
-    values, noise = stacked(recording)
-    if not np.all(np.isfinite(values)):
-        good = np.all(np.isfinite(values), axis=1)
-        if good.sum() < 20:
-            return None
-        for d in range(values.shape[1]):
-            values[:, d] = np.interp(recording.times, recording.times[good], values[good, d])
-    pose = arm.reference(len(values))
-    turning = angle_mask(recording)
-    weight = 1.0 / noise
-    spread = None
-    for _ in range(25):
-        now = channel_values(forward.model, recording, arm.positions(pose)[None], None)[0]
-        gap = values.T - now
-        gap[turning] -= 2 * np.pi * np.round(gap[turning] / (2 * np.pi))
-        tangent = np.empty((len(noise), arm.size, len(values)))
-        for k in range(arm.size):
-            by = np.zeros((arm.size, len(values)))
-            by[k] = 1e-6
-            ahead = channel_values(forward.model, recording, arm.positions(arm.moved(pose, by))[None], None)[0]
-            change = ahead - now
-            change[turning] -= 2 * np.pi * np.round(change[turning] / (2 * np.pi))
-            tangent[:, k] = change / 1e-6
-        scaled = np.moveaxis(tangent * weight[:, None, None], 2, 0)
-        if np.linalg.matrix_rank(scaled[len(scaled) // 2], tol=1e-6 * np.abs(scaled).max()) < arm.size:
-            return None
-        inverse = np.linalg.pinv(scaled)
-        by = np.einsum("nkd,dn->kn", inverse, gap * weight[:, None])
-        pose = arm.moved(pose, np.clip(by, -0.7, 0.7))
-        spread = np.sqrt(np.median(np.sum(inverse**2, axis=2), axis=0))
-        if np.abs(by).max() < 1e-9:
-            break
-    assert spread is not None
-    return np.unwrap(pose.angles, axis=1), spread

@@ -3,7 +3,8 @@ error).
 
 Panels are taken as rigid. A recorded frame gives the coordinates of the tree; a smoother gives their rates and
 accelerations; the residual generalised force is J'(m a - f), which for a crease's fold angle is the moment that is
-missing at that crease, whatever its cause. Its product with the rate is the unexplained power.
+missing at that crease, whatever its cause, and for a device that nothing holds also the wrench that is missing on its
+root panel. Its product with the rate is the unexplained power.
 """
 
 from collections.abc import Sequence
@@ -12,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from origami_sim.diagnose.articulation import Pose
 from origami_sim.diagnose.diagnosis import Curve, Place
-from origami_sim.diagnose.forward import Forward, coordinates
+from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.refit import Fit
+from origami_sim.diagnose.track import track
 from origami_sim.distort import distorted
-from origami_sim.drive import Signal
-from origami_sim.model import State
+from origami_sim.drive import Drive, Signal
+from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
 
 BINS = 13
@@ -48,47 +51,84 @@ class Motion:
 
 
 def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
-    """The smoothed motion of a recording, and what is missing in it under a fitted hypothesis."""
-    found = coordinates(forward, index)
-    if found is None:
-        return None
-    q, noise = found
+    """The smoothed motion of a recording, and what is missing in it under a fitted hypothesis.
+
+    Frames near a contact are left out: in a blow a smoothed acceleration means nothing, see `impulses`.
+    """
     recording, arm = forward.recordings[index], forward.articulation
+    followed = track(forward, recording)
+    if followed is None or not np.any(followed.told) or not (arm.floating or np.all(followed.told)):
+        return None
     times = recording.times - recording.times[0]
     step = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1], step)
-    q = np.stack([np.interp(grid, times, row) for row in q])
-    half = _half_window(q, noise)
+    q, noise, told = np.stack([np.interp(grid, times, row) for row in followed.q]), followed.noise, followed.told
+    half = _half_window(q[told], noise[told])
+    if q.shape[1] < 4 * half + 2:
+        return None
     smooth, rate, acceleration = (
         savgol_filter(q, 2 * half + 1, 3 if d < 2 else 4, deriv=d, delta=step, axis=1) for d in range(3)
     )
-    keep = slice(half, q.shape[1] - half)
-    smooth, rate, acceleration, grid = smooth[:, keep], rate[:, keep], acceleration[:, keep], grid[keep]
     rough = (q - smooth_of(q, half))[:, half:-half]
     deviation = np.maximum(noise, rough.std(axis=1)) * np.linalg.norm(
         savgol_coeffs(2 * half + 1, 4, deriv=2, delta=step)
     )
     model, parameters = forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
-    without = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
-    parameters = parameters.for_model(without)
-    pose = arm.moved(arm.reference(len(grid)), smooth - arm.reference().angles)
-    x = arm.positions(pose)
-    jacobian = arm.jacobian(pose, x)
-    velocity = np.einsum("mnwa,mw->nwa", jacobian, rate)
-    h = 1e-4
-    ahead, behind = (arm.positions(arm.moved(pose, s * h * rate)) for s in (1, -1))
-    a = np.einsum("mnwa,mw->nwa", jacobian, acceleration) + (ahead - 2 * x + behind) / h**2
+    without, parameters = loose(model, parameters)
+    pose = followed.at(grid + recording.times[0], smooth, arm.floating)
     drive = distorted(without, parameters, forward._drives[index], float(grid[-1]))
     frozen = drive.replace(**{n: Signal(offset=_at(s, grid)) for n, s in drive.signals.items()})
-    state = State.at_rest(without, len(grid), position=x)
-    state.v[:] = velocity
-    force = Batch(without, parameters, frozen, state, threads=forward.threads).total_force(0.0)
-    mass = parameters["inertia", "mass"][:, :, None]
-    missing = np.einsum("mnwa,nwa->mw", jacobian, mass * a - force)
-    inertia = np.einsum("mnwa,nwa,knwa->mkw", jacobian, np.broadcast_to(mass, x.shape), jacobian)
+    inertia, free, gaps = dynamics(forward, without, parameters, frozen, pose, rate)
+    keep = ~spread_out(touching(gaps, noise[:3].max()), half)
+    keep[:half] = keep[-half:] = False
+    if keep.sum() < 4 * half + 2:
+        return None
+    missing = np.einsum("mkw,kw->mw", inertia, acceleration) - free
     error = np.sqrt(np.einsum("mkw,k->mw", inertia**2, deviation**2))
-    varying = {n: _at(s, grid) for n, s in drive.signals.items() if np.ptp(_at(s, grid)) > 0}
-    return Motion(grid + recording.times[0], smooth, rate, acceleration, missing, error, varying, half)
+    missing[~told], error[~told] = 0.0, np.inf
+    varying = {n: _at(s, grid)[keep] for n, s in drive.signals.items() if np.ptp(_at(s, grid)) > 0}
+    smooth, rate, acceleration, missing, error = (v[:, keep] for v in (smooth, rate, acceleration, missing, error))
+    return Motion(grid[keep] + recording.times[0], smooth, rate, acceleration, missing, error, varying, half)
+
+
+def loose(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
+    """The model without what keeps panels stiff, which rigid panels do not need."""
+    without = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
+    return without, parameters.for_model(without)
+
+
+def dynamics(forward: Forward, model: Model, parameters: Parameters, drive: Drive, pose: Pose, rate: np.ndarray):
+    """Generalised inertia [m, m, W], forces less centripetal ones [m, W], and gaps of all contacts [k, W].
+
+    Args:
+        pose: W poses. rate: [m, W] of the coordinates.
+    """
+    arm = forward.articulation
+    x = arm.positions(pose)
+    jacobian = arm.jacobian(pose, x)
+    h = 1e-4
+    ahead, behind = (arm.positions(arm.moved(pose, s * h * rate)) for s in (1, -1))
+    state = State.at_rest(model, x.shape[1], position=x)
+    state.v[:] = np.einsum("mnwa,mw->nwa", jacobian, rate)
+    batch = Batch(model, parameters, drive, state, threads=forward.threads)
+    mass = parameters["inertia", "mass"][:, :, None]
+    force = batch.total_force(0.0) - mass * (ahead - 2 * x + behind) / h**2
+    inertia = np.einsum("mnwa,nwa,knwa->mkw", jacobian, np.broadcast_to(mass, x.shape), jacobian)
+    return inertia, np.einsum("mnwa,nwa->mw", jacobian, force), batch.evaluate(0.0).gaps
+
+
+def touching(gaps: np.ndarray, noise: float) -> np.ndarray:
+    """(n,) frames in which a contact may act: its gap [k, n] is less than the noise and half of the way of a frame."""
+    if not len(gaps) or gaps.shape[1] < 2:
+        return np.zeros(gaps.shape[1], bool)
+    way = np.abs(np.diff(gaps, axis=1))
+    way = np.maximum(np.pad(way, ((0, 0), (1, 0))), np.pad(way, ((0, 0), (0, 1))))
+    return np.any(gaps < 3.0 * noise + 0.5 * way, axis=0)
+
+
+def spread_out(mask: np.ndarray, by: int) -> np.ndarray:
+    """A mask and so many frames around it."""
+    return np.convolve(mask, np.ones(2 * by + 1), "same") > 0.5 if by else mask
 
 
 def smooth_of(q: np.ndarray, half: int) -> np.ndarray:

@@ -60,6 +60,9 @@ SECTIONS = {
 PLACES, OPEN_PLACES, OPEN_RECORDINGS, OPEN_SUSPECTS = 6, 2, 3, 12
 """Places drawn in full; of those, and of recordings and suspects, how many are open at first."""
 
+BLOWS = 12
+"""Blows that are listed."""
+
 _DATA = re.compile(r'href="data:application/gzip;base64,([^"]+)"')
 _SECURITY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
@@ -380,8 +383,9 @@ def _where(d: Diagnosis, geometry: dict | None) -> list:
     out: list = []
     if geometry is not None:
         out.append(_drawing(geometry, shares, panels))
+    blows = [_impulses(d)] if d.impulses else []
     if not d.places:
-        return [*out, _nothing("The residual moment could not be located.")]
+        return [*out, *(blows or [_nothing("The residual moment could not be located.")])]
     ordered = sorted(d.places, key=lambda p: -_or(p.share, -1.0))
     ids = {p.site: f"place-{n}" for n, p in enumerate(ordered[:PLACES])}
     head = _header("Place", "Share", "Structure [sd]", "Unexplained power", "Departs at")
@@ -417,7 +421,31 @@ def _where(d: Diagnosis, geometry: dict | None) -> list:
         out.append(
             element("p", f"{len(ordered) - PLACES} more places share {percent(rest)}; their curves are in the data.")
         )
-    return out
+    return [*out, *blows]
+
+
+def _impulses(d: Diagnosis) -> Html:
+    """Momentum that contacts give, recorded and predicted, the most different first."""
+    listed = sorted(d.impulses, key=lambda i: -i.apart)[:BLOWS]
+    body = [
+        element(
+            "tr",
+            element("th", f"{i.site}, {i.recording}", scope="row"),
+            element("td", amount(i.time, "s", 3), class_="n"),
+            *(
+                element("td", ", ".join(f"{1e3 * v:.3g}" for v in part), class_="n")
+                for part in (i.recorded, i.predicted, i.error)
+            ),
+            element("td", number(i.apart), class_="n"),
+        )
+        for i in listed
+    ]
+    head = _header("Contact", "At", "Recorded", "Refitted model", "Error", "Apart [sd]")
+    about = (
+        "Impulses on the device (x, y, z) [mN s]: inertia times the change of its rates, from lines through the frames "
+        f"before and after each blow. {len(d.impulses)} blows are seen on both sides."
+    )
+    return element("div", element("h3", "Blows"), element("p", about, class_="quiet"), _table(head, body, "Impulses"))
 
 
 def _place(p: Place) -> Html:

@@ -15,8 +15,9 @@ from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Curve, Place
 from origami_sim.diagnose.forward import Block, Forward, angle_mask, component_names, continuous, drive_of, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, at_several_times
-from origami_sim.diagnose.locate import BINS, PASSIVE, coordinates
+from origami_sim.diagnose.locate import BINS, PASSIVE
 from origami_sim.diagnose.refit import Fit
+from origami_sim.diagnose.track import coordinates
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get

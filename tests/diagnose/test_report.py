@@ -19,6 +19,7 @@ from origami_sim.diagnose.diagnosis import (
     Curve,
     Diagnosis,
     Experiment,
+    Impulse,
     Number,
     Place,
     Suspected,
@@ -252,6 +253,18 @@ def test_numbers_on_the_page_follow_from_the_data():
     assert "21.30 µN m s/rad (20.40 to 22.20)" in text  # 2.13e-5, half-width 0.09e-5
     assert "+412 ± 21" in text
     assert "1.2 sd away" in text  # (1.312 - 1.25) / 0.05
+
+
+def test_blows_are_listed_the_most_different_first():
+    d = example()
+    assert "Blows" not in Read(page(d, GEOMETRY)).words
+    blow = Impulse("toss <1>", 0.1234, "corner4", [0.011, -0.0021, 0.35], [0.01, -0.002, 0.21], [0.001] * 3, 140.0)
+    d.impulses = [Impulse("toss <1>", 0.4, "corner2", [0.0] * 3, [0.0] * 3, [0.001] * 3, 0.0), blow]
+    for places in (d.places, []):
+        d.places = places
+        text = " ".join(Read(page(d, GEOMETRY)).words)
+        assert "11, -2.1, 350" in text and "10, -2, 210" in text and "2 blows are seen" in text
+        assert text.index("corner4, toss <1>") < text.index("corner2, toss <1>")
 
 
 def test_chosen_rows_stand_out():
