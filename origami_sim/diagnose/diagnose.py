@@ -149,7 +149,7 @@ def diagnose(
     more = combine(forward, fits, scores, screening, weights, o, tell)
     if alike_ones or more:
         screening, fits, weights = settled(forward, screening, [*fits, *more], weights)
-    fits = [f if f.failed else replace(f, wider=widened(screening, f)) for f in fits]
+    fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
     best = leader(fits, scores)
@@ -425,9 +425,13 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
-def widened(screening: Screening, f: Fit) -> np.ndarray:
-    """How effects that are too small to be told, and what a fit leaves of structure, widen its intervals (P,)."""
-    return widening(screening, f, words.ALLOWED + max(words.structure(f, f).excess, 0.0))
+def widened(forward: Forward, screening: Screening, f: Fit, weights: Weights) -> np.ndarray:
+    """How effects that are too small to be told widen a fit's intervals (P,); less where a fit leaves more than noise.
+
+    What is left already counts as noise in the weights.
+    """
+    noise = np.minimum(forward.blocks[0].noise / weights.deviation, 1.0)
+    return widening(screening, f, words.ALLOWED * float(np.mean(noise**2)) * weights.part)
 
 
 HOPELESS = 4.0

@@ -221,7 +221,9 @@ class Forward:
         except InputError:
             return out
         for r, recording in enumerate(self.recordings):
-            mine = [b for b in range(len(self.blocks)) if self.blocks[b].recording == r]
+            mine = [b for b, block in enumerate(self.blocks) if block.recording == r and block.line is not None]
+            if not mine:
+                continue
             lines = np.stack([self.blocks[b].line for b in mine], axis=2)  # type: ignore[arg-type]  # [2, D, W]
             x = np.concatenate([self.articulation.positions(self.blocks[b].pose) for b in mine], axis=1)
             deep = depths(self.model, recording, x[None])
@@ -365,7 +367,12 @@ class Forward:
         step = float(np.median(np.diff(recording.times)))
         frames = int(np.ceil(times[-1] / step - 1e-6)) + 1 + SPARE
         span = frames * step
-        drive = shifted(self._drives[r], recording.times[[b.first for b in blocks]] - recording.times[0], span, k)
+        begins = recording.times[[b.first for b in blocks]] - recording.times[0]
+        late = self._late(model, parameters, each, begins)
+        if np.any(late):
+            drive = shifted(self._drives[r], np.tile(begins, k) + late, span, 1)
+        else:
+            drive = shifted(self._drives[r], begins, span, k)
         drive = distorted(model, parameters, drive, span)
         state = self._state(model, worlds, blocks, None if local is None else local[:, group])
         state.memory[:] = self._memory(r, model, parameters, blocks, k)
@@ -396,6 +403,28 @@ class Forward:
             values = spline(grid, plain)(times)
         values = values.reshape(len(times), -1, k, count)
         return [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)]
+
+    def _late(self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], begins: np.ndarray) -> np.ndarray:
+        """By how much later than its clock says a recording's frames at `begins` were taken [s], for all worlds (W,).
+
+        A clock that runs fast or slow is off by more in each segment, and so is the drive that acts there. Within a
+        segment the reading of the motion takes care of it.
+        """
+        worlds = len(each) * len(begins)
+        out = np.zeros(worlds)
+        rows = np.stack([np.full(worlds, -1e3), np.zeros(worlds), np.tile(begins, len(each))])
+        for name in model.effects:
+            effect = get(name)
+            if effect.family != "measurement" or effect.channels or effect.apply is None:
+                continue  # what reads angles or places has no time of its own
+            whole = [name in self.model.effects or _acts(h, name, None) for h in each]
+            given = {n: np.where(np.repeat(whole, len(begins)), v[0], effect.parameter(n).default)
+                     for n, v in parameters.of(name).items()}  # fmt: skip
+            read = effect.apply(lambda t: t[:, None], rows, **given)[
+                :, 0
+            ]  # when a frame was taken, by a clock's reading
+            out += read[2] - read[1] - rows[2]
+        return out
 
     def _state(self, model: Model, worlds, blocks: list[Block], local) -> State:
         """The starts of all worlds [theta, block]."""
@@ -574,8 +603,8 @@ def _with_effects(state: State, model: Model, step: int | None = None) -> State:
     )
 
 
-def _acts(hypothesis: Hypothesis, effect: str, channel: int) -> bool:
-    """Whether a hypothesis distorts the measurement of a channel by an effect."""
+def _acts(hypothesis: Hypothesis, effect: str, channel: int | None) -> bool:
+    """Whether a hypothesis distorts the measurement of a channel (None: of all of them) by an effect."""
     return any(s.effect == effect and (s.entities is None or channel in s.entities) for s in hypothesis.suspects)
 
 

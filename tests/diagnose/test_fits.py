@@ -16,6 +16,7 @@ from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, rated, screen, widening
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure, white_of
+from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel
 from origami_sim.solve.batch import Batch
@@ -193,6 +194,35 @@ def test_a_start_is_read_as_a_hypothesis_says_that_it_was_measured(effect):
     true = rates if effect == "angle_offset" else rates / (1.0 + value)
     assert not np.any(moved[:, :half])
     np.testing.assert_allclose(rates + moved[:, half:], true, rtol=1e-3, atol=1e-3)
+
+
+def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_not():
+    """What the drive does in a segment is asked of the time at which it was recorded."""
+    forward = arranged(subject(3), prepared([record(**SMALL)], 200.0), Options(start="fit"))
+    begins = np.array([0.0, 1.0, 2.5])
+
+    def late(effect: str, value: float) -> np.ndarray:
+        one = next(s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == effect)
+        each = [Hypothesis(), Hypothesis((one,))]
+        theta = [np.ones(3), np.array([1.0, 1.0, 1.0, value])]
+        worlds = [forward._world(h, t, (effect,)) for h, t in zip(each, theta, strict=True)]
+        joined = Parameters.join([p for _, p in worlds], repeat=3)
+        return forward._late(worlds[0][0], joined, each, begins).reshape(2, 3)
+
+    assert np.array_equal(late("clock_rate", 0.01)[0], [0.0] * 3)
+    assert late("clock_rate", 0.01)[1] == pytest.approx(0.01 * begins, abs=1e-12)
+    for effect in ("clock_delay", "tracker_lag", "exposure", "angle_scale"):
+        if any(s.effect == effect for s in suspects(forward.model, forward.recordings, forward.drive)):
+            assert np.abs(late(effect, 0.02)).max() < 1e-9, effect
+
+
+def test_a_recording_without_segments_tells_no_start():
+    forward = arranged(subject(3), prepared([record(**SMALL)], 200.0), Options(start="fit"))
+    one = next(s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "angle_scale")
+    forward.recordings = [*forward.recordings, forward.recordings[0]]
+    forward.blocks[0] = replace(forward.blocks[0], line=None, towards=None)
+    moved = forward.told(Hypothesis((one,)), np.array([1.0, 1.0, 1.0, -0.3]))
+    assert not np.any(moved[0]) and np.any(moved[1:])
 
 
 # --- softer panels
