@@ -9,13 +9,13 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Impulse
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.locate import dynamics, loose, spread_out, touching
+from origami_sim.diagnose.locate import dynamics, loose, touching
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.track import Track, track
 from origami_sim.distort import distorted
 from origami_sim.effects import CONTACTS, get
 
-FEWEST, MOST = 4, 8
+FEWEST, MOST = 3, 8
 """Frames before and after a blow that give a rate."""
 
 
@@ -50,7 +50,7 @@ def _blows(forward: Forward, fit: Fit, block, recording, tracks: list[Track]) ->
         found.append((*dynamics(forward, free, given, held, t.pose, rate)[:2], gaps))
     noise = tracks[0].noise
     near = np.any([touching(gaps, noise[:3].max()) for *_, gaps in found], axis=0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], spread_out(near, 1).astype(int), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
     runs = list(zip(edges[::2], edges[1::2], strict=True))  # from, to (beyond) of frames in contact
     ends = [(0, 0), *runs, (count, count)]
     out = []
