@@ -211,19 +211,15 @@ def nearer(a: Score, b: Score) -> bool:
 
 
 def together(f: Fit) -> float:
-    """What several effects do together, less what nominal numbers and starts take up, over what each does: squares.
+    """What several effects do together, less what starts take up, over what each of them does alone: squares.
 
     1 for effects that show in different places; near 0 where they cancel, linearised at the fit.
     """
     assert f.linear is not None
     own = len(f.free) - len(f.hypothesis.free)
-    prior = np.diag([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
-    whole = np.concatenate([*(f.linear.clear(n, t) for n, t in enumerate(f.linear.tangent)), prior])
-    q, _ = np.linalg.qr(whole[:, :own])
+    whole = np.concatenate([f.linear.clear(n, t) for n, t in enumerate(f.linear.tangent)])
     firsts = own + np.cumsum([0, *(len(s.free) for s in f.hypothesis.suspects[:-1])])
-    size = np.array([(f.theta[k] - f.free[k].start) / f.free[k].scale for k in firsts])
-    each = whole[:, firsts] * size
-    each -= q @ (q.T @ each)
+    each = whole[:, firsts] * [(f.theta[k] - f.free[k].start) / f.free[k].scale for k in firsts]
     return float(np.sum(each.sum(axis=1) ** 2) / max(np.sum(each**2), 1e-300))
 
 
