@@ -55,6 +55,9 @@ NEAR = 4
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
 
+ROUNDING = 1e-9
+"""Lateness [s] that is due to rounding; worlds without any share one drive."""
+
 STEADY, GENTLE, UNDONE = 64, 1e-3, 6
 """Frames after which a measurement shows a steady motion's rate; part of the rate that is tried; passes to undo it."""
 
@@ -418,13 +421,11 @@ class Forward:
             if effect.family != "measurement" or effect.channels or effect.apply is None:
                 continue  # what reads angles or places has no time of its own
             whole = [name in self.model.effects or _acts(h, name, None) for h in each]
-            given = {n: np.where(np.repeat(whole, len(begins)), v[0], effect.parameter(n).default)
-                     for n, v in parameters.of(name).items()}  # fmt: skip
-            read = effect.apply(lambda t: t[:, None], rows, **given)[
-                :, 0
-            ]  # when a frame was taken, by a clock's reading
-            out += read[2] - read[1] - rows[2]
-        return out
+            here = np.repeat(whole, len(begins))
+            given = {n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()}
+            taken = effect.apply(lambda t: t[:, None], rows, **given)[:, 0]  # what a clock in the picture would show
+            out += taken[2] - taken[1] - rows[2]
+        return np.where(np.abs(out) > ROUNDING, out, 0.0)
 
     def _state(self, model: Model, worlds, blocks: list[Block], local) -> State:
         """The starts of all worlds [theta, block]."""

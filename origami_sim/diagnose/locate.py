@@ -53,7 +53,8 @@ class Motion:
 def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
     """The smoothed motion of a recording, and what is missing in it under a fitted hypothesis.
 
-    Frames near a contact are left out: in a blow a smoothed acceleration means nothing, see `impulses`.
+    Of a device that nothing holds, frames near a contact are left out: in a blow a smoothed acceleration means nothing,
+    see `impulses`.
     """
     recording, arm = forward.recordings[index], forward.articulation
     followed = track(forward, recording)
@@ -75,11 +76,13 @@ def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
     )
     model, parameters = forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
     without, parameters = loose(model, parameters)
-    pose = followed.at(grid + recording.times[0], smooth, arm.floating)
+    pose = followed.at(grid + recording.times[0], smooth)
     drive = distorted(without, parameters, forward._drives[index], float(grid[-1]))
     frozen = drive.replace(**{n: Signal(offset=_at(s, grid)) for n, s in drive.signals.items()})
     inertia, free, gaps = dynamics(forward, without, parameters, frozen, pose, rate)
-    keep = ~spread_out(touching(gaps, noise[:3].max()), half)
+    keep = np.ones(len(grid), bool)
+    if arm.floating:
+        keep = ~spread_out(touching(gaps, noise[:3].max()), half)
     keep[:half] = keep[-half:] = False
     if keep.sum() < 4 * half + 2:
         return None
@@ -114,7 +117,8 @@ def dynamics(forward: Forward, model: Model, parameters: Parameters, drive: Driv
     mass = parameters["inertia", "mass"][:, :, None]
     force = batch.total_force(0.0) - mass * (ahead - 2 * x + behind) / h**2
     inertia = np.einsum("mnwa,nwa,knwa->mkw", jacobian, np.broadcast_to(mass, x.shape), jacobian)
-    return inertia, np.einsum("mnwa,nwa->mw", jacobian, force), batch.evaluate(0.0).gaps
+    gaps = batch.evaluate(0.0).gaps if len(model.contacts) else np.zeros((0, x.shape[1]))
+    return inertia, np.einsum("mnwa,nwa->mw", jacobian, force), gaps
 
 
 def touching(gaps: np.ndarray, noise: float) -> np.ndarray:

@@ -30,11 +30,11 @@ class Track:
     noise: np.ndarray
     told: np.ndarray
 
-    def at(self, times: np.ndarray, q: np.ndarray, floating: bool) -> Pose:
+    def at(self, times: np.ndarray, q: np.ndarray) -> Pose:
         """Poses at times (k,) whose coordinates [m, k] are near those of the nearest frames."""
         near = np.abs(times[:, None] - self.times).argmin(axis=1)
         pose = self.pose.select(near)
-        if not floating:
+        if len(q) == len(pose.angles):  # something holds it
             return Pose(pose.rotation, pose.centre, q)
         turn = Rotation.from_rotvec((q[3:6] - self.q[3:6, near]).T).as_matrix()
         return Pose(turn @ pose.rotation, q[:3].T, q[6:])

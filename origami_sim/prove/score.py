@@ -26,6 +26,7 @@ TOLD = 5.0
 """d' from another effect from which on the recordings tell a single one from all others."""
 
 BOARD = "scoreboard.json"
+"""What a run is scored in."""
 
 SOON = 2.0
 """Frames within which an onset counts as found."""
