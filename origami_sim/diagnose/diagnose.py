@@ -508,7 +508,7 @@ def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, scree
 
 
 def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
-    """The best pair of suspects by the screening, if it promises much more than the best single one."""
+    """The best pair of suspects by the screening, if it promises much more than the best single one gives."""
     top = distinct(screening.signatures)[:12]
     if len(top) < 2 or o.most < 2:
         return []
@@ -526,6 +526,7 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
             explained = float(np.sum((a @ x) ** 2))
             if explained > gain:
                 best, gain = (top[i], top[j], x), explained
+    single = max([single, *(base.cost - f.cost for f in fits if not f.failed)])  # linearised promises may fall short
     if best is None or gain - single < 9.0 + 0.1 * single:
         return []
     a, b, x = best

@@ -34,7 +34,7 @@ CAREFUL, TRUSTED = 3.0, 0.05
 """A rate that was read from a recording is known within so many of its standard deviations, and such a part of it."""
 
 LEAD = 1500
-"""Frames before a segment along which laws with memory are taken, at most; the motion there is as recorded."""
+"""Frames without a segment along which laws with memory are taken, at most; the motion there is as recorded."""
 
 SOFTER = (100.0, 30.0, 10.0)
 """By how much softer panels may be where only derivatives are asked for: the solver's step grows with the root."""
@@ -378,7 +378,9 @@ class Forward:
             drive = shifted(self._drives[r], begins, span, k)
         drive = distorted(model, parameters, drive, span)
         state = self._state(model, worlds, blocks, None if local is None else local[:, group])
-        state.memory[:] = self._memory(r, model, parameters, blocks, k)
+        memory = self._memory(r, worlds, blocks)
+        if memory is not None:
+            state.memory[:] = memory
         chosen = stable_step(model, parameters)
         substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
         raw: list[np.ndarray] = []
@@ -455,32 +457,38 @@ class Forward:
         state.v[:] = np.concatenate(vs, axis=1)
         return state
 
-    def _memory(self, r: int, model: Model, parameters: Parameters, blocks: list[Block], k: int) -> np.ndarray:
-        """Memory [M, W] of the laws where the segments start: that of the recorded motion up to there.
+    def _memory(self, r: int, worlds: list[tuple[Model, Parameters]], blocks: list[Block]) -> np.ndarray | None:
+        """Memory [M, W] of the laws where the segments start: that of the recorded motion up to there; None: no memory.
 
-        All nodes are held and carried along as recorded, so that the laws feel the motion without changing it.
+        All nodes are held and carried along as recorded, from segment to segment, so that the laws feel the motion
+        without changing it. Before that they rest.
         """
-        count = len(blocks)
-        start = State.at_rest(model, k * count)
+        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
         firsts = np.array([b.first for b in blocks])
-        lead = min(LEAD, int(firsts.max(initial=0)))
-        if not len(start.memory) or not lead:
-            return start.memory
+        if not len(State.at_rest(model).memory) or not np.any(firsts):
+            return None
         path = self._path(r)
         if path is None:
-            return start.memory
-        step = float(np.median(np.diff(self.recordings[r].times)))
-        frames = np.maximum(firsts[:, None] - lead + np.arange(lead + 1), 0)  # held still before the recording
-        frames = np.minimum(frames, len(path) - 1)
-        held = Model(
-            **{**{f: getattr(model, f) for f in model.__dataclass_fields__}, "free": np.zeros_like(model.free)}
-        )
-        begin = self.recordings[r].times[frames[:, 0]] - self.recordings[r].times[0]
-        drive = distorted(model, parameters, shifted(self._drives[r], begin, lead * step, k), lead * step)
-        state = State.at_rest(held, k * count, position=np.tile(np.moveaxis(path[frames[:, 0]], 0, 1), (1, k, 1)))
-        batch = self._batch(held, parameters, drive, state)
-        batch.carry(np.moveaxis(path[frames], (0, 1, 2), (2, 0, 1)), step)
-        return batch.state().memory
+            return None
+        times = self.recordings[r].times - self.recordings[r].times[0]
+        step = float(np.median(np.diff(times)))
+        held = replace(model, free=np.zeros_like(model.free))
+        out, batch, at = [], None, 0
+        for first in np.unique(firsts):
+            if batch is None or first - at > LEAD:
+                at = max(int(first) - LEAD, 0)
+                span = float(times[-1] - times[at]) + step
+                drive = distorted(model, parameters, shifted(self._drives[r], times[[at]], span, len(worlds)), span)
+                state = State.at_rest(held, len(worlds), position=np.repeat(path[at][:, None], len(worlds), axis=1))
+                batch = self._batch(held, parameters, drive.held(0.0), state)
+                batch.carry(path[[at, at], :, None], LEAD * step)
+                batch = self._batch(held, parameters, drive, replace(state, memory=batch.state().memory))
+            if first > at:
+                batch.carry(path[at : first + 1, :, None], step)
+            out.append(batch.state().memory)
+            at = int(first)
+        which = np.searchsorted(np.unique(firsts), firsts)
+        return np.stack(out, axis=2)[:, :, which].reshape(len(out[0]), -1)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State) -> Batch:
         return Batch(model, parameters, drive, state, threads=self.threads)

@@ -17,7 +17,7 @@ from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 
-CHUNK = 8
+CHUNK = 6
 """Effects that share a program while screening: more compile longer, fewer compile more often."""
 
 SILENT = 0.3
@@ -148,7 +148,7 @@ def screen(
         blocks = [blocks[i] for i in np.round(np.linspace(0, len(blocks) - 1, most)).astype(int)]
     single = [s for s in suspects if not _together(s, suspects)]
     groups: list[list[Suspect]] = []
-    for s in sorted(single, key=lambda s: (stiff(s.effect), s.effect)):
+    for s in sorted(single, key=lambda s: (stiff(s.effect), bool(get(s.effect).memory), s.effect)):
         last = groups[-1] if groups else []
         if last and stiff(last[0].effect) == stiff(s.effect) and len({t.effect for t in last} | {s.effect}) <= CHUNK:
             last.append(s)
@@ -238,11 +238,9 @@ def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
     change = _changes(forward, group, size, base, few)  # on one block first
     size, _ = _resized(forward, group, size, change[0], goal, base, weights)
     change = _changes(forward, group, size, base, blocks)
-    for _ in range(2):
-        wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
-        redo = np.flatnonzero(off & (wanted != size))
-        if not len(redo):
-            break
+    wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
+    redo = np.flatnonzero(off & (wanted != size))
+    if len(redo):
         size[redo] = wanted[redo]
         for c, new in zip(change, _changes(forward, [group[k] for k in redo], size[redo], base, blocks), strict=True):
             c[redo] = new
@@ -276,12 +274,13 @@ def _size(base: Fit, block: int, weights: Weights) -> float:
 def _affordable(forward, base: Fit, s: Suspect, change: float) -> float:
     """A change within the bounds that does not make the solver's step much smaller than it is."""
     change = _admissible(s, change)
-    enough = forward.step(base.hypothesis, base.theta) / SLOWEST
+    enough = forward.step(base.hypothesis, base.theta, soft=True) / SLOWEST
     rest = [f.start for f in s.free[1:]]
     hypothesis = base.hypothesis.plus(s)
     for _ in range(12):
         try:
-            if forward.step(hypothesis, np.concatenate([base.theta, [s.free[0].start + change], rest])) >= enough:
+            theta = np.concatenate([base.theta, [s.free[0].start + change], rest])
+            if forward.step(hypothesis, theta, soft=True) >= enough:
                 break
         except InputError:
             pass

@@ -2,7 +2,7 @@
 
 A rollout runs the whole time loop of one world in one thread. Its body is the list of laws that are switched on, each
 called with the arguments that it names, so that an effect costs nothing when it is off and nobody maintains a kernel
-by hand. The source is composed as text (see `Program.source`), compiled once per set of effects and cached by warp.
+by hand. The source is composed as text (see `Program.sources`), compiled once per set of effects and cached by warp.
 """
 
 import functools
@@ -36,8 +36,11 @@ FIXED_SLOTS = (
 NATURAL = wp.constant(0x7FFFFFFF)
 """Masked with this, an index is seen to be no negative one, and every access to an array is spared that test."""
 
-CPU_FLAGS = "-fno-slp-vectorize"
-"""Two numbers of a vector stored by halves and loaded whole wait for the store; without packing they do not."""
+CPU_FLAGS = "-fno-slp-vectorize -ffp-contract=fast"
+"""Two numbers of a vector stored by halves and loaded whole wait for the store; without packing they do not.
+
+Products and sums are fused across statements, as on CUDA.
+"""
 
 _ARGUMENTS = """
     mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
@@ -159,21 +162,56 @@ class _Text:
 
 @dataclass(frozen=True)
 class Program:
-    """The compiled kernels of an ordered set of effects.
+    """The kernels of an ordered set of effects, each compiled when it is first asked for.
 
     Attributes:
         effects: the effects, in the order of their summation.
         slots: (owner, parameter) of every parameter slot of the buffer.
-        source: the kernels as text.
-        rollout, evaluate, total: warp kernels.
+        sources: the kernels as text, by name.
     """
 
     effects: tuple[Effect, ...]
     slots: tuple[tuple[str, str], ...]
-    source: str
-    rollout: wp.Kernel
-    evaluate: wp.Kernel
-    total: wp.Kernel
+    sources: dict[str, str]
+
+    @functools.cached_property
+    def rollout(self) -> wp.Kernel:
+        return self._kernel("rollout")
+
+    @functools.cached_property
+    def evaluate(self) -> wp.Kernel:
+        return self._kernel("evaluate")
+
+    @functools.cached_property
+    def total(self) -> wp.Kernel:
+        return self._kernel("total")
+
+    def _kernel(self, name: str) -> wp.Kernel:
+        """In a module of its own, so that nothing is compiled that is not run."""
+        source = self.sources[name]
+        module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+        filename = f"<{module}>"
+        # warp reads the source of a kernel through inspect, which looks here first
+        linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+        scope = {
+            "__name__": module,
+            "wp": wp,
+            "scalar": wp.float64,
+            "vec3": wp.vec3d,
+            "kinematics": kinematics,
+            "wave": wave,
+            "NATURAL": NATURAL,
+        }
+        for e in self.effects:
+            scope[f"{e.name}_force"] = e.force
+            if e.energy is not None:
+                scope[f"{e.name}_energy"] = e.energy
+        exec(compile(source, filename, "exec"), scope)
+        kernel = scope[name]
+        if name == "rollout" and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
+            common = wp.config.cpu_compiler_flags or "-march=native"
+            kernel.module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
+        return kernel
 
 
 class _Composer:
@@ -511,16 +549,14 @@ class _Composer:
             at_node = f"share[{i - 1}] * part - (off * wp.dot(part, patch.g{i})) * patch.n"
             self.scatter(t, effect, f"n{i}", at_node, mode)
 
-    def source(self) -> str:
-        arguments, hoist = _ARGUMENTS, self.hoist()
+    def sources(self) -> dict[str, str]:
+        given = {"arguments": _ARGUMENTS, "hoist": self.hoist()}
         mass = self.value("inertia", "mass", "n")
-        return "\n".join(
-            (
-                _ROLLOUT_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("rollout"), mass=mass),
-                _EVALUATE_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("evaluate")),
-                _TOTAL_HEAD.format(arguments=arguments, hoist=hoist, body=self.body("total")),
-            )
-        )
+        return {
+            "rollout": _ROLLOUT_HEAD.format(**given, body=self.body("rollout"), mass=mass),
+            "evaluate": _EVALUATE_HEAD.format(**given, body=self.body("evaluate")),
+            "total": _TOTAL_HEAD.format(**given, body=self.body("total")),
+        }
 
 
 @functools.cache
@@ -528,26 +564,4 @@ def compose(names: tuple[str, ...]) -> Program:
     """The program of these effects. Raises InputError for an unknown effect."""
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
     composer = _Composer(effects)
-    source = composer.source()
-    module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
-    filename = f"<{module}>"
-    # warp reads the source of a kernel through inspect, which looks here first
-    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    scope = {
-        "__name__": module,
-        "wp": wp,
-        "scalar": wp.float64,
-        "vec3": wp.vec3d,
-        "kinematics": kinematics,
-        "wave": wave,
-        "NATURAL": NATURAL,
-    }
-    for e in effects:
-        scope[f"{e.name}_force"] = e.force
-        if e.energy is not None:
-            scope[f"{e.name}_energy"] = e.energy
-    exec(compile(source, filename, "exec"), scope)
-    if hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
-        common = wp.config.cpu_compiler_flags or "-march=native"
-        scope["rollout"].module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
-    return Program(effects, composer.slots, source, scope["rollout"], scope["evaluate"], scope["total"])
+    return Program(effects, composer.slots, composer.sources())
