@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sp
 import warp as wp
 
 from origami_sim.diagnose.articulation import Articulation
@@ -25,7 +24,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import NULL_SHIFT, STENCIL, WEIGHTS, _Factor, _System, equilibrium
+from origami_sim.solve.statics import NULL_SHIFT, _Factor, _System, equilibrium
 
 PIECES = 6
 """Blocks that a curve is cut into: contiguous stretches, each of which is held out in its turn."""
@@ -49,8 +48,8 @@ ROUNDS = 12
 ITERATIONS = 12
 """Tangents of a load step, and Broyden's steps with each."""
 
-MOST_WORLDS = 4000
-"""Perturbed copies whose forces are found in one launch."""
+THREADED = 20000
+"""Nodes of all worlds together below which starting a thread takes as long as the forces."""
 
 
 class CurveForward(Forward, ABC):
@@ -255,13 +254,13 @@ class Static(CurveForward):
         xs, all_angles, found = [], [], []
         before = model.position
         drives = self._resting(r, model, Parameters.join([p for _, p in worlds]))
+        search = _Search(self._system(model, worlds), worlds, drives[0], state, self.threads)
         for k in range(steps):
             guess = state.x.copy()
             if path is not None:
                 guess += (path[k] - before)[:, None]
                 before = path[k]
-            search = _Step(self._system(model, worlds), worlds, drives[k], state, self.threads)
-            state, alive = search.settle(guess, alive)
+            state, alive = search.settle(drives[k], state, guess, alive)
             xs.append(np.moveaxis(state.x, 1, 0))
             all_angles.append(state.angles.T)
             found.append(alive)
@@ -309,23 +308,29 @@ class Static(CurveForward):
         return -np.einsum("mnwa,nwa->mw", arm.jacobian(pose, x), force)
 
 
-class _Step:
-    """Equilibria of all worlds in one load step, beginning with the state in which the last one left them.
+class _Search:
+    """Equilibria of all worlds, load step after load step.
 
     Args:
-        drive: held, as it reaches the device.
+        drive: of the first load step, held, as it reaches the device. state: in which all begin.
     """
 
     def __init__(self, system: _System, worlds, drive: Drive, state: State, threads: int | None):
-        self.system, self.worlds, self.state, self.threads = system, worlds, state, threads
+        self.system, self.worlds, self.threads = system, worlds, threads
         self.model = worlds[0][0]
-        self.parameters = Parameters.join([p for _, p in worlds])
-        self.drive = drive
         self.remembers = any(get(e).memory for e in self.model.laws)
+        self.drive, self.state = drive, state
         # held nodes: the integrator moves them as it is told, and laws with memory advance
         still = replace(self.model, free=np.zeros_like(self.model.free))
-        self.batch = Batch(still, self.parameters, self.drive, state, threads=1 if state.worlds < 64 else threads)
+        every = drive.replace(**{n: s.offset + np.zeros(state.worlds) for n, s in drive.signals.items()})
+        parameters = Parameters.join([p for _, p in worlds])
+        self.batch = Batch(still, parameters, every, state, threads=1 if state.worlds < 64 else threads)
         self.free = system.free
+        self._moved: dict[int, Batch] = {}
+
+    def _levels(self, drive: Drive) -> np.ndarray:
+        """What a held drive gives in each world [channels, W]."""
+        return np.stack([np.broadcast_to(s.offset, (len(self.worlds),)) for s in drive.signals.values()])
 
     def force(self, x: np.ndarray) -> np.ndarray:
         """Forces on the free axes [F, W] at positions [N, W, 3], reached from the step's beginning."""
@@ -337,8 +342,14 @@ class _Step:
         f = b.total_force(0.0)
         return np.moveaxis(f, 1, 2).reshape(-1, x.shape[1])[self.free]
 
-    def settle(self, x: np.ndarray, alive: np.ndarray) -> tuple[State, np.ndarray]:
-        """The state at the equilibria, and which worlds have one; x [N, W, 3] is the guess."""
+    def settle(self, drive: Drive, state: State, x: np.ndarray, alive: np.ndarray) -> tuple[State, np.ndarray]:
+        """The state at the equilibria of a load step, and which worlds have one.
+
+        Args:
+            state: in which the last load step left them. x: [N, W, 3] the guess.
+        """
+        self.drive, self.state, self.levels = drive, state, self._levels(drive)
+        self.batch.hold(self.levels)
         x, done = self._newton(x, alive, ROUNDS)
         lost = alive & ~done
         if np.any(lost):
@@ -415,48 +426,31 @@ class _Step:
 
     def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[_Factor | None], np.ndarray]:
         """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
-        y, n = self.system, len(x)
-        colours = int(y._colours.max(initial=0)) + 1
-        copies = colours * 3 * len(STENCIL)
-        moved_ = np.flatnonzero(y._colours >= 0)
-        moves = np.zeros((n, colours, 3, len(STENCIL), 3))
-        for axis in range(3):
-            moves[moved_, y._colours[moved_], axis, :, axis] = y._steps[moved_, None] * STENCIL
-        moves = moves.reshape(n, copies, 3)
-        of = np.flatnonzero(y._colours[y._columns] >= 0)
-        rows, columns = y._rows[of], y._columns[of]
+        y = self.system
         out: list[_Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
-        wanted = np.flatnonzero(alive)
-        for part in np.array_split(wanted, max(1, -(-len(wanted) * copies // MOST_WORLDS))):
-            if not len(part):
+        for w in np.flatnonzero(alive):
+            batch, copies = self._copies(w), np.full(y.moves.shape[1], w)
+            angles, memory = self.state.angles[:, copies], self.state.memory[:, copies]
+            batch.place(x[:, w, None] + y.moves, angles, memory)
+            k = y.assembled(batch.total_force(0.0))
+            if not np.all(np.isfinite(k.data)):
                 continue
-            state = self.state.select(np.repeat(part, copies))
-            state.x = (x[:, part, None] + moves[:, None]).reshape(n, -1, 3)
-            given = Parameters.join([self.worlds[w][1] for w in part], repeat=copies)
-            drive = self.drive.replace(
-                **{
-                    m: np.repeat(np.broadcast_to(s.offset, (x.shape[1],))[part], copies)
-                    for m, s in self.drive.signals.items()
-                    if np.size(s.offset) > 1
-                }
-            )
-            threads = 1 if state.worlds * n < 20000 else self.threads  # starting a thread takes as long
-            f = Batch(self.model, given, drive, state, threads=threads).total_force(0.0)
-            f = f.reshape(n, len(part), colours, 3, len(STENCIL), 3)
-            slopes = -np.einsum("nwcasb,s->wncab", f, WEIGHTS)
-            for w, slope in zip(part, slopes, strict=True):
-                blocks = slope[rows, y._colours[columns]] / y._steps[columns, None, None]
-                i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
-                j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * blocks.astype(np.int64)
-                whole = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(3 * n, 3 * n))
-                k = sp.csc_array(whole[self.free][:, self.free])
-                if not np.all(np.isfinite(k.data)):
-                    continue
-                largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
-                out[w], shift = _System._definite(k, largest, 0.0)
-                stable[w] = shift <= NULL_SHIFT * largest * (1 + 1e-9)
+            largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
+            out[w], shift = y.definite(k, largest, 0.0)
+            stable[w] = shift <= NULL_SHIFT * largest * (1 + 1e-9)
         return out, stable
+
+    def _copies(self, w: int) -> Batch:
+        """A batch of copies of a world, from whose differences its tangent comes."""
+        if w not in self._moved:
+            count = self.system.moves.shape[1]
+            drive = self.drive.replace(**dict(zip(self.drive.signals, self.levels[:, w], strict=True)))
+            threads = 1 if count * len(self.model.position) < THREADED else self.threads
+            state = self.state.select(np.full(count, w))
+            self._moved[w] = Batch(self.model, self.worlds[w][1], drive, state, threads=threads)
+        self._moved[w].hold(self.levels[:, [w]])
+        return self._moved[w]
 
 
 def clocked(effect: str) -> bool:
@@ -466,16 +460,14 @@ def clocked(effect: str) -> bool:
 
 def moved(batch: Batch, start: State, velocity: np.ndarray, dt: float):
     """Moves held nodes from a state at a velocity [N, W, 3] for dt [s]; memory advances, and they are then at rest."""
-    batch._x.assign(batch._upload(start.x, wp.vec3d))
-    batch._angles.assign(batch._upload(start.angles, wp.float64))
-    batch._memory.assign(batch._upload(start.memory, wp.float64))
+    batch.place(start.x, start.angles, start.memory)
     onward(batch, velocity, dt)
     batch._v.zero_()
 
 
 def onward(batch: Batch, velocity: np.ndarray, dt: float):
     """One step of dt [s] of held nodes from where they are, at a velocity [N, W, 3]."""
-    batch._v.assign(batch._upload(velocity, wp.vec3d))
+    batch._write(batch._v, velocity)
     batch._a.zero_()
     batch._status.fill_(-1)
     batch.advance(1, dt, np.inf)

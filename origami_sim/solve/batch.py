@@ -70,6 +70,7 @@ class Batch:
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         # rows a multiple of 4 KiB apart would all fall into one cache set
         self._pool: ThreadPoolExecutor | None = None
+        self._total: wp.Launch | None = None
         self._stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
         self.step = state.step
 
@@ -97,6 +98,8 @@ class Batch:
         times, values = drive.samples()
         sizes = [(e, m) for e in self.program.effects for m in e.memory]
         rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
+        self._buffer = constant(buffer, wp.float64)
+        self._drive_offset = int(layout[self.program.slots.index(("drive", "offset")), 0])
         self._constants = [
             constant(model.free, wp.vec3d),
             constant(model.bars.reshape(-1, 2), wp.vec2i),
@@ -108,7 +111,7 @@ class Batch:
             constant(model.contact_offsets, wp.float64),
             constant(model.contact_axes.reshape(-1, 3), wp.vec3d),
             len(model.creases),
-            constant(buffer, wp.float64),
+            self._buffer,
             constant(layout, wp.int32),
             constant(times, wp.float64),
             constant(values, wp.float64),
@@ -227,7 +230,16 @@ class Batch:
 
     def total_force(self, time: float) -> np.ndarray:
         """Sum of all effects on every node, [N, W, 3] [N], at the state's positions and velocities."""
-        self._launch(self.program.total, [self._f, _FIRST, wp.float64(time)])
+        if self.threads > 1:
+            self._launch(self.program.total, [self._f, _FIRST, wp.float64(time)])
+        else:  # asked many times over, and a recorded launch costs a tenth
+            if self._total is None:
+                inputs = [*self._constants, self._x, self._v, self._angles, self._memory, self._f, 0, wp.float64(time)]
+                self._total = wp.launch(
+                    self.program.total, dim=self.worlds, inputs=inputs, device=self.device, record_cmd=True
+                )
+            self._total.set_param_by_name("time", wp.float64(time))
+            self._total.launch()
         return self._download(self._f, len(self.model.position))
 
     def evaluate(self, time: float) -> Evaluation:
@@ -258,10 +270,31 @@ class Batch:
         """[W] the step at which a world went unstable; -1: none."""
         return self._download(self._status, 2)[0]
 
-    def place(self, x: np.ndarray, angles: np.ndarray):
-        """Overwrites positions [N, W, 3] and the angles from which they are continued [C + Q, W]."""
-        self._x.assign(self._upload(x, wp.vec3d))
-        self._angles.assign(self._upload(angles, wp.float64))
+    def place(self, x: np.ndarray, angles: np.ndarray, memory: np.ndarray | None = None):
+        """Overwrites positions [N, W, 3], the angles from which they are continued [C + Q, W], and the memory [M, W]."""
+        self._write(self._x, x)
+        self._write(self._angles, angles)
+        if memory is not None:
+            self._write(self._memory, memory)
+
+    def hold(self, levels: np.ndarray):
+        """Another level of every channel of the drive, which has to be a held one.
+
+        Args:
+            levels: [channels, 1 or W], as many columns as the drive had that the batch was made with.
+        """
+        first = self._drive_offset
+        host = np.ascontiguousarray(levels, float).ravel()
+        if self.device.is_cpu:
+            self._buffer.numpy()[first : first + len(host)] = host
+        else:
+            wp.copy(self._buffer, wp.array(host, dtype=wp.float64, device=self.device), first, 0, len(host))
+
+    def _write(self, target: wp.array, a: np.ndarray):
+        if self.device.is_cpu:  # without an array in between
+            target.numpy()[: len(a), : self.worlds] = a
+        else:
+            target.assign(self._upload(a, target.dtype))
 
     def state(self) -> State:
         """The present state, copied to the host."""

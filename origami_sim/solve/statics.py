@@ -286,6 +286,16 @@ def _line(base: Drive, drive: Drive) -> Drive:
     return out
 
 
+def _shifted(k: sp.csc_array, shift: float) -> sp.csc_array:
+    """k + shift on the diagonal."""
+    at = np.flatnonzero(k.indices == np.repeat(np.arange(k.shape[1]), np.diff(k.indptr)))
+    if len(at) < k.shape[0]:  # it is not all stored
+        return sp.csc_array(k + shift * sp.eye_array(k.shape[0], format="csc"))
+    data = k.data.copy()
+    data[at] += shift
+    return sp.csc_array((data, k.indices, k.indptr), shape=k.shape)
+
+
 class _Factor:
     """Sparse factors of a shifted tangent.
 
@@ -333,6 +343,13 @@ class _System:
         tiled = self.state.select(np.zeros(worlds, int))
         self._many = Batch(model, parameters, drive, tiled)
         self._shape = (n, worlds // 3 // len(STENCIL), 3, len(STENCIL), 3)
+        moved, moves = np.flatnonzero(self._colours >= 0), np.zeros(self._shape)
+        for axis in range(3):
+            moves[moved, self._colours[moved], axis, :, axis] = self._steps[moved, None] * STENCIL
+        self.moves = moves.reshape(n, worlds, 3)
+        of = np.flatnonzero(self._colours[columns] >= 0)
+        self._pairs = rows[of], columns[of]
+        self._pattern = self._places(n)
 
     # --- forces
 
@@ -393,25 +410,37 @@ class _System:
                 colours[i] = next(c for c in range(n) if c not in taken)
         return colours
 
+    def _places(self, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of a tangent on the free axes: which entries of all blocks it takes, row indices and column starts."""
+        rows, columns = self._pairs
+        i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * rows[:, None, None]
+        j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * rows[:, None, None]
+        i, j = (np.broadcast_to(v, (len(rows), 3, 3)).ravel() for v in (i, j))
+        numbered = sp.csr_array((np.arange(1.0, len(i) + 1), (i, j)), shape=(3 * n, 3 * n))
+        kept = sp.csc_array(numbered[self.free][:, self.free])
+        return kept.data.astype(int) - 1, kept.indices, kept.indptr
+
     def tangent(self, x: np.ndarray, angles: np.ndarray, time: float) -> sp.csr_array:
         """K = -dF/dx [3 N, 3 N] [N/m]."""
         n = len(x)
-        moved = np.flatnonzero(self._colours >= 0)
-        moves = np.zeros(self._shape)
-        for axis in range(3):
-            moves[moved, self._colours[moved], axis, :, axis] = self._steps[moved, None] * STENCIL
-        worlds = moves.shape[1] * moves.shape[2] * moves.shape[3]
-        placed = x[:, None] + moves.reshape(n, worlds, 3)
-        self._many.place(placed, np.repeat(angles[:, None], worlds, axis=1))
-        f = self._many.total_force(time).reshape(self._shape)
-        slopes = -np.einsum("ncasb,s->ncab", f, WEIGHTS)  # [row node, colour, axis moved, axis of force]
-        of = np.flatnonzero(self._colours[self._columns] >= 0)
-        rows, columns = self._rows[of], self._columns[of]
-        blocks = slopes[rows, self._colours[columns]] / self._steps[columns, None, None]
+        self._many.place(x[:, None] + self.moves, np.repeat(angles[:, None], self.moves.shape[1], axis=1))
+        blocks, (rows, columns) = self._blocks(self._many.total_force(time)), self._pairs
         i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
         j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * blocks.astype(np.int64)
         k = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(3 * n, 3 * n))
         return k @ sp.diags_array(self.model.free.ravel().astype(float), format="csr")
+
+    def assembled(self, force: np.ndarray) -> sp.csc_array:
+        """Tangent on the free axes from the forces [N, copies, 3] on copies that are moved by `moves`."""
+        taken, rows, starts = self._pattern
+        size = len(self.free)
+        return sp.csc_array((self._blocks(force).ravel()[taken], rows, starts), shape=(size, size))
+
+    def _blocks(self, force: np.ndarray) -> np.ndarray:
+        """[pairs, axis moved, axis of force] of the tangent."""
+        slopes = -np.einsum("ncasb,s->ncab", force.reshape(self._shape), WEIGHTS)
+        rows, columns = self._pairs
+        return slopes[rows, self._colours[columns]] / self._steps[columns, None, None]
 
     def reduced(self, x: np.ndarray, angles: np.ndarray, time: float) -> tuple[sp.csc_array, float, bool]:
         """Tangent on the free axes, its largest entry [N/m] and whether it is symmetric (then made exactly so)."""
@@ -429,7 +458,7 @@ class _System:
         if n <= DENSE:
             values, vectors = np.linalg.eigh(k.toarray()) if symmetric else np.linalg.eig(k.toarray())
         else:
-            shift = self._definite(k, largest, 0.0)[1]
+            shift = self.definite(k, largest, 0.0)[1]
             v0 = np.random.default_rng(0).standard_normal(n)  # fixed, so that runs repeat
             find = spla.eigsh if symmetric else spla.eigs
             values, vectors = find(k, k=min(count, n - 2), sigma=-2 * shift, which="LM", v0=v0)
@@ -440,18 +469,17 @@ class _System:
         return np.real(values)[order], (mode / (peak or 1.0)).reshape(-1, 3)
 
     @staticmethod
-    def _definite(k: sp.csc_array, largest: float, least: float) -> tuple[_Factor, float]:
+    def definite(k: sp.csc_array, largest: float, least: float) -> tuple[_Factor, float]:
         """Factors of k + shift, with the shift raised from `least` until they are positive definite."""
-        eye = sp.eye_array(k.shape[0], format="csc")
         shift = max(least, NULL_SHIFT * largest)
-        factor = _Factor(k + shift * eye)
+        factor = _Factor(_shifted(k, shift))
         raised = False
         while not factor.definite:
             raised, shift = True, 4.0 * shift
-            factor = _Factor(k + shift * eye)
+            factor = _Factor(_shifted(k, shift))
         if raised:  # away from the edge, so that the weakest direction does not take the whole step
             shift *= 2.0
-            factor = _Factor(k + shift * eye)
+            factor = _Factor(_shifted(k, shift))
         return factor, shift
 
     # --- equilibrium
@@ -558,7 +586,7 @@ class _System:
             if factor.singular:
                 return None
         else:
-            factor, shift = self._definite(k, largest, shift / 16)
+            factor, shift = self.definite(k, largest, shift / 16)
         for _ in range(8):
             p = factor.solve(r)
             d = self.spread(p)
@@ -576,7 +604,7 @@ class _System:
                 share *= min(0.5, max(0.1, 0.35 / off))
             if unstable:
                 return None
-            factor, shift = self._definite(k, largest, 64 * max(shift, NULL_SHIFT * largest))
+            factor, shift = self.definite(k, largest, 64 * max(shift, NULL_SHIFT * largest))
         return None
 
 

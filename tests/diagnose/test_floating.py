@@ -80,7 +80,9 @@ def test_impulses_are_the_momentum_that_blows_give(restitution):
     """The recorded impulse is what the motion took up, whatever the model says; the model's differs if its law does."""
     made, recording = toss(0.32, restitution=0.9, spin=2.0)
     forward, base = fitted(recording, restitution=restitution)
-    (blow,) = impulses(forward, base)
+    blow, *later = impulses(forward, base)
+    for b in later:  # the wrong model may fall again where the recording flies on
+        assert restitution == 0.125 and np.abs(b.recorded).max() < 3 * max(b.error) and b.apart > 10.0
     speed = np.gradient(made.centre_of_mass()[:, 0], made.times, axis=0)
     low = np.flatnonzero(made.gaps[:, :, 0].min(axis=1) < 0.0)
     start, stop = low[0] - 3, low[-1] + 4
