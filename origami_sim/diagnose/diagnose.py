@@ -138,6 +138,7 @@ def diagnose(
     fits += pairs(forward, base, screening, fits, weights, o)
     rough = screening
     screening, fits, weights = settled(forward, rough, fits, weights)
+    refined = fits
     alike_ones = twins(forward, rough, screening, fits, weights)
     fits += alike_ones
     # with weights that do not count the effect itself as noise
@@ -148,7 +149,7 @@ def diagnose(
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     more = combine(forward, fits, scores, screening, weights, o, tell)
     if alike_ones or more:
-        screening, fits, weights = settled(forward, screening, [*fits, *more], weights)
+        screening, fits, weights = settled(forward, screening, [*fits, *more], weights, refined)
     fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
@@ -445,9 +446,13 @@ AGAIN = 2
 
 
 def settled(
-    forward: Forward, screening: Screening, fits: list[Fit], weights: Weights
+    forward: Forward, screening: Screening, fits: list[Fit], weights: Weights, refined: Sequence[Fit] = ()
 ) -> tuple[Screening, list[Fit], Weights]:
-    """The fits with the weights of the best one, which first counted what it lacks as noise; the best ones refined."""
+    """The fits with the weights of the best one, which first counted what it lacks as noise; the best ones refined.
+
+    Args:
+        refined: fits that have been, with the weights given.
+    """
     new = weights_from(forward, fits)
     same = np.all(np.abs(np.log(new.deviation / weights.deviation)) < 0.05)
     if same and abs(np.log(new.part / weights.part)) < 0.2:
@@ -458,6 +463,8 @@ def settled(
     order.sort(key=lambda n: out[n].cost)
     for place, n in enumerate([0, *order[:CONTENDERS]]):
         f = out[n]
+        if new is weights and any(fits[n] is r for r in refined):
+            continue
         given = {"theta": f.theta, "blocks": f.blocks}
         out[n] = fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, **given)
         if new is not weights and place <= AGAIN and forward.local:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import warp as wp
 
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Curve, Place
@@ -430,7 +429,7 @@ class _Search:
         out: list[_Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(alive):
-            batch, copies = self._copies(w), np.full(y.moves.shape[1], w)
+            batch, copies = self._copies(int(w)), np.full(y.moves.shape[1], w)
             angles, memory = self.state.angles[:, copies], self.state.memory[:, copies]
             batch.place(x[:, w, None] + y.moves, angles, memory)
             k = y.assembled(batch.total_force(0.0))
@@ -467,7 +466,7 @@ def moved(batch: Batch, start: State, velocity: np.ndarray, dt: float):
 
 def onward(batch: Batch, velocity: np.ndarray, dt: float):
     """One step of dt [s] of held nodes from where they are, at a velocity [N, W, 3]."""
-    batch._write(batch._v, velocity)
+    batch._overwrite(batch._v, velocity)
     batch._a.zero_()
     batch._status.fill_(-1)
     batch.advance(1, dt, np.inf)

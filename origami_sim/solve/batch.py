@@ -238,6 +238,7 @@ class Batch:
                 self._total = wp.launch(
                     self.program.total, dim=self.worlds, inputs=inputs, device=self.device, record_cmd=True
                 )
+            assert self._total is not None
             self._total.set_param_by_name("time", wp.float64(time))
             self._total.launch()
         return self._download(self._f, len(self.model.position))
@@ -271,11 +272,11 @@ class Batch:
         return self._download(self._status, 2)[0]
 
     def place(self, x: np.ndarray, angles: np.ndarray, memory: np.ndarray | None = None):
-        """Overwrites positions [N, W, 3], the angles from which they are continued [C + Q, W], and the memory [M, W]."""
-        self._write(self._x, x)
-        self._write(self._angles, angles)
+        """Overwrites positions [N, W, 3], the angles from which they are continued [C + Q, W], and memory [M, W]."""
+        self._overwrite(self._x, x)
+        self._overwrite(self._angles, angles)
         if memory is not None:
-            self._write(self._memory, memory)
+            self._overwrite(self._memory, memory)
 
     def hold(self, levels: np.ndarray):
         """Another level of every channel of the drive, which has to be a held one.
@@ -290,7 +291,7 @@ class Batch:
         else:
             wp.copy(self._buffer, wp.array(host, dtype=wp.float64, device=self.device), first, 0, len(host))
 
-    def _write(self, target: wp.array, a: np.ndarray):
+    def _overwrite(self, target: wp.array, a: np.ndarray):
         if self.device.is_cpu:  # without an array in between
             target.numpy()[: len(a), : self.worlds] = a
         else:
