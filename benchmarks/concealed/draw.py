@@ -17,17 +17,21 @@ import sys
 from pathlib import Path
 
 import beam
+import coupon
 import laws
 import numpy as np
 import objects
 from beam import BeamCase
+from coupon import CouponCase
 from laws import Concealed
 from rigid import RigidCase, entry
 from rivals import ALIKE, APART, PAIRS, TIED, Pair, apart, changed, overlap, proposed
 from strata import PROPORTIONS, stratum
 
 LEVELS = (2.0, 5.0, 10.0, 20.0, 50.0)
-STRUCTURES = (*objects.STRUCTURES, *beam.STRUCTURES)
+STRUCTURES = (*objects.STRUCTURES, *beam.STRUCTURES, *coupon.STRUCTURES)
+CURVES = {s: (beam, BeamCase) for s in beam.STRUCTURES} | {s: (coupon, CouponCase) for s in coupon.STRUCTURES}
+"""Structures that are recorded as curves: where they are described, and as what."""
 
 NUISANCE = 2.0
 """Largest d' of an unlisted nuisance: beyond, it would be a second effect."""
@@ -52,8 +56,9 @@ Case = RigidCase | BeamCase
 
 def table(structure: str, outside: bool = False) -> dict[str, Concealed]:
     """What may be concealed in a structure."""
-    if structure in beam.STRUCTURES:
-        return (beam.OUTSIDE if outside else beam.INSIDE)[structure]
+    if structure in CURVES:
+        module = CURVES[structure][0]
+        return (module.OUTSIDE if outside else module.INSIDE)[structure]
     known = laws.OUTSIDE if outside else laws.INSIDE
     return {n: c for n, c in known.items() if not c.only or structure in c.only}
 
@@ -63,7 +68,9 @@ def cells(structures=STRUCTURES, kinds=tuple(PROPORTIONS)) -> dict[str, list[tup
     pairs = [(n, p.structure, way) for n, p in enumerate(PAIRS) for way in (0, 1) if p.structure in structures]
     out = {
         "single": [(d, m, s) for s in structures for m in table(s) for d in LEVELS],
-        "null": [(what, s) for s in structures for what in NULLS],
+        "null": [
+            (what, s) for s in structures for what in NULLS if what != "wrong_camera" or s not in coupon.STRUCTURES
+        ],
         "outside": [(d, m, s) for s in structures for m in table(s, True) for d in LEVELS[2:]],
         "confounded": pairs,
         "double": [(m, n, s) for s in structures for m in table(s) for n in table(s) if n != m],
@@ -72,11 +79,11 @@ def cells(structures=STRUCTURES, kinds=tuple(PROPORTIONS)) -> dict[str, list[tup
 
 
 def case_of(o: dict, factors: dict[str, float]) -> Case:
-    return BeamCase(o, factors) if o["structure"] in beam.STRUCTURES else RigidCase(o, factors)
+    return (CURVES[o["structure"]][1] if o["structure"] in CURVES else RigidCase)(o, factors)
 
 
 def drawn_object(structure: str, rng: np.random.Generator) -> dict:
-    return (beam if structure in beam.STRUCTURES else objects).draw(structure, rng)
+    return (CURVES[structure][0] if structure in CURVES else objects).draw(structure, rng)
 
 
 def drawn_factors(o: dict, rng: np.random.Generator, *, wrong: bool = False) -> dict[str, float]:

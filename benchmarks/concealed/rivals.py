@@ -91,7 +91,8 @@ MENU = (
     (r"let it run three times as long", lambda m: {"stretch": 3.0}),
     (r"(?:field|voltage) at ([\d.]+) times the level", lambda m: {"gain": float(m[1])}),
     (r"(?:field|voltage) at twice the level", lambda m: {"gain": 2.0}),
-    (r"(?:field|voltage) reversed", lambda m: {"gain": -1.0}),
+    (r"(?:field|voltage) reversed|the same angles to the other side", lambda m: {"gain": -1.0}),
+    (r"half of the angles", lambda m: {"gain": 0.5}),
     (r"(?:field|voltage) at ([\d.]+) times the frequency", lambda m: {"speed": float(m[1])}),
 )
 """Experiments that a diagnosis may propose and that can be made here; others, such as a tilted set-up, would need
