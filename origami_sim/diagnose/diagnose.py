@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -515,38 +516,49 @@ def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, scree
 
 
 def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
-    """The best pair of suspects by the screening, if it promises much more than the best single one gives."""
-    top = distinct(screening.signatures)[:12]
-    if len(top) < 2 or o.most < 2:
+    """The best pair of suspects by the screening, if it promises much more than the best single one gives.
+
+    What they promise is measured by the noise alone: in the weights of the model without them, they are noise.
+    """
+    if o.most < 2:
         return []
-    r = screening.residual
-    single = max(s.score**2 for s in top)
-    best, gain = None, 0.0
-    for i in range(len(top)):
-        for j in range(i):
-            a = np.stack([top[i].shape, top[j].shape], axis=1)
-            if abs(a[:, 0] @ a[:, 1]) > 0.95 or not (top[i].score and top[j].score):
-                continue
-            x, *_ = np.linalg.lstsq(a, r, rcond=None)
-            if np.sign(x[0]) != np.sign(top[i].score) or np.sign(x[1]) != np.sign(top[j].score):
-                continue
-            explained = float(np.sum((a @ x) ** 2))
-            if explained > gain:
-                best, gain = (top[i], top[j], x), explained
-    single = max([single, *(base.cost - f.cost for f in fits if not f.failed)])  # linearised promises may fall short
-    if best is None or gain - single < 9.0 + 0.1 * single:
+    sharp = Weights(np.minimum(forward.blocks[0].noise, weights.deviation))
+    plain = base.reweighted(weights, sharp)
+    seen = reweighted(screening, plain, weights, sharp)
+    r, top = seen.residual, distinct(seen.signatures)[:12]
+    gains = {f.hypothesis.label: plain.cost - f.reweighted(weights, sharp).cost for f in fits if not f.failed}
+    single = max([*(s.score**2 for s in top), *gains.values()])
+    best, most = None, 0.0
+    for a, b in combinations(top, 2):
+        both = np.stack([a.shape, b.shape], axis=1)
+        if abs(a.shape @ b.shape) > 0.95 or not (a.score and b.score):
+            continue
+        x, *_ = np.linalg.lstsq(both, r, rcond=None)
+        if np.sign(x[0]) != np.sign(a.score) or np.sign(x[1]) != np.sign(b.score):
+            continue
+        # fits gain other amounts than signatures promise, for which strengths are small
+        more = max(gains.get(s.suspect.label, 0.0) / s.score**2 for s in (a, b))
+        explained = float(np.sum((both @ x) ** 2)) * max(more, 1.0)
+        if explained > most:
+            best, most = [(a, x[0]), (b, x[1])], explained
+    if best is None or most - single < 9.0 + 0.1 * single:
         return []
-    a, b, x = best
-    first = replace(a, strength=float(x[0] * a.error))
-    second = replace(b, strength=float(x[1] * b.error))
-    one = next((f for f in fits if f.hypothesis.suspects == (a.suspect,)), None) or refit(
-        forward, base, first, weights, screening
-    )
+    first, second = (replace(_counterpart(screening, s), strength=float(x * s.error)) for s, x in best)
+    known = [f for f in fits if f.hypothesis.suspects == (first.suspect,)]
+    one = known[0] if known else refit(forward, base, first, weights, screening)
     if one.failed:
         return []
-    out = [] if any(one is f for f in fits) else [one]
     both = refit(forward, one, second, weights, screening)
-    return [*out, both]
+    return [both] if known else [one, both]
+
+
+def _counterpart(screening: Screening, found: Signature) -> Signature:
+    """The same signature in other weights."""
+
+    def key(s: Suspect):
+        return s.label, tuple(n.start for n in s.free[1:])
+
+    return next(s for s in screening.signatures if key(s.suspect) == key(found.suspect))
 
 
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
@@ -558,30 +570,54 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
         left = again(screening, best, without=best.hypothesis.effects)
         if not left.signatures:
             break
-        p = look_elsewhere(left, o.draws, o.seed, small=words.SMALL)
-        top = left.signatures[0]
+        top, found = left.signatures[0], distinct(left.signatures)
+        structured = words.structure(best, best).repeated >= words.STRUCTURED
         inexact = top.score**2 < words.INEXACT * (base.cost - best.cost)
-        if p > o.level or (inexact and words.structure(best, best).repeated < words.STRUCTURED):
+        told = look_elsewhere(left, o.draws, o.seed, small=words.SMALL) <= o.level and not inexact
+        if told:  # at other sites, too
+            found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
+        elif not structured:
             break
-        rivals = [g for g in distinct(left.signatures) if g.suspect.effect == top.suspect.effect]  # at other sites
-        tried = []
-        for g in [g for g in rivals if g.score**2 > 0.7 * top.score**2][:3]:
-            f = refit(forward, best, g, weights, screening)
-            if not f.failed:
-                scores[id(f)] = score(forward, f, weights)
-                tried.append(f)
+        tried = [refit(forward, best, g, weights, screening) for g in found[:RIVALS]]
+        tried = [f for f in tried if not f.failed]
         if not tried:
             break
+        scores |= {id(f): score(forward, f, weights) for f in tried}
         more += tried
         f = max(tried, key=lambda f: scores[id(f)].evidence)
-        if not (
-            reproducible(scores[id(f)], scores[id(best)]) and scores[id(f)].evidence > scores[id(best)].evidence + 3.0
-        ):
+        if told:
+            told = better(scores[id(f)], scores[id(best)])
+        else:
+            told = stands_out(forward, base, best, f, screening, weights, o)
+        if not told:
             break
         best = f
     if best is not None and len(best.hypothesis.suspects) > 1:
         more += swaps(forward, base, best, [*fits, *more], scores, screening, weights)
     return more
+
+
+RIVALS = 3
+"""Further effects that are tried at a time."""
+
+
+def better(a: Score, b: Score) -> bool:
+    """Whether an explanation with one more effect is worth it."""
+    return reproducible(a, b) and a.evidence > b.evidence + 3.0
+
+
+def stands_out(
+    forward: Forward, base: Fit, best: Fit, f: Fit, screening: Screening, weights: Weights, o: Options
+) -> bool:
+    """Whether a further effect is told by the weights of the fit with it; in others, what it explains is noise."""
+    new = weights_from(forward, [f])
+    none, less, all_ = (g.reweighted(weights, new) for g in (base, best, f))
+    if less.cost - all_.cost < words.INEXACT * (none.cost - less.cost):
+        return False
+    left = again(reweighted(screening, none, weights, new), less, without=less.hypothesis.effects)
+    if not left.signatures or look_elsewhere(left, o.draws, o.seed, small=words.SMALL) > o.level:
+        return False
+    return better(score(forward, all_, new), score(forward, less, new))
 
 
 def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, weights) -> list[Fit]:

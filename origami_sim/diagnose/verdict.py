@@ -27,8 +27,9 @@ from origami_sim.recording.units import quantity
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-STRUCTURED = 3.0
-"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
+STRUCTURED, PLAIN = 3.0, 6.0
+"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing; and from
+which on that holds even if what explains a part of it may be small."""
 
 INEXACT = 0.06
 """Part of what it explains that a named effect may leave, because real devices follow no law exactly."""
@@ -188,7 +189,8 @@ class _Weighed:
     @property
     def leaves(self) -> bool:
         """Whether the best leaves more structure than an inexact law does; one that may be small, most of it."""
-        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else INEXACT)
+        doubtful = self.small and self.after.repeated < PLAIN
+        return self.after.repeated > STRUCTURED and self.share > (MOST if doubtful else INEXACT)
 
     @property
     def fall(self) -> str:
@@ -289,7 +291,7 @@ def _refuted(w: _Weighed) -> _Said | None:
     strain, number = _strain(w.best)
     text = f"Something real is missing that the catalogue does not name: the closest, {_say(w.best)}, "
     left = f"{w.share:.0%} of the slow structure, {w.after.repeated:.0f} standard deviations of noise"
-    if w.leaves and not w.small and w.share < MOST:
+    if w.leaves and w.share < MOST:
         text = f"The catalogue explains a part, by {_say(w.best)}. Something real is left that it does not name: {left}"
     elif w.leaves:
         text += f"leaves {left}"
