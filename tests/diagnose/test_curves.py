@@ -253,6 +253,29 @@ def test_cubic_stiffening():
     assert sign_changes(against)  # what a straight line leaves of a cubic
 
 
+def test_two_effects_each_of_which_hides_the_other():
+    """Friction and a set of about the same size: either alone takes a part of both, and leaves much."""
+    most, least, slid = 0.0, 0.0, 0.0
+    up = np.linspace(0.0, 1.2, 25)
+    path = REST + np.concatenate([up, up[-2::-1], -up[1:], -up[-2::-1]])
+    moment = []
+    for turn in path - REST:
+        most, least = max(most, turn), min(least, turn)
+        slid = min(max(slid, turn - 0.01), turn + 0.01)
+        moment.append(K * turn + 2.5e-5 * (turn - slid) / 0.01 - 1.2e-4 * (most + least))
+    rng = np.random.default_rng(1)
+    noisy = np.array(moment) + MOMENT_NOISE * rng.normal(size=len(path))
+    made = curve({"moment": Channel("moment", "moment", noisy, "N m", MOMENT_NOISE, {"crease": 0})}, angle=path)
+    found = diagnose(coupon(), made, Options(threads=1))
+    assert found.verdict in ("SEVERAL", "TIE"), found.sentence
+    best = found.candidates[0]
+    assert set(best.effects) == {"crease_friction", "crease_set"}
+    numbers = {n.label: n.value for n in best.numbers}
+    assert numbers["crease_friction.friction_moment"] == pytest.approx(2.5e-5, rel=0.15)
+    assert numbers["crease_set.set_stiffness"] == pytest.approx(1.2e-4, rel=0.15)
+    assert found.error_after[0] < 1.2 * MOMENT_NOISE
+
+
 def test_relaxation():
     d = diagnose(coupon(), relaxing(20.0, 0.5))
     assert d.verdict == "MECHANISM"

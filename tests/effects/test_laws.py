@@ -67,6 +67,23 @@ def test_dihedral_angle_is_the_angle_built_in():
     assert np.abs(np.sin(dihedral_angles(x, hinge().creases)[0] - SWEEP)).max() < 1e-14
 
 
+def test_small_angles_are_exact_to_rounding():
+    """By a series below 1/32, by the arctangent beyond; a coefficient in single precision would be off by 1e-11."""
+    small = np.concatenate([np.geomspace(1e-12, 0.04, 200), 1 / 32 + 1e-9 * np.linspace(-1, 1, 21)])
+    angles = np.concatenate([small, -small, np.pi - small])
+    x = np.stack([hinge_positions(a) for a in angles], axis=1)
+    exact = np.array([math.atan2(*sines(x[:, w])) for w in range(len(angles))])
+    found = report(hinge(), {}, x=x, angles=angles[None], worlds=len(angles)).angles[0]
+    assert np.abs(found / exact - 1).max() < 1e-15
+
+
+def sines(x: np.ndarray) -> tuple[float, float]:
+    """Sine and cosine of the angle of a hinge, up to a common factor, as the laws find them."""
+    e, ri, rl = x[2] - x[1], x[0] - x[1], x[3] - x[1]
+    n1, n2 = np.cross(ri, e), np.cross(e, rl)
+    return float(ri @ n2 * np.linalg.norm(e)), float(n1 @ n2)
+
+
 @pytest.mark.parametrize("apexes", [((0.4, 0.9), (0.6, 0.8)), ((1.7, 0.3), (-0.4, 1.2))], ids=["acute", "obtuse"])
 def test_dihedral_gradient_matches_central_differences(apexes):
     """Measured with a moment of exactly 1 N m, so that the forces are the gradient."""

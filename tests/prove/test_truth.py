@@ -7,6 +7,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from origami_sim.diagnose.hypothesis import Hypothesis
+from origami_sim.diagnose.prescribed import curves
 from origami_sim.observe import follow, observe_equilibria
 from origami_sim.prove import STRUCTURES, battery, case
 from origami_sim.recording import read_recording
@@ -15,7 +17,7 @@ from origami_sim.scene import scene_module, scene_settings
 pytest.importorskip("mujoco", reason="the truth of the proof needs MuJoCo: pip install 'origami-sim[proof]'")
 
 
-MODULES = ("beam", "draw", "laws", "objects", "recorder", "rigid", "rivals", "strata", "world")
+MODULES = ("beam", "coupon", "draw", "laws", "objects", "recorder", "rigid", "rivals", "strata", "world")
 
 
 @pytest.fixture
@@ -209,6 +211,63 @@ def test_every_effect_of_a_beam_shows(truth):
             _, signature = truth["draw"].strengthened(made, what, c, 5.0, 1.0)
             assert np.linalg.norm(signature) == pytest.approx(5.0, rel=0.11), name
         assert np.linalg.norm(made.signature([])) == 0.0
+
+
+# --- a crease in a torque test
+
+
+def test_coupon_follows_its_laws(truth):
+    """Of a bridge: what all fibres do together is known in closed form."""
+    coupon, stiffness = truth["coupon"], 1.5e-3
+    fold = np.concatenate([[0.0], coupon.path(0, 1.0), coupon.path(1.0, -1.0), coupon.path(-1.0, 0.5)])
+
+    def more(**effects):
+        return coupon.moments(stiffness, fold, coupon.Bridge(**effects)) - stiffness * fold
+
+    assert np.abs(more()).max() < 1e-12
+    assert more(taper=0.5) == pytest.approx(more(taper=0.0) + (coupon_taper(0.5) - 1) * stiffness * fold, abs=1e-12)
+    assert more(cubic=1e-4) == pytest.approx(1e-4 * fold**3, abs=1e-12)
+    assert more(valley=2e-4) == pytest.approx(2e-4 * np.maximum(fold, 0), abs=1e-12)
+    assert more(offset=1e-5) == pytest.approx(1e-5 + 0 * fold, abs=1e-12)
+    so_far = np.maximum.accumulate(fold) + np.minimum.accumulate(fold)
+    assert more(lasting=1e-4) == pytest.approx(-1e-4 * so_far, abs=1e-12)
+    dry = more(dry=1e-5)
+    assert dry[1:] == pytest.approx(1e-5 * np.sign(np.diff(fold)), rel=0.01)
+    # a rectangle that yields: M = Mp (1 - (a / turn)^2 / 3)
+    plastic = more(plastic=1e-5, yields=0.1)[1:11]
+    assert plastic == pytest.approx(1e-5 * (1 - (0.1 / fold[1:11]) ** 2 / 3), rel=0.02)
+    virgin = more(virgin=1e-3, half=0.3)
+    exact = 3e-3 * 0.3 * (0.2 + 0.09 * np.log(1.3 / 0.3))  # 3 Kv times the integral of s^2 half / (half + s)
+    assert virgin[10] == pytest.approx(exact, rel=1e-6) and virgin[20] == pytest.approx(0.0, abs=1e-10)
+    assert virgin[15] == pytest.approx(0.5 * virgin[10], rel=1e-9)  # back: no further damage
+
+
+def coupon_taper(taper: float) -> float:
+    """Stiffness of five stations in series over that of an even bridge."""
+    own = 1 + taper * ((np.arange(5) + 0.5) / 5 - 0.5)
+    return float(1 / np.mean(1 / own))
+
+
+def test_scene_and_coupon_agree_without_an_effect(truth, tmp_path):
+    made = truth["coupon"].CouponCase(truth["coupon"].draw("crease_coupon", np.random.default_rng(5)), {})
+    made.write(tmp_path, [], {"noise": 1e-12, "quantum": 1e-13, "stated": 1e-6}, np.random.default_rng(0))
+    (tmp_path / "object.json").write_text(json.dumps(made.known()))
+    recording = read_recording(tmp_path / "recording1.csv")
+    subject = case.subject(tmp_path)
+    forward = curves(subject, [recording])
+    assert forward is not None and [n.name for n in subject.nominals] == ["stiffness"]
+    predicted = np.concatenate([v[0, :, 0] for v in forward.predict(Hypothesis(), [[subject.nominals[0].start]])])
+    assert predicted == pytest.approx(recording.channels["moment"].values, abs=1e-11)
+
+
+def test_every_effect_of_a_coupon_shows(truth):
+    coupon = truth["coupon"]
+    made = coupon.CouponCase(coupon.draw("crease_coupon", np.random.default_rng(2)), {})
+    for name, c in {**coupon.INSIDE["crease_coupon"], **coupon.OUTSIDE["crease_coupon"]}.items():
+        what = {"mechanism": name, "place": 0, "extra": {"angle": 0.1}}
+        _, signature = truth["draw"].strengthened(made, what, c, 5.0, 1.0)
+        assert np.linalg.norm(signature) == pytest.approx(5.0, rel=0.11), name
+    assert np.linalg.norm(made.signature([])) == 0.0
 
 
 # --- confounded pairs

@@ -6,6 +6,7 @@ from effects.kit import HINGE, hinge, hinge_positions, make_model, quiet, start,
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.model import Parameters
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import SAFETY, TimeStep, stable_step
@@ -131,6 +132,30 @@ def exact_limit(mass, stiffness, damping, guess):
         # rigid motion has the double root 1, which roundoff splits by its square root
         low, high = (dt, high) if spectral_radius(mass, stiffness, damping, dt) < 1 + 2e-4 else (low, dt)
     return low
+
+
+def test_limit_of_bars_is_that_of_their_norms():
+    """The bound is the largest eigenvalue of the stiffnesses, all taken positive, over the masses."""
+    model, parameters = bars_only()
+    m = np.broadcast_to(parameters["inertia", "mass"], (len(model.position), 1))[:, 0]
+    k = np.zeros((len(m), len(m)))
+    free = model.free.max(axis=1)
+    for (p, q), stiffness in zip(model.bars, parameters["bars", "stiffness"][:, 0], strict=True):
+        ends = np.zeros(len(m))
+        ends[[p, q]] = free[[p, q]]
+        k += stiffness * np.outer(ends, ends)
+    exact = 2 / np.sqrt(np.linalg.eigvalsh(k / np.sqrt(m) / np.sqrt(m)[:, None]).max())
+    limit = stable_step(model, parameters).limit
+    assert 0.95 * exact < limit <= exact * (1 + 1e-12)
+    assert limit > 1.1 * 2 / np.sqrt((k.sum(1) / m).max())  # plain row sums would ask for smaller steps
+
+
+def test_worlds_do_not_change_each_others_bound():
+    model, one = sheet()
+    _, other = sheet()
+    other.set("bars", "stiffness", 3.0 * other["bars", "stiffness"])
+    alone = [stable_step(model, p).limit for p in (one, other)]
+    assert stable_step(model, Parameters.join([one, other])).limit == pytest.approx(min(alone), rel=0.02)
 
 
 UNDAMPED = [bars_only, hinges_only, sheet, contact]
