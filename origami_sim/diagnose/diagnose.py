@@ -564,9 +564,16 @@ def _counterpart(screening: Screening, found: Signature) -> Signature:
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
     """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
     more: list[Fit] = []
-    base, best = fits[0], leader(fits, scores)
-    while best is not None and best is not base and len(best.hypothesis.suspects) < o.most:
-        tell("combine", len(best.hypothesis.suspects) / o.most)
+    base, best, seen = fits[0], leader(fits, scores), set()
+    while best is not None and best is not base:
+        tell("combine", len(best.hypothesis.suspects) / (o.most + 1))
+        if len(best.hypothesis.suspects) > 1:  # what stands in for another place may ask for a further effect
+            more += swaps(forward, base, best, [*fits, *more], scores, screening, weights)
+            more += spared(forward, [*fits, *more], scores, weights)
+            best = leader([*fits, *more], scores)
+        if best is None or best is base or len(best.hypothesis.suspects) >= o.most or id(best) in seen:
+            break
+        seen.add(id(best))
         left = again(screening, best, without=best.hypothesis.effects)
         if not left.signatures:
             break
@@ -592,8 +599,6 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
         if not told:
             break
         best = f
-    if best is not None and len(best.hypothesis.suspects) > 1:
-        more += swaps(forward, base, best, [*fits, *more], scores, screening, weights)
     return more
 
 
@@ -643,6 +648,27 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
             if not f.failed:
                 scores[id(f)] = score(forward, f, weights)
                 out.append(f)
+    return out
+
+
+def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weights: Weights) -> list[Fit]:
+    """Of the best explanations by several effects: without those whose strength is not told from none."""
+    out: list[Fit] = []
+    good = [f for f in fits if id(f) in scores]
+    most = max(scores[id(f)].evidence for f in good)
+    for f in good:
+        if len(f.hypothesis.suspects) < 2 or scores[id(f)].evidence < most - words.CLOSE:
+            continue
+        sure = dict(zip((id(n) for n in f.free), zip(f.theta, f.deviations(), strict=True), strict=True))
+        for s in f.hypothesis.suspects:
+            value, deviation = sure[id(s.free[0])]
+            rest = tuple(t for t in f.hypothesis.suspects if t is not s)
+            if abs(value - s.free[0].start) > 2.0 * deviation or any(_same(g.hypothesis, rest) for g in (*fits, *out)):
+                continue
+            fewer = fit(forward, Hypothesis(rest), weights, theta=_kept(f, rest), local=f.local)
+            if not fewer.failed:
+                scores[id(fewer)] = score(forward, fewer, weights)
+                out.append(fewer)
     return out
 
 

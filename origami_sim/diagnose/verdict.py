@@ -28,8 +28,8 @@ FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
 STRUCTURED, PLAIN = 3.0, 6.0
-"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing; from the
-second on even if what explains a part of it may be small."""
+"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing; from
+PLAIN on even if what explains a part of it may be small."""
 
 INEXACT = 0.06
 """Part of what it explains that a named effect may leave, because real devices follow no law exactly."""
