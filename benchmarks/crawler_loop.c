@@ -36,11 +36,21 @@ static inline double at(const wave *w, double t) {
 
 typedef struct { double angle; vec gi, gj, gk, gl; } dihedral;
 
+/* atan2 of a small angle by its series, as in the kernel */
+static inline double turned(double y, double x) {
+    double t = y / x, u = t * t;
+    if (u < 1.0 / 1024 && x > 0) {
+        double s = (u / 9 - 1.0 / 7) * u + 0.2;
+        return t + t * u * (s * u - 1.0 / 3);
+    }
+    return atan2(y, x);
+}
+
 static inline dihedral fold(vec xi, vec xj, vec xk, vec xl) {
     dihedral h;
     vec e = sub(xk, xj), ri = sub(xi, xj), rl = sub(xl, xj), n1 = cross(ri, e), n2 = cross(e, rl);
     double ee = dot(e, e), length = sqrt(ee);
-    h.angle = atan2(dot(ri, n2) * length, dot(n1, n2));
+    h.angle = turned(dot(ri, n2) * length, dot(n1, n2));
     h.gi = mul(length / dot(n1, n1), n1);
     h.gl = mul(length / dot(n2, n2), n2);
     double inverse = 1 / ee, ai = dot(ri, e) * inverse, al = dot(rl, e) * inverse;

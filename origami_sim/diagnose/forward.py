@@ -34,7 +34,7 @@ CAREFUL, TRUSTED = 3.0, 0.05
 """A rate that was read from a recording is known within so many of its standard deviations, and such a part of it."""
 
 LEAD = 1500
-"""Frames without a segment along which laws with memory are taken, at most; the motion there is as recorded."""
+"""Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
 
 SOFTER = (100.0, 30.0, 10.0)
 """By how much softer panels may be where only derivatives are asked for: the solver's step grows with the root."""

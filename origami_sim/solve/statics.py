@@ -348,8 +348,13 @@ class _System:
             moves[moved, self._colours[moved], axis, :, axis] = self._steps[moved, None] * STENCIL
         self.moves = moves.reshape(n, worlds, 3)
         of = np.flatnonzero(self._colours[columns] >= 0)
-        self._pairs = rows[of], columns[of]
-        self._pattern = self._places(n)
+        self._pairs = rows, columns = rows[of], columns[of]
+        # of every entry of all pairs' blocks [axis moved, axis of force]
+        self._row = (3 * rows[:, None, None] + np.tile(np.arange(3), (3, 1))).ravel()
+        self._column = (3 * columns[:, None, None] + np.tile(np.arange(3), (3, 1)).T).ravel()
+        numbered = sp.csr_array((np.arange(1.0, len(self._row) + 1), (self._row, self._column)), shape=(3 * n, 3 * n))
+        kept = sp.csc_array(numbered[self.free][:, self.free])
+        self._pattern = kept.data.astype(int) - 1, kept.indices, kept.indptr
 
     # --- forces
 
@@ -410,24 +415,12 @@ class _System:
                 colours[i] = next(c for c in range(n) if c not in taken)
         return colours
 
-    def _places(self, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a tangent on the free axes: which entries of all blocks it takes, row indices and column starts."""
-        rows, columns = self._pairs
-        i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * rows[:, None, None]
-        j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * rows[:, None, None]
-        i, j = (np.broadcast_to(v, (len(rows), 3, 3)).ravel() for v in (i, j))
-        numbered = sp.csr_array((np.arange(1.0, len(i) + 1), (i, j)), shape=(3 * n, 3 * n))
-        kept = sp.csc_array(numbered[self.free][:, self.free])
-        return kept.data.astype(int) - 1, kept.indices, kept.indptr
-
     def tangent(self, x: np.ndarray, angles: np.ndarray, time: float) -> sp.csr_array:
         """K = -dF/dx [3 N, 3 N] [N/m]."""
         n = len(x)
         self._many.place(x[:, None] + self.moves, np.repeat(angles[:, None], self.moves.shape[1], axis=1))
-        blocks, (rows, columns) = self._blocks(self._many.total_force(time)), self._pairs
-        i = 3 * rows[:, None, None] + np.arange(3)[None, None, :] + 0 * blocks.astype(np.int64)
-        j = 3 * columns[:, None, None] + np.arange(3)[None, :, None] + 0 * blocks.astype(np.int64)
-        k = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(3 * n, 3 * n))
+        blocks = self._blocks(self._many.total_force(time))
+        k = sp.csr_array((blocks.ravel(), (self._row, self._column)), shape=(3 * n, 3 * n))
         return k @ sp.diags_array(self.model.free.ravel().astype(float), format="csr")
 
     def assembled(self, force: np.ndarray) -> sp.csc_array:

@@ -136,7 +136,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
         if settled:
             break
         h = np.where(np.isfinite(limit), limit, 0.0)
-        growth = h**2 / 4.0 * square + h * rate
+        growth = h**2 / 4.0 * square + h * rate  # 1 at all nodes if the sums are alike
         x = x * np.maximum(growth / np.maximum(growth.max(axis=0), 1e-300), 1e-6)
         x = np.maximum(x / x.max(axis=0), 1e-100)
     assert plain is not None
