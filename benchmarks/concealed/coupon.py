@@ -199,6 +199,8 @@ def moments(stiffness: float, folds: np.ndarray, b: Bridge) -> np.ndarray:
             turn = turn + step
             if np.abs(step).max() < 1e-12:
                 break
+        else:
+            raise RuntimeError(f"no moment holds a fold of {fold:.3g} rad")
         known = section(turn, known, b, stiffness * health)[2]
         out.append(moment + b.drift * n / (len(folds) - 1))
     return np.array(out)

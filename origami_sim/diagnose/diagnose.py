@@ -139,7 +139,7 @@ def diagnose(
     fits += pairs(forward, base, screening, fits, weights, o)
     rough = screening
     screening, fits, weights = settled(forward, rough, fits, weights)
-    refined = fits
+    refined = tuple(fits)
     alike_ones = twins(forward, rough, screening, fits, weights)
     fits += alike_ones
     # with weights that do not count the effect itself as noise
@@ -522,28 +522,35 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     """
     if o.most < 2:
         return []
-    sharp = Weights(np.minimum(forward.blocks[0].noise, weights.deviation))
+    sharp = Weights(forward.blocks[0].noise)
     plain = base.reweighted(weights, sharp)
     seen = reweighted(screening, plain, weights, sharp)
     r, top = seen.residual, distinct(seen.signatures)[:12]
-    gains = {f.hypothesis.label: plain.cost - f.reweighted(weights, sharp).cost for f in fits if not f.failed}
+
+    def missed(f: Fit) -> float:
+        """What a fit misses of the screened blocks."""
+        line = f.reweighted(weights, sharp).linear
+        assert line is not None
+        return float(sum(line.residual[f.blocks.index(b)] @ line.residual[f.blocks.index(b)] for b in seen.blocks))
+
+    gains = {f.hypothesis.label: missed(base) - missed(f) for f in fits if not f.failed}
     single = max([*(s.score**2 for s in top), *gains.values()])
     best, most = None, 0.0
     for a, b in combinations(top, 2):
         both = np.stack([a.shape, b.shape], axis=1)
-        if abs(a.shape @ b.shape) > 0.95 or not (a.score and b.score):
+        if abs(a.shape @ b.shape) > 0.95 or min(abs(a.score), abs(b.score)) < 2.0:
             continue
         x, *_ = np.linalg.lstsq(both, r, rcond=None)
         if np.sign(x[0]) != np.sign(a.score) or np.sign(x[1]) != np.sign(b.score):
             continue
         # fits gain other amounts than signatures promise, for which strengths are small
         more = max(gains.get(s.suspect.label, 0.0) / s.score**2 for s in (a, b))
-        explained = float(np.sum((both @ x) ** 2)) * max(more, 1.0)
+        explained = float(np.sum((both @ x) ** 2)) * float(np.clip(more, 1.0, MORE))
         if explained > most:
-            best, most = [(a, x[0]), (b, x[1])], explained
+            best, most = (a, b), explained
     if best is None or most - single < 9.0 + 0.1 * single:
         return []
-    first, second = (replace(_counterpart(screening, s), strength=float(x * s.error)) for s, x in best)
+    first, second = (_counterpart(screening, s) for s in best)
     known = [f for f in fits if f.hypothesis.suspects == (first.suspect,)]
     one = known[0] if known else refit(forward, base, first, weights, screening)
     if one.failed:
@@ -552,13 +559,17 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     return [both] if known else [one, both]
 
 
+MORE = 4.0
+"""Times as much as a signature promises that a fit is thought to gain, at most."""
+
+
 def _counterpart(screening: Screening, found: Signature) -> Signature:
-    """The same signature in other weights."""
+    """The same signature in other weights, in which it may not stand out enough to be tested."""
 
     def key(s: Suspect):
         return s.label, tuple(n.start for n in s.free[1:])
 
-    return next(s for s in screening.signatures if key(s.suspect) == key(found.suspect))
+    return next(s for s in (*screening.signatures, *screening.untestable) if key(s.suspect) == key(found.suspect))
 
 
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
@@ -585,12 +596,14 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
             found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
         elif not structured:
             break
-        tried = [refit(forward, best, g, weights, screening) for g in found[:RIVALS]]
-        tried = [f for f in tried if not f.failed]
+        known = [*fits, *more]
+        wanted = [(g, (*best.hypothesis.suspects, g.suspect)) for g in found[:RIVALS]]
+        tried = [refit(forward, best, g, weights, screening) for g, w in wanted if not _made(known, w)]
+        tried = [f for f in (*tried, *(_made(known, w) for _, w in wanted)) if f is not None and not f.failed]
         if not tried:
             break
-        scores |= {id(f): score(forward, f, weights) for f in tried}
-        more += tried
+        scores |= {id(f): score(forward, f, weights) for f in tried if id(f) not in scores}
+        more += [f for f in tried if not any(f is g for g in known)]
         f = max(tried, key=lambda f: scores[id(f)].evidence)
         if told:
             told = better(scores[id(f)], scores[id(best)])
@@ -670,6 +683,11 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
                 scores[id(fewer)] = score(forward, fewer, weights)
                 out.append(fewer)
     return out
+
+
+def _made(fits: Sequence[Fit], wanted: tuple[Suspect, ...]) -> Fit | None:
+    """The fit of these suspects, if there is one."""
+    return next((f for f in fits if _same(f.hypothesis, wanted)), None)
 
 
 def _same(hypothesis: Hypothesis, wanted: tuple[Suspect, ...]) -> bool:

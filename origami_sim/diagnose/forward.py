@@ -464,8 +464,8 @@ class Forward:
         without changing it. Before that they rest.
         """
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
-        firsts = np.array([b.first for b in blocks])
-        if not len(State.at_rest(model).memory) or not np.any(firsts):
+        every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
+        if not len(State.at_rest(model).memory) or not np.any(every):
             return None
         path = self._path(r)
         if path is None:
@@ -473,22 +473,29 @@ class Forward:
         times = self.recordings[r].times - self.recordings[r].times[0]
         step = float(np.median(np.diff(times)))
         held = replace(model, free=np.zeros_like(model.free))
-        out, batch, at = [], None, 0
-        for first in np.unique(firsts):
-            if batch is None or first - at > LEAD:
-                at = max(int(first) - LEAD, 0)
-                span = float(times[-1] - times[at]) + step
-                drive = distorted(model, parameters, shifted(self._drives[r], times[[at]], span, len(worlds)), span)
-                state = State.at_rest(held, len(worlds), position=np.repeat(path[at][:, None], len(worlds), axis=1))
+
+        def at(frame: int, memory: np.ndarray | None) -> Batch:
+            """The worlds held as they were at a frame, driven as from there on; without a memory they have rested."""
+            span = float(times[-1] - times[frame]) + step
+            drive = distorted(model, parameters, shifted(self._drives[r], times[[frame]], span, len(worlds)), span)
+            state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
+            if memory is None:
                 batch = self._batch(held, parameters, drive.held(0.0), state)
-                batch.carry(path[[at, at], :, None], LEAD * step)
-                batch = self._batch(held, parameters, drive, replace(state, memory=batch.state().memory))
-            if first > at:
-                batch.carry(path[at : first + 1, :, None], step)
-            out.append(batch.state().memory)
-            at = int(first)
-        which = np.searchsorted(np.unique(firsts), firsts)
-        return np.stack(out, axis=2)[:, :, which].reshape(len(out[0]), -1)
+                batch.carry(path[[frame, frame], :, None], LEAD * step)
+                memory = batch.state().memory
+            return self._batch(held, parameters, drive, replace(state, memory=memory))
+
+        out: dict[int, np.ndarray] = {}
+        last, memory = -LEAD - 1, None
+        for first in map(int, every[every <= max(b.first for b in blocks)]):
+            if first - last > LEAD:
+                last, memory = max(first - LEAD, 0), None
+            batch = at(last, memory)
+            if first > last:
+                batch.carry(path[last : first + 1, :, None], step)
+            last, memory = first, batch.state().memory
+            out[first] = memory
+        return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State) -> Batch:
         return Batch(model, parameters, drive, state, threads=self.threads)

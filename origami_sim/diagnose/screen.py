@@ -231,7 +231,7 @@ def rated(simulated: Sequence[tuple[Suspect, float, list[np.ndarray]]], base: Fi
 
 
 def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
-    """Changes by suspects that share a program; strengths are scaled until the change is as large as the residual."""
+    """Changes by suspects that share a program; strengths are scaled for a change as large as the residual."""
     few = [max(blocks, key=lambda b: _size(base, b, weights))]
     goal = np.sqrt(_size(base, few[0], weights)) + 1.0
     size = np.array([_affordable(forward, base, s, s.free[0].scale) for s in group])
@@ -274,7 +274,7 @@ def _size(base: Fit, block: int, weights: Weights) -> float:
 def _affordable(forward, base: Fit, s: Suspect, change: float) -> float:
     """A change within the bounds that does not make the solver's step much smaller than it is."""
     change = _admissible(s, change)
-    enough = forward.step(base.hypothesis, base.theta, soft=True) / SLOWEST
+    enough = forward.step(base.hypothesis, base.theta, soft=not stiff(s.effect)) / SLOWEST
     rest = [f.start for f in s.free[1:]]
     hypothesis = base.hypothesis.plus(s)
     for _ in range(12):

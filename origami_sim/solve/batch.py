@@ -99,7 +99,8 @@ class Batch:
         sizes = [(e, m) for e in self.program.effects for m in e.memory]
         rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
         self._buffer = constant(buffer, wp.float64)
-        self._drive_offset = int(layout[self.program.slots.index(("drive", "offset")), 0])
+        levels = self.program.slots.index(("drive", "offset"))
+        self._levels = int(layout[levels, 0]), int(layout[levels + 1, 0] - layout[levels, 0])
         self._constants = [
             constant(model.free, wp.vec3d),
             constant(model.bars.reshape(-1, 2), wp.vec2i),
@@ -284,8 +285,9 @@ class Batch:
         Args:
             levels: [channels, 1 or W], as many columns as the drive had that the batch was made with.
         """
-        first = self._drive_offset
+        first, size = self._levels
         host = np.ascontiguousarray(levels, float).ravel()
+        assert len(host) == size
         if self.device.is_cpu:
             self._buffer.numpy()[first : first + len(host)] = host
         else:

@@ -208,7 +208,7 @@ class Program:
                 scope[f"{e.name}_energy"] = e.energy
         exec(compile(source, filename, "exec"), scope)
         kernel = scope[name]
-        if name == "rollout" and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
+        if hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
             common = wp.config.cpu_compiler_flags or "-march=native"
             kernel.module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
         return kernel

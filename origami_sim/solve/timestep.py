@@ -23,7 +23,7 @@ class TimeStep:
     Attributes:
         limit: bound on stable steps over all worlds [s].
         dt: the step recommended, SAFETY * limit [s].
-        node: node that limits it. cause: the element at that node which contributes most.
+        node: node whose elements are the stiffest for its mass. cause: the element there which contributes most.
     """
 
     limit: float

@@ -1,5 +1,7 @@
 """The diagnosis on constructed cases with known answers, stage by stage."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,9 @@ from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import memory, probabilities
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit
-from origami_sim.diagnose.hypothesis import suspects
+from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.locate import locate
-from origami_sim.diagnose.screen import screen
+from origami_sim.diagnose.screen import _affordable, screen
 from origami_sim.errors import InputError
 from origami_sim.model import dihedral_angles
 from origami_sim.scene import read_calibration
@@ -85,6 +87,32 @@ def test_a_nested_model_never_fits_worse(rubbing):
         f = refit(forward, base, found, weights, screening, most=2)
         assert f.failed or f.cost <= base.cost * (1 + 1e-6), found.suspect.label
     assert chosen(screening, 2)[0] is screening.signatures[0]
+
+
+def test_what_keeps_panels_in_shape_is_screened_as_strongly_beside_softer_panels():
+    forward = arranged(subject(3), [record(duration=2.0, panels=3)], Options(threads=1))
+    theta = np.array([f.start for f in forward.subject.nominals])
+    base = SimpleNamespace(hypothesis=Hypothesis(), theta=theta)
+    (panels,) = [s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "panel_softness"]
+    sizes = []
+    for forward.softness in (1.0, 100.0):
+        sizes.append(_affordable(forward, base, panels, panels.free[0].scale))
+    assert sizes[0] == sizes[1] == panels.free[0].scale
+
+
+def test_a_segments_memory_does_not_depend_on_which_others_are_asked_for():
+    """The largest fold of the past is that of the whole recording before the segment."""
+    forward = arranged(subject(3), [record(duration=3.0, panels=3)], Options(threads=1))
+    mullins = next(
+        s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "crease_mullins"
+    )
+    theta = np.array([*(f.start for f in forward.subject.nominals), 1e-4, 0.3])
+    every = forward.predict(Hypothesis((mullins,)), [theta])
+    for b in (0, len(forward.blocks) - 1):
+        assert np.array_equal(forward.predict(Hypothesis((mullins,)), [theta], blocks=[b])[0], every[b], equal_nan=True)
+    hypothesis = Hypothesis((mullins,))
+    largest = forward._memory(0, [forward._world(hypothesis, theta, hypothesis.effects)], forward.blocks)
+    assert largest is not None and np.all(np.diff(largest, axis=1) >= 0) and largest.max() > 0.5
 
 
 def test_memory_and_probabilities():
