@@ -27,9 +27,8 @@ from origami_sim.recording.units import quantity
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-STRUCTURED, PLAIN = 3.0, 6.0
-"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing; from
-PLAIN on even if what explains a part of it may be small."""
+STRUCTURED = 3.0
+"""Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
 
 INEXACT = 0.06
 """Part of what it explains that a named effect may leave, because real devices follow no law exactly."""
@@ -89,7 +88,7 @@ FAST = (1 / 4, 3 / 8, 1 / 2)
 WHITE, TINTED = 0.8, 0.35
 """Ratio of the powers in these bands from which on noise counts as white, and the part that it may still differ by."""
 
-MOST = 0.75
+MOST = 2 / 3
 """Part of the structure that a suspect must leave to be refuted where it may itself be small."""
 
 ALLOWED = SMALL * SHOWN**2
@@ -189,8 +188,7 @@ class _Weighed:
     @property
     def leaves(self) -> bool:
         """Whether the best leaves more structure than an inexact law does; one that may be small, most of it."""
-        doubtful = self.small and self.after.repeated < PLAIN
-        return self.after.repeated > STRUCTURED and self.share > (MOST if doubtful else INEXACT)
+        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else INEXACT)
 
     @property
     def fall(self) -> str:
