@@ -223,8 +223,17 @@ def together(f: Fit) -> float:
     return float(np.sum(each.sum(axis=1) ** 2) / max(np.sum(each**2), 1e-300))
 
 
+WORTH = 3.0
+"""Log evidence by which an explanation with one more effect must be ahead."""
+
+
+def better(a: Score, b: Score) -> bool:
+    """Whether an explanation with more effects is worth it: what is held out must ask for them, and be nearer."""
+    return reproducible(a, b) and nearer(a, b) and a.evidence > b.evidence + WORTH
+
+
 def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:
-    """Evidence of each fit; several effects that are no reproducible gain over fewer of them fall below those."""
+    """Evidence of each fit; several effects that are no better than fewer of them fall below those."""
     out = []
     for f in fits:
         evidence = scores[id(f)].evidence
@@ -232,9 +241,8 @@ def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:
         for g in fits:
             inner = {s.label for s in g.hypothesis.suspects}
             if inner and inner < mine:
-                a, b = scores[id(f)], scores[id(g)]
-                if not (reproducible(a, b) and a.evidence > b.evidence + 3.0):
-                    evidence = min(evidence, b.evidence - 5.0)
+                if not better(scores[id(f)], scores[id(g)]):
+                    evidence = min(evidence, scores[id(g)].evidence - 5.0)
         out.append(evidence)
     return out
 

@@ -12,9 +12,9 @@ from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.compare import (
     Score,
+    better,
     difference,
     probabilities,
-    reproducible,
     score,
     supported,
     weights_from,
@@ -619,11 +619,6 @@ RIVALS = 3
 """Further effects that are tried at a time."""
 
 
-def better(a: Score, b: Score) -> bool:
-    """Whether an explanation with one more effect is worth it."""
-    return reproducible(a, b) and a.evidence > b.evidence + 3.0
-
-
 def stands_out(
     forward: Forward, base: Fit, best: Fit, f: Fit, screening: Screening, weights: Weights, o: Options
 ) -> bool:
@@ -665,7 +660,10 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
 
 
 def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weights: Weights) -> list[Fit]:
-    """Of the best explanations by several effects: without those whose strength is not told from none."""
+    """Of the best explanations by several effects: without those whose strength is not told from none.
+
+    What is left may have been fitted before, and have been stuck far from where this fit came to.
+    """
     out: list[Fit] = []
     good = [f for f in fits if id(f) in scores]
     most = max(scores[id(f)].evidence for f in good)
@@ -676,7 +674,8 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
         for s in f.hypothesis.suspects:
             value, deviation = sure[id(s.free[0])]
             rest = tuple(t for t in f.hypothesis.suspects if t is not s)
-            if abs(value - s.free[0].start) > 2.0 * deviation or any(_same(g.hypothesis, rest) for g in (*fits, *out)):
+            near = [g for g in (*fits, *out) if _same(g.hypothesis, rest) and g.cost < f.cost + words.CLOSE]
+            if abs(value - s.free[0].start) > 2.0 * deviation or near:
                 continue
             fewer = fit(forward, Hypothesis(rest), weights, theta=_kept(f, rest), local=f.local)
             if not fewer.failed:

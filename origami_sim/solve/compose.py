@@ -39,7 +39,8 @@ NATURAL = wp.constant(0x7FFFFFFF)
 CPU_FLAGS = "-fno-slp-vectorize -ffp-contract=fast"
 """Two numbers of a vector stored by halves and loaded whole wait for the store; without packing they do not.
 
-Products and sums are fused across statements, as on CUDA.
+Products and sums are fused across statements, as on CUDA. The other kernels round every one, so that a law without
+strength adds exactly nothing.
 """
 
 _ARGUMENTS = """
@@ -208,7 +209,7 @@ class Program:
                 scope[f"{e.name}_energy"] = e.energy
         exec(compile(source, filename, "exec"), scope)
         kernel = scope[name]
-        if hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
+        if name == "rollout" and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
             common = wp.config.cpu_compiler_flags or "-march=native"
             kernel.module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
         return kernel
