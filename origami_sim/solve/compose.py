@@ -188,31 +188,34 @@ class Program:
         return self._kernel("total")
 
     def _kernel(self, name: str) -> wp.Kernel:
-        """In a module of its own, so that nothing is compiled that is not run."""
-        source = self.sources[name]
-        module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
-        filename = f"<{module}>"
-        # warp reads the source of a kernel through inspect, which looks here first
-        linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-        scope = {
-            "__name__": module,
-            "wp": wp,
-            "scalar": wp.float64,
-            "vec3": wp.vec3d,
-            "kinematics": kinematics,
-            "wave": wave,
-            "NATURAL": NATURAL,
-        }
-        for e in self.effects:
-            scope[f"{e.name}_force"] = e.force
-            if e.energy is not None:
-                scope[f"{e.name}_energy"] = e.energy
-        exec(compile(source, filename, "exec"), scope)
-        kernel = scope[name]
+        kernel = written(self.sources[name], name, self.effects)
         if name == "rollout" and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
             common = wp.config.cpu_compiler_flags or "-march=native"
             kernel.module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
         return kernel
+
+
+def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
+    """The kernel of that name, in a module of its own, so that nothing is compiled that is not run."""
+    module = f"origami_sim.composed_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
+    filename = f"<{module}>"
+    # warp reads the source of a kernel through inspect, which looks here first
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    scope = {
+        "__name__": module,
+        "wp": wp,
+        "scalar": wp.float64,
+        "vec3": wp.vec3d,
+        "kinematics": kinematics,
+        "wave": wave,
+        "NATURAL": NATURAL,
+    }
+    for e in effects:
+        scope[f"{e.name}_force"] = e.force
+        if e.energy is not None:
+            scope[f"{e.name}_energy"] = e.energy
+    exec(compile(source, filename, "exec"), scope)
+    return scope[name]
 
 
 class _Composer:

@@ -21,9 +21,7 @@ Every evaluation begins with the memory of the beginning of the step; memory adv
 """
 
 import functools
-import hashlib
 import itertools
-import linecache
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -34,7 +32,6 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 import warp as wp
 
-from origami_sim import kinematics
 from origami_sim.drive import Drive
 from origami_sim.effects import DISTORTIONS, get
 from origami_sim.errors import InputError
@@ -43,7 +40,6 @@ from origami_sim.solve import compose
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import STEP, _System
 from origami_sim.solve.timestep import stable_step
-from origami_sim.solve.wave import wave
 
 TOLERANCE = 1e-5
 """Position error of one step over the size of the structure, where the step is adapted."""
@@ -123,21 +119,7 @@ def _kernel(names: tuple[str, ...]) -> wp.Kernel:
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
     composer = _Averager(effects)
     source = _HEAD.format(arguments=compose._ARGUMENTS, hoist=composer.hoist(), body=composer.body("rollout"))
-    module = f"origami_sim.implicit_{hashlib.sha256(source.encode()).hexdigest()[:12]}"
-    filename = f"<{module}>"
-    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    scope = {
-        "__name__": module,
-        "wp": wp,
-        "scalar": wp.float64,
-        "vec3": wp.vec3d,
-        "kinematics": kinematics,
-        "wave": wave,
-        "NATURAL": compose.NATURAL,
-        **{f"{e.name}_force": e.force for e in effects},
-    }
-    exec(compile(source, filename, "exec"), scope)
-    return scope["average"]
+    return compose.written(source, "average", effects)
 
 
 @dataclass(frozen=True)
