@@ -654,6 +654,8 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
                 continue
             f = refit(forward, inner, g, weights, screening)
             if not f.failed:
+                near = np.concatenate([_kept(best, rest), f.theta[len(inner.free) :]])
+                f = min(f, fit(forward, f.hypothesis, weights, theta=near, local=best.local), key=lambda f: f.cost)
                 scores[id(f)] = score(forward, f, weights)
                 out.append(f)
     return out
