@@ -121,6 +121,8 @@ def placed(o: dict, mechanism: str, place: int, extra: dict, outside: bool = Fal
         site = f"panel{place}"
     elif c.site == "last panel":
         site = f"panel{len(o['faces']) - 1}"
+    elif c.site == "foot":
+        site = o["feet"][place]["name"]
     return {"mechanism": mechanism, "place": place, "site": site, "extra": extra}
 
 
@@ -132,8 +134,8 @@ def chosen(o: dict, mechanism: str, rng: np.random.Generator, outside: bool = Fa
 
 def places(o: dict, c: Concealed) -> list[int]:
     """Where a mechanism may be: creases, or panels that move."""
-    if c.site == "crease":
-        return list(range(len(o["creases"])))
+    if c.site in ("crease", "foot"):
+        return list(range(len(o["creases" if c.site == "crease" else "feet"])))
     return [p for p in range(len(o["faces"])) if p != o["held"]] if c.site == "panel" else [0]
 
 
@@ -284,7 +286,8 @@ def null(what: str, structure: str, rng: np.random.Generator) -> tuple[Case, dic
     case = case_of(o, drawn_factors(o, rng, wrong=what == "wrong_parameter"))
     account = {"null": what}
     if what == "wrong_camera":
-        name = "length_scale" if "scene" in o else str(rng.choice(["angle_scale", "clock_rate"]))
+        lengths = "scene" in o or o["channels"] == "marker_2d"
+        name = "length_scale" if lengths else str(rng.choice(["angle_scale", "clock_rate"]))
         account |= concealed(case, placed(o, name, 0, {}), float(rng.choice(LEVELS)), rng)[0]
     return case, account, None
 

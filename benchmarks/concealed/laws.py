@@ -162,6 +162,33 @@ class Tether(Law):
         world.wrench[p, 3:] += cross(arm, force)
 
 
+class FootFriction(Law):
+    """One foot rubs more or less than the others."""
+
+    def prepare(self, numbers: Numbers):
+        numbers.friction[self.place] += self.strength
+
+
+class Adhesion(Law):
+    """Each of a foot's two points is pulled down, exponentially less with the gap."""
+
+    REACH = 3e-5
+
+    def act(self, world, t, q, w, dt):
+        for foot in world.feet:
+            foot.pressed(world, 0.0, -2.0 * self.strength * math.exp(-max(foot.height, 0.0) / self.REACH))
+
+
+class StaticFriction(Law):
+    """Feet at rest rub more than those that slide, by a rational function of the speed."""
+
+    SPEED = 0.01
+
+    def act(self, world, t, q, w, dt):
+        for foot, mu in zip(world.feet, world.numbers.friction, strict=True):
+            foot.friction = float(mu) + self.strength / (1.0 + (foot.speed / self.SPEED) ** 2)
+
+
 # outside the catalogue ------------------------------------------------------------------------------------------------
 
 
@@ -177,7 +204,7 @@ class Neighbour(Law):
     """A moment that depends on the square of the next crease's angle."""
 
     def act(self, world, t, q, w, dt):
-        other = (self.place + 1) % len(q)
+        other = (self.place + 1) % world.count
         world.torque[self.place] -= self.strength * q[other] ** 2
 
 
@@ -215,6 +242,20 @@ class Pushes(Law):
                 world.torque[self.place] += sign * self.strength * math.sin(math.pi * (t - at) / 0.04)
 
 
+class Ageing(Law):
+    """Friction that grows while a foot rests, and is lost once it slides."""
+
+    TIME, STILL = 0.1, 1e-3
+
+    def reset(self, world, q):
+        self.age = [0.0] * len(world.feet)
+
+    def act(self, world, t, q, w, dt):
+        for n, (foot, mu) in enumerate(zip(world.feet, world.numbers.friction, strict=True)):
+            self.age[n] = self.age[n] + dt if abs(foot.speed) < self.STILL else 0.0
+            foot.friction = float(mu) + self.strength * (1.0 - math.exp(-self.age[n] / self.TIME))
+
+
 # measurement ----------------------------------------------------------------------------------------------------------
 
 
@@ -234,13 +275,18 @@ class Offset(Law):
     """Constant added to all readings."""
 
 
+class LengthScale(Law):
+    """Relative error of the lengths that a camera sees."""
+
+
 @dataclass(frozen=True)
 class Concealed:
     """A mechanism that may be drawn.
 
     Attributes:
         law: its class. names: what the diagnosis may call it, the first being the exact name; empty: nothing fits.
-        site: "crease", "panel", "last panel", all of them ("all panels") or "" (the whole object or its measurement).
+        site: "crease", "panel", "last panel", "foot", all of them ("all panels") or "" (the whole object or its
+            measurement).
         first: strength to begin the search with, times the crease stiffness where `stiff`. largest: likewise.
         signed: either sign is possible. only: structures that it suits; empty: all.
         number: parameter of the catalogue's effect that means the same as the strength, if there is one.
@@ -257,14 +303,19 @@ class Concealed:
     number: str = ""
 
 
-DRIVEN = ("magnetic_strip", "box", "bi_fold")
+CRAWLER = ("crawler",)
+DRIVEN = ("magnetic_strip", "box", "bi_fold", "crawler")
 ELASTIC = ("hanging_strip", *DRIVEN)
+FOLDED = ("hanging_strip", "magnetic_strip", "box", "bi_fold")
+HELD = ("pendulum_chain", *FOLDED)
 STRIPS = ("hanging_strip", "pendulum_chain", "magnetic_strip")
 
 INSIDE: dict[str, Concealed] = {
     "dry_friction": Concealed(DryFriction, ("crease_friction",), number="friction_moment"),
     "quadratic_damping": Concealed(QuadraticDamping, ("crease_quadratic_damping",), first=5e-3, number="coefficient"),
-    "air_drag": Concealed(AirDrag, ("air_drag",), "all panels", 2.0, False, largest=10.0, number="drag_coefficient"),
+    "air_drag": Concealed(
+        AirDrag, ("air_drag",), "all panels", 2.0, False, largest=10.0, only=HELD, number="drag_coefficient"
+    ),
     "hysteresis": Concealed(Hysteresis, ("crease_hysteresis",), only=ELASTIC, number="hysteresis_moment"),
     "relaxation": Concealed(Relaxation, ("crease_relaxation",), first=0.3, only=ELASTIC, number="stiffness_1"),
     "stiffening": Concealed(Stiffening, ("crease_stiffening",), first=0.3, number="cubic_stiffness"),
@@ -272,9 +323,9 @@ INSIDE: dict[str, Concealed] = {
         Asymmetry, ("crease_asymmetry",), signed=True, largest=0.8, only=ELASTIC, number="valley_stiffness"
     ),
     "rest_angle": Concealed(RestAngle, ("crease_offset", "crease_swelling"), "crease", 0.05, False, True),
-    "viscosity": Concealed(Viscosity, ("crease_viscosity",), first=0.01, number="viscosity"),
+    "viscosity": Concealed(Viscosity, ("crease_viscosity",), first=0.01, only=HELD, number="viscosity"),
     "softness": Concealed(
-        Softness, ("crease_softness",), signed=True, largest=0.8, only=ELASTIC, number="stiffness_change"
+        Softness, ("crease_softness",), signed=True, largest=0.8, only=FOLDED, number="stiffness_change"
     ),
     "misalignment": Concealed(Misalignment, ("field_misalignment",), "", 0.05, False, True, 0.7, DRIVEN),
     "field_lag": Concealed(Lag, ("field_lag", "drive_delay"), "", 0.01, False, False, 0.2, DRIVEN, number="lag"),
@@ -286,21 +337,30 @@ INSIDE: dict[str, Concealed] = {
     "tether": Concealed(Tether, ("tether",), "last panel", 0.01, False, largest=1.0, only=STRIPS),
     "clock_rate": Concealed(ClockRate, ("clock_rate",), "", 2e-3, False, True, 0.1, number="clock_rate"),
     "clock_delay": Concealed(ClockDelay, ("clock_delay",), "", 2e-3, False, False, 0.1, DRIVEN, number="clock_delay"),
-    "angle_scale": Concealed(Scale, ("angle_scale",), "", 5e-3, False, True, 0.3, number="angle_scale"),
-    "angle_offset": Concealed(Offset, ("angle_offset",), "", 2e-3, False, True, 0.5, number="angle_offset"),
+    "angle_scale": Concealed(Scale, ("angle_scale",), "", 5e-3, False, True, 0.3, HELD, number="angle_scale"),
+    "angle_offset": Concealed(Offset, ("angle_offset",), "", 2e-3, False, True, 0.5, HELD, number="angle_offset"),
+    "length_scale": Concealed(LengthScale, ("length_scale",), "", 5e-3, False, True, 0.3, CRAWLER, "length_scale"),
+    "foot_friction": Concealed(
+        FootFriction, ("coulomb",), "foot", 0.05, False, True, 0.3, CRAWLER, "friction_coefficient"
+    ),
+    "adhesion": Concealed(Adhesion, ("adhesion",), "", 1e-3, False, largest=0.1, only=CRAWLER, number="pull_off"),
+    "static_friction": Concealed(
+        StaticFriction, ("stribeck",), "", 0.05, False, largest=0.5, only=CRAWLER, number="static_excess"
+    ),
 }
 """Mechanisms that the catalogue has."""
 
 OUTSIDE: dict[str, Concealed] = {
     "parametric_stiffness": Concealed(Parametric, (), only=ELASTIC),
-    "neighbour_moment": Concealed(Neighbour, (), signed=True),
+    "neighbour_moment": Concealed(Neighbour, (), signed=True, only=HELD),
     "hidden_magnets": Concealed(HiddenMagnets, (), "", 1e-4, False, True, only=STRIPS),
     "falling_friction": Concealed(FallingFriction, ()),
     "pushes": Concealed(Pushes, (), first=0.1),
+    "ageing_friction": Concealed(Ageing, (), "", 0.05, False, largest=0.5, only=CRAWLER),
 }
 """Mechanisms that it has not."""
 
-MEASUREMENT = ("clock_rate", "clock_delay", "angle_scale", "angle_offset")
+MEASUREMENT = ("clock_rate", "clock_delay", "angle_scale", "angle_offset", "length_scale")
 
 
 def build(name: str, strength: float, place: int, extra: dict) -> Law:

@@ -3,13 +3,15 @@
 An object is plain data: `vertices` [m] and `faces` in the flat reference state, `held` panel, `thickness` [m] and
 `density` [kg/m^3] of the sheet, `creases` with the two panels, `stiffness` [N m/rad] and `viscosity` [N m s/rad],
 `magnets` by panel with `moment` [A m^2] along `poling`, `gravity` [m/s^2], `channels`, the `releases` (angles [rad])
-and `fields` of its recordings, and what is known of the numbers: relative standard deviations in `priors`.
+and `fields` of its recordings, and what is known of the numbers: relative standard deviations in `priors`. What nothing
+holds has `feet` that reach down to the ground at z = 0 and are as wide as the panels: `panel`, where along x they are
+(`at`), coefficient of `friction`, and how far they `give` way [m] under their `load` [N].
 Fold angles are positive towards the side from which a face runs counter-clockwise.
 """
 
 import numpy as np
 
-STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold")
+STRUCTURES = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold", "crawler")
 
 
 def strip(lengths, width: float) -> tuple[list, list]:
@@ -40,6 +42,47 @@ def corner(side: float) -> tuple[list, list]:
     return vertices, [[0, 1, 4, 3], [1, 2, 5, 4], [4, 5, 7, 6]]
 
 
+def crawler(o: dict, vary, rng: np.random.Generator) -> None:
+    """Two panels on legs, with magnets against each other: one is a little stronger, so that the load shifts with the
+    field, and the crease lags, so that what slides out is not what slides in."""
+    lengths, width, leg = (0.022 * vary(0.05), 0.018 * vary(0.05)), 0.02, 0.008
+    x = np.concatenate([[0.0], np.cumsum(lengths)])
+    o["vertices"] = [[float(a), side * width / 2, leg] for a in x for side in (-1, 1)]
+    o["faces"] = [[2 * p, 2 * p + 2, 2 * p + 3, 2 * p + 1] for p in range(2)]
+    o |= {"held": None, "thickness": 1.5e-3, "density": 2200.0, "channels": "marker_2d", "duration": 1.2, "rate": 120}
+    o["noise"] = float(rng.uniform(2.5e-4, 4e-4))
+    foot = {
+        "friction": 0.5 * vary(0.2),
+        "give": 5e-6,
+        "load": 0.5 * o["gravity"] * o["density"] * o["thickness"] * width * sum(lengths),
+    }
+    o["feet"] = [
+        {"name": n, "panel": p, "at": float(x[2 * p]), **foot} for p, n in enumerate(("rear foot", "front foot"))
+    ]
+    stiffness, moment = 5e-3 * vary(0.2), 0.04 * vary(0.05)
+    o["creases"] = creases([(0, 1)], stiffness, 0.06 * vary(0.2) * stiffness)
+    weaker = moment * float(rng.uniform(0.85, 0.9))
+    o["magnets"] = [
+        {"panel": 0, "poling": [1.0, 0.0, 0.0], "moment": moment},
+        {"panel": 1, "poling": [-1.0, 0.0, 0.0], "moment": weaker},
+    ]
+    o["priors"] = {
+        "crease.stiffness": 0.05,
+        "crease_viscosity.viscosity": 0.2,
+        "inertia.mass": 0.02,
+        "magnetic_torque.remanence": 0.03,
+        "coulomb.friction_coefficient": 0.1,
+    }
+    amplitude, frequency = 0.055 * vary(0.1), 2.5 * vary(0.2)
+    o["recordings"] = [
+        {
+            "release": [0.0],
+            "field": {"amplitude": b * amplitude, "frequency": f * frequency, "axis": [0.0, 0.0, 1.0], "delay": 0.1},
+        }
+        for b, f in ((1.0, 1.0), (0.7, 1.6), (0.85, 0.7))
+    ]
+
+
 def creases(pairs, stiffness: float, viscosity: float) -> list[dict]:
     return [
         {"name": f"fold{n + 1}", "panels": list(p), "stiffness": stiffness, "viscosity": viscosity}
@@ -60,6 +103,9 @@ def draw(structure: str, rng: np.random.Generator) -> dict:
         "rate": int(rng.choice([120, 240])),
         "noise": float(np.exp(rng.uniform(np.log(3e-3), np.log(8e-3)))),
     }
+    if structure == "crawler":
+        crawler(o, vary, rng)
+        return o
     if structure == "hanging_strip":
         count, side = int(rng.integers(3, 5)), 0.03 * vary(0.1)
         vertices, faces = strip([side] * count, side)

@@ -8,7 +8,7 @@ from recorder import channels, readings, tracked, write
 from world import FINE, Law, Motion, Numbers, World
 
 STRETCH = 1.0
-"""Length of the stretches over which d' is taken [s]."""
+"""Length of the stretches over which d' is taken [s]; what nothing holds starts from rest, as one stretch."""
 
 EVERY = 4
 """Of the samples of a motion, which are used for d'."""
@@ -18,6 +18,7 @@ FACTORS = {
     "crease_viscosity.viscosity": "viscosity",
     "inertia.mass": "mass",
     "magnetic_torque.remanence": "remanence",
+    "coulomb.friction_coefficient": "friction",
 }
 
 
@@ -47,6 +48,8 @@ class RigidCase:
     def __init__(self, o: dict, factors: dict[str, float]):
         self.o, self.factors = o, factors
         self._tangents: list | None = None
+        self._rest = o["held"] is None
+        self._plain: dict[int, np.ndarray] = {}
         noise = np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12))
         self._sigma = noise / np.sqrt(o["rate"] * EVERY / FINE)
 
@@ -65,7 +68,9 @@ class RigidCase:
         world, out = self.world(laws), []
         for r in self.o["recordings"]:
             q0 = np.array(r["release"])
-            if "field" in r:
+            if self._rest:
+                q0 = np.zeros(len(world.joints))
+            elif "field" in r:
                 still = {"field": {**r["field"], "amplitude": 0.0}}
                 q0 = world.run(still, world.settled(), duration=1.5).angles[-1]
             out.append(world.run(r, q0, duration=self.duration(r) + 0.2))
@@ -82,9 +87,14 @@ class RigidCase:
         if fresh or self._tangents is None:
             self._tangents = [self._tangent(r, m, k) for r, m, k in stretches]
         rows = []
-        for (r, m, k), (basis, _) in zip(stretches, self._tangents, strict=True):
-            times = m.times[k : k + round(STRETCH * FINE) + 1 : EVERY]
-            gap = readings(plain, m, times, chain) - self._stretch(plain, r, m.angles[k], m.rates[k], m.times[k])
+        for n, ((r, m, k), (basis, _)) in enumerate(zip(stretches, self._tangents, strict=True)):
+            times = m.times[k : k + round(self._length(r) * FINE) + 1 : EVERY]
+            without = self._plain.get(n)
+            if without is None:
+                without = self._stretch(plain, r, m.angles[k], m.rates[k], m.times[k])
+            if self._rest:  # it starts alike, whatever is concealed
+                self._plain[n] = without
+            gap = readings(plain, m, times, chain) - without
             d = gap.ravel() / self._sigma
             rows.append(d - basis @ (basis.T @ d))
         t, d = np.concatenate([c for _, c in self._tangents]), np.concatenate(rows)
@@ -94,16 +104,19 @@ class RigidCase:
     def _stretches(self, motions: list[Motion]):
         """Recording, motion and first sample of every stretch."""
         for r, m in zip(self.o["recordings"], motions, strict=True):
-            for start in np.arange(0.0, self.duration(r) - 0.5 * STRETCH, STRETCH):
+            for start in [0.0] if self._rest else np.arange(0.0, self.duration(r) - 0.5 * STRETCH, STRETCH):
                 yield r, m, round(start * FINE)
+
+    def _length(self, r: dict) -> float:
+        return self.duration(r) if self._rest else STRETCH
 
     def _stretch(self, world: World, r: dict, q, w, start: float) -> np.ndarray:
         """Readings (n, D) of one stretch from a start."""
-        return channels(world, world.run(r, q, w, duration=STRETCH, start=start).angles)[::EVERY]
+        return channels(world, world.run(r, q, w, duration=self._length(r), start=start).angles)[::EVERY]
 
     def _tangent(self, r: dict, m: Motion, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Orthonormal columns of what the start takes up, and columns of the numbers per standard deviation."""
-        q, w, start, e = m.angles[k], m.rates[k], m.times[k], np.eye(len(self.o["creases"]))
+        q, w, start, e = m.angles[k], m.rates[k], m.times[k], np.eye(0 if self._rest else len(self.o["creases"]))
         plain, priors = self.world(), self.o["priors"]
         base = self._stretch(plain, r, q, w, start)
         local = [(self._stretch(plain, r, q + 1e-4 * v, w, start) - base) / 1e-4 for v in e]
@@ -112,8 +125,10 @@ class RigidCase:
         for n, spread in priors.items():
             other = self.world(**{n: self.factors.get(n, 1.0) * 1.001})
             common.append((self._stretch(other, r, q, w, start) - base) / 1e-3 * spread)
-        local, common = (np.stack([v.ravel() for v in vs], axis=1) / self._sigma for vs in (local, common))
-        basis, _ = np.linalg.qr(local)
+        common = np.stack([v.ravel() for v in common], axis=1) / self._sigma
+        basis = np.zeros((len(common), 0))
+        if local:
+            basis, _ = np.linalg.qr(np.stack([v.ravel() for v in local], axis=1) / self._sigma)
         return basis, common - basis @ (basis.T @ common)
 
     # --- what nobody lists
@@ -124,6 +139,13 @@ class RigidCase:
         weight = o["density"] * o["thickness"] * still.areas[1] * o["gravity"]
         push = 0.02 * weight * float(np.ptp(still.corners[1], axis=0).max())
         errors = {"errors": (0.01 * rng.normal(size=len(o["faces"]))).tolist()}
+        if self._rest:
+            return [
+                entry("panel_masses", 1.0, extra=errors),
+                entry("length_scale", float(2e-3 * rng.normal())),
+                entry("air_drag", float(rng.uniform(0.3, 1.2))),
+                entry("clock_rate", float(1e-3 * rng.normal())),
+            ]
         return [
             entry("panel_masses", 1.0, extra=errors),
             entry("angle_offset", float(3e-3 * rng.normal())),

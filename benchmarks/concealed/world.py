@@ -1,16 +1,27 @@
-"""The truth: the object as rigid bodies in MuJoCo, with concealed laws applied as forces at every step."""
+"""The truth: the object as rigid bodies in MuJoCo, with concealed laws applied as forces at every step.
+
+An object that nothing holds moves in the plane of x and z, on its feet.
+"""
 
 import math
 from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+from feet import Foot
 
 STEP = 1.3e-4
 """Longest step [s]. Semi-implicit Euler: at 100 rad/s the period is right to (100 * 1.3e-4)^2 / 24 = 7e-6."""
 
+WALKING = 4.4e-5
+"""The same for what stands on feet [s]."""
+
 FINE = 480.0
 """Samples per second that are kept; frames are splines through them."""
+
+
+ROOT = {"shift": ("slide", "1 0 0"), "rise": ("slide", "0 0 1"), "pitch": ("hinge", "0 -1 0")}
+"""Joints of the first panel where nothing holds it."""
 
 
 @dataclass
@@ -18,7 +29,7 @@ class Numbers:
     """What the object really has, as opposed to what its description says: factors and changes by place.
 
     Attributes:
-        stiffness, viscosity: factors by crease. mass: factors by panel. remanence: factors by panel.
+        stiffness, viscosity: factors by crease. mass, remanence: factors by panel. friction: coefficients by foot.
         lift: shift of a panel's centre of mass along its normal [m]. tilt: lean of gravity in x and y [rad].
     """
 
@@ -28,11 +39,13 @@ class Numbers:
     remanence: np.ndarray
     lift: np.ndarray
     tilt: np.ndarray
+    friction: np.ndarray
 
     @classmethod
     def described(cls, o: dict) -> "Numbers":
         j, p = len(o["creases"]), len(o["faces"])
-        return cls(np.ones(j), np.ones(j), np.ones(p), np.ones(p), np.zeros(p), np.zeros(2))
+        friction = np.array([f["friction"] for f in o.get("feet", ())])
+        return cls(np.ones(j), np.ones(j), np.ones(p), np.ones(p), np.zeros(p), np.zeros(2), friction)
 
     def copy(self) -> "Numbers":
         return Numbers(*(getattr(self, f).copy() for f in self.__dataclass_fields__))
@@ -40,7 +53,7 @@ class Numbers:
 
 @dataclass
 class Motion:
-    """times (n,), angles and rates (n, J)."""
+    """times (n,), angles and rates (n, J); of what nothing holds, then those of `ROOT`."""
 
     times: np.ndarray
     angles: np.ndarray
@@ -80,6 +93,12 @@ class World:
         self.model = mujoco.MjModel.from_xml_string(self._xml())
         self.data = mujoco.MjData(self.model)
         self.count = len(o["creases"])
+        self.joints = [f"j{n}" for n in range(self.count)] + (list(ROOT) if o["held"] is None else [])
+        self.feet = []
+        for f, mu in zip(o.get("feet", ()), self.numbers.friction, strict=True):
+            p = f["panel"]
+            arm = np.array([f["at"], 0.0, 0.0]) - self.centres[p] - self.numbers.lift[p] * self.normals[p]
+            self.feet.append(Foot(f, arm, float(mu)))
         self.torque = np.zeros(self.count)
         self.wrench = np.zeros((len(o["faces"]), 6))
         moment = {m["panel"]: np.array(m["poling"]) * m["moment"] for m in o["magnets"]}
@@ -130,29 +149,34 @@ class World:
                 f'<inertial pos="{text(centre)}" mass="{text(mass)}" diaginertia="{text(inertia)}"/>{below}</body>'
             )
 
-        held = o["held"]
+        held, root = o["held"], ""
+        if held is None:
+            root = "".join(f'<joint name="{n}" type="{t}" axis="{a}"/>' for n, (t, a) in ROOT.items())
         return (
             '<mujoco><compiler angle="radian" balanceinertia="false" boundmass="0" boundinertia="0"/>'
             f'<option gravity="{text(gravity)}" integrator="Euler"><flag contact="disable"/></option>'
-            f"<worldbody>{panel(held, np.zeros(3))}</worldbody></mujoco>"
+            f"<worldbody>{panel(held or 0, np.zeros(3), root)}</worldbody></mujoco>"
         )
 
     def run(self, recording: dict, q0, w0=None, *, duration: float, start: float = 0.0) -> Motion:
         """The motion from angles q0 and rates w0 at time `start` of the recording."""
         m, d = self.model, self.data
         mujoco.mj_resetData(m, d)
-        order = [m.joint(f"j{n}").qposadr[0] for n in range(self.count)]
-        dofs = [m.joint(f"j{n}").dofadr[0] for n in range(self.count)]
+        order = [m.joint(n).qposadr[0] for n in self.joints]
+        dofs = [m.joint(n).dofadr[0] for n in self.joints]
+        hinges = dofs[: self.count]
         d.qpos[order] = q0
         d.qvel[dofs] = 0.0 if w0 is None else w0
-        every = math.ceil(1.0 / FINE / STEP - 1e-9)
+        every = math.ceil(1.0 / FINE / (WALKING if self.feet else STEP) - 1e-9)
         dt = m.opt.timestep = 1.0 / FINE / every
         frames = round(duration * FINE) + 1
         drive = recording.get("field")
         axis = np.array(drive["axis"]) * drive["amplitude"] if drive else None
         for law in self.laws:
             law.reset(self, list(map(float, q0)))
-        out, rates = np.empty((frames, self.count)), np.empty((frames, self.count))
+        for foot in self.feet:
+            foot.rest()
+        out, rates = np.empty((2, frames, len(order)))
         bodies = [self.body[p] for p in range(len(self.o["faces"]))]
         turned = [self.body[p] for p in self.magnetic]
         turn, crossed = d.xmat.reshape(-1, 3, 3), np.zeros((3, 3))  # a view, and what turns m into m x b: m @ crossed
@@ -162,12 +186,12 @@ class World:
             out[n], rates[n] = d.qpos[order], d.qvel[dofs]
             for k in range(every):
                 t = start + (n * every + k) * dt
-                if acting or drive:
+                if acting or drive or self.feet:
                     self.torque[:] = 0.0
                     self.wrench[:] = 0.0
                     mujoco.mj_kinematics(m, d)
                 if drive:
-                    b = axis * math.sin(2 * math.pi * drive["frequency"] * t)
+                    b = axis * wave(drive, t)
                     for law in fielding:
                         b = law.field(b, dt)
                     bx, by, bz = b.tolist()
@@ -178,8 +202,10 @@ class World:
                     q, w = d.qpos[order].tolist(), d.qvel[dofs].tolist()
                     for law in acting:
                         law.act(self, t, q, w, dt)
-                if acting or drive:
-                    d.qfrc_applied[dofs] = self.torque
+                for foot in self.feet:
+                    foot.press(self, dt)
+                if acting or drive or self.feet:
+                    d.qfrc_applied[hinges] = self.torque
                     d.xfrc_applied[bodies] = self.wrench
                 mujoco.mj_step(m, d)
         return Motion(start + np.arange(frames) / FINE, out, rates)
@@ -212,6 +238,12 @@ class World:
         spin, velocity = d.cvel[b, :3], d.cvel[b, 3:]  # at the centre of mass of the whole tree
         arm = d.xipos[b] - d.subtree_com[self.model.body_rootid[b]]
         return d.xmat[b].reshape(3, 3), spin, velocity + cross(spin, arm)
+
+
+def wave(drive: dict, t):
+    """What a field that oscillates is of its amplitude, at times; it may set in later."""
+    since = np.maximum(t - drive.get("delay", 0.0), 0.0)
+    return np.sin(2 * np.pi * drive["frequency"] * since)
 
 
 def cross(a, b) -> np.ndarray:

@@ -286,11 +286,16 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
         block = next(b for b in probe.blocks if b.recording == index)
         head = slice(0, max(4, len(values) // 100))
         now, _ = probe._channel_tangent(recording, block.pose, values[0])
+        # a start on the ground is better guessed than fitted: where feet touch turns on micrometres
+        standing = probe.articulation.floating and len(probe.model.contacts) and len(set(_units(recording))) == 1
+        if standing and len(values) >= 4 * words.WINDOW:  # a tracker that smooths hides its noise from the next frames
+            noise = np.maximum(noise, np.sqrt(np.nan_to_num(np.nanmedian(words.scatter(values), axis=0))))
         with np.errstate(invalid="ignore"):
             away = np.nanmedian(values[head], axis=0) - now
             drift = np.nanstd(values[head], axis=0)
         scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
-        if np.any(np.abs(away) > np.maximum(0.05 * scale, 5 * noise)) or np.any(drift > 0.2 * scale):
+        moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max()), 3 * noise) if standing else 0.2 * scale
+        if np.any(np.abs(away) > np.maximum(0.05 * scale, 5 * noise)) or np.any(drift > moves):
             return "fit" if probe.articulation.size else "rest"
     return "rest"
 

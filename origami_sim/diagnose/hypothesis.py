@@ -189,12 +189,15 @@ def apply(
     index = 0
     for s in hypothesis.suspects:
         for f in s.free:
-            value = float(np.clip(values[index], *get(s.effect).parameter(f.name).bounds))
-            if s.effect in given:  # more of what the model has
+            bounds = get(s.effect).parameter(f.name).bounds
+            if s.effect in given:  # more or less of what the model has
                 mine = slice(None) if s.entities is None else np.array(s.entities)
-                out.set(s.effect, f.name, parameters[s.effect, f.name][mine] + value, s.entities)
+                out.set(
+                    s.effect, f.name, np.clip(parameters[s.effect, f.name][mine] + values[index], *bounds), s.entities
+                )
                 index += 1
                 continue
+            value = float(np.clip(values[index], *bounds))
             everywhere = s.entities is None or s.kind == "measurement"  # channels are told apart where they are read
             out.set(s.effect, f.name, value, None if everywhere else np.array(s.entities))
             index += 1
@@ -204,12 +207,12 @@ def apply(
 def suspects(
     model: Model, recordings: Sequence[Recording], drive: Drive, parameters: Parameters | None = None
 ) -> list[Suspect]:
-    """Everything in the catalogue that could act on this object, and more of what its model has at one place.
+    """Everything in the catalogue that could act on this object, and more or less of what its model has at one place.
 
     An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
-    channel of its kind was recorded; one of the ground, if the device has contact points. Creases and panels are
-    suspected one by one and all together. An effect that the model has to state (`Effect.stated`) is a suspect where it
-    does so and leaves it at no strength.
+    channel of its kind was recorded; one of the ground, if the device has contact points. Creases, panels and feet
+    (contact points of one name) are suspected one by one and all together. An effect that the model has to state
+    (`Effect.stated`) is a suspect where it does so and leaves it at no strength.
     """
     kinds = {c.kind for r in recordings for c in r.channels.values()}
     driven = _driven(recordings, drive)
@@ -218,7 +221,7 @@ def suspects(
         if not effect.fitted or not model.count(effect.family):
             continue
         if name in model.effects and not (effect.stated and parameters and _off(parameters, name)):
-            found += _more_of(model, name)
+            found += _more_of(model, name, parameters)
             continue
         if effect.stated and name not in model.effects:
             continue
@@ -239,15 +242,19 @@ def suspects(
     return found
 
 
-def _more_of(model: Model, name: str) -> list[Suspect]:
-    """An effect that the model has, stronger at one crease or panel than was thought."""
+def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Suspect]:
+    """An effect that the model has, stronger or weaker at one crease, panel or foot than was thought."""
     effect = get(name)
     each = [s for s in _sites(model, effect.family) if s[2] is not None]
-    if effect.family not in ("crease", "triangle") or len(each) < 2:
+    if effect.family not in ("crease", "triangle", *CONTACTS) or len(each) < 2:
         return []
     out = []
     for site, kind, entities in each:
         strength = _free(name, effect.fitted[0], entities)
+        if parameters:  # no less than nothing is left
+            strength = replace(
+                strength, lower=strength.lower - float(np.min(parameters[name, strength.name][list(entities)]))
+            )
         out.append(Suspect(name, site, kind, (strength,), entities, len(each)))
     return out
 
@@ -279,7 +286,9 @@ def _sites(model: Model, family: str):
     if family in DISTORTIONS:
         return [("the " + family, family, None)]
     if family in CONTACTS:
-        return [("the ground", "ground", None)]
+        names = [model.name("contact", k) for k in range(len(model.contacts))]
+        feet = {n: tuple(k for k, m in enumerate(names) if m == n) for n in dict.fromkeys(names) if names.count(n) > 1}
+        return [*((n, "ground", feet[n]) for n in feet if len(feet) > 1), ("the ground", "ground", None)]
     if family == "crease":
         each = [(model.name("crease", c), "crease", (c,)) for c in range(len(model.creases))]
         return each if len(each) == 1 else [*each, ("all creases", "crease", None)]

@@ -187,8 +187,12 @@ class _Weighed:
 
     @property
     def leaves(self) -> bool:
-        """Whether the best leaves more structure than an inexact law does; one that may be small, most of it."""
-        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else INEXACT)
+        """Whether the best leaves more structure than inexact laws do; one that may be small, most of it.
+
+        Several effects bend to anything: of 43 pairs that were right, none left more than a sixtieth.
+        """
+        allowed = INEXACT / max(len(self.best.hypothesis.suspects), 1)
+        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else allowed)
 
     @property
     def fall(self) -> str:
@@ -299,7 +303,17 @@ def _refuted(w: _Weighed) -> _Said | None:
         text += "are effects that mostly cancel each other, as if both stood for one with another law"
     else:
         return None
-    return _Said("UNKNOWN", f"{text}; {w.fall}.", np.nan, [w.best.hypothesis.label], w.best)
+    return _Said("UNKNOWN", f"{text}{_as_well(w)}; {w.fall}.", np.nan, [w.best.hypothesis.label], w.best)
+
+
+def _as_well(w: _Weighed) -> str:
+    """What these recordings do not tell from the closest, in words."""
+    others = [f for f in w.kept if _effects(f) != _effects(w.best) and not _labels(f) > _labels(w.best)]
+    names = _distinct([f for f in others if f.hypothesis.suspects])
+    if not names:
+        return ""
+    some = [*names[:3], f"{len(names) - 3} more"] if len(names) > 4 else names
+    return f"; these recordings do not tell that from {_join(some)}"
 
 
 def _quiet(w: _Weighed) -> bool:
@@ -451,14 +465,19 @@ def floor_of(forward, best: Fit) -> np.ndarray:
     width = [1 if c.values.ndim == 1 else c.values.shape[1] for c in channels]
     read = np.repeat([c.noise_report is not None and c.noise == c.noise_report.level for c in channels], width)
     if min(map(len, best.residuals)) >= 2 * WINDOW:
-        parts = np.concatenate([r[: len(r) // WINDOW * WINDOW].reshape(-1, WINDOW, len(floor)) for r in best.residuals])
-        q, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, WINDOW), 3))
-        fast = parts - np.einsum("ij,kj,nkd->nid", q, q, parts)  # nan where a frame of the window is missing
-        variance = np.sum(fast**2, axis=1) / (WINDOW - 3)
+        variance = np.concatenate([scatter(r) for r in best.residuals])
         seen = np.isfinite(variance)
-        scatter = np.sqrt(np.sum(np.where(seen, variance, 0.0), axis=0) / np.maximum(seen.sum(axis=0), 1))
-        floor[read] = np.maximum(floor, scatter)[read]
+        fast = np.sqrt(np.sum(np.where(seen, variance, 0.0), axis=0) / np.maximum(seen.sum(axis=0), 1))
+        floor[read] = np.maximum(floor, fast)[read]
     return floor
+
+
+def scatter(values: np.ndarray) -> np.ndarray:
+    """(K, D) variance of values (n, D) about a parabola over each window; nan where a frame of it is missing."""
+    parts = values[: len(values) // WINDOW * WINDOW].reshape(-1, WINDOW, values.shape[1])
+    q, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, WINDOW), 3))
+    fast = parts - np.einsum("ij,kj,nkd->nid", q, q, parts)
+    return np.sum(fast**2, axis=1) / (WINDOW - 3)
 
 
 def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:

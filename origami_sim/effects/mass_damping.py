@@ -1,7 +1,5 @@
 """Drag proportional to mass and velocity, the usual stand-in for air."""
 
-import math
-
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
@@ -17,7 +15,7 @@ EFFECT = Effect(
     family="node",
     force=force,
     parameters=(
-        Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, math.inf), "rate at which free motion decays", typical=0.5),
+        Parameter("decay_rate", "alpha", "1/s", 0.0, (0.0, 1e4), "rate at which free motion decays", typical=0.5),
     ),
     fitted=("decay_rate",),
     damping=lambda p: p["decay_rate"] * p["mass"],

@@ -18,6 +18,9 @@ from origami_sim.scene import scene_module, scene_settings
 RIGIDITY = 6e4
 """Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.01 mm."""
 
+LOSS = 0.1
+"""Part of critical damping of a foot on the ground."""
+
 DIAGONAL_STIFFNESS = 1.0
 """Of the diagonals of a panel, some 2500 times that of a crease [N m/rad]."""
 
@@ -47,7 +50,10 @@ def panels(o: dict) -> Subject:
         modulus=1.5e6,
         triangulation="center",
     )
-    sheet.fix(panels=[o["held"]])
+    if o["held"] is not None:
+        sheet.fix(panels=[o["held"]])
+    else:  # between two glass plates
+        sheet.fix(nodes=range(len(x)), axes="y")
     corners = [x[f] for f in faces]
     area = sum(
         np.linalg.norm(sum(np.cross(c[k] - c[0], c[k + 1] - c[0]) for k in range(1, len(c) - 1))) / 2
@@ -64,6 +70,16 @@ def panels(o: dict) -> Subject:
     sheet.gravity((0.0, 0.0, -o["gravity"]))
     sheet.membrane_damping = 0.0
     sheet.name("panel", [f"panel{p}" for p in range(len(faces))])
+    for foot in o.get("feet", ()):
+        leg = x[faces[foot["panel"]][0], 2]
+        sides = np.unique(x[faces[foot["panel"]], 1])
+        at = [sheet.contact(foot["panel"], (foot["at"], y, leg), offset=-leg, name=foot["name"]) for y in sides]
+        sheet.set("coulomb", at, friction_coefficient=foot["friction"])
+        load = foot["load"] / len(at)
+        for effect, force in (("ground", load), ("friction", foot["friction"] * load)):
+            stiffness = force / foot["give"]
+            damping = 2.0 * LOSS * np.sqrt(stiffness * load / o["gravity"])
+            sheet.set(effect, at, stiffness=stiffness, damping=damping)
     model, parameters = sheet.build()
     middles = model.position[model.creases[:, 1:3]].mean(1)
     names = [""] * len(middles)

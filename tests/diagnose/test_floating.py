@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
+from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
-from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared
+from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared, starting
+from origami_sim.diagnose.forward import drive_of
+from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.locate import locate, motion, touching
 from origami_sim.diagnose.track import track
-from origami_sim.recording import Channel, Recording
+from origami_sim.drive import Drive
+from origami_sim.materials import MU0
+from origami_sim.pattern.assemble import assemble
+from origami_sim.recording import Camera, Channel, Recording
+from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import cube_toss
 from origami_sim.solve.dynamics import simulate
@@ -97,3 +104,69 @@ def test_what_touches_is_near_or_about_to_be():
     gaps = np.array([[0.05, 0.03, 0.01, 0.008, 0.02, 0.05]])
     assert touching(gaps, 1e-4).tolist() == [False, False, True, False, False, False]
     assert not np.any(touching(np.zeros((0, 4)), 1e-3))
+
+
+# --- on feet
+
+
+def walker():
+    """Two panels on legs, with magnets against each other; feet of one name are a pair of points."""
+    leg, x = 0.008, (0.0, 0.022, 0.04)
+    vertices = np.array([[a, side * 0.01, leg] for a in x for side in (-1, 1)])
+    sheet = Sheet(assemble(vertices, [(0, 2, 3, 1), (2, 4, 5, 3)]), thickness=1.5e-3, density=2200.0, modulus=1.5e6,
+                  triangulation="center")  # fmt: skip
+    sheet.fix(nodes=range(6), axes="y")
+    sheet.on("bars").set("bars", stiffness=1500.0)
+    sheet.crease(stiffness=5e-3).set("crease_viscosity", viscosity=3e-4)
+    for panel, moment in ((0, 0.04), (1, -0.035)):
+        sheet.magnetise(panel, remanence=1.0, volume=abs(moment) * MU0, poling=(np.sign(moment), 0, 0))
+    sheet.gravity((0.0, 0.0, -9.81))
+    sheet.membrane_damping = 0.0
+    for panel, at, name in ((0, x[0], "rear foot"), (1, x[2], "front foot")):
+        for y in (-0.01, 0.01):
+            sheet.contact(panel, (at, y, leg), offset=-leg, name=name)
+    sheet.set("coulomb", friction_coefficient=0.5)
+    for effect in ("ground", "friction"):
+        sheet.set(effect, stiffness=1000.0, damping=0.1)
+    return sheet.build()
+
+
+def walked(model, parameters, *, noise: float, seed=0) -> Recording:
+    """Three edges from the side, by a tracker that smooths and rounds."""
+    rng = np.random.default_rng(seed)
+    wait = np.arange(0.0, 0.85, 1 / 120)
+    field = np.zeros((len(wait), 3))
+    field[:, 2] = 0.055 * np.sin(2 * np.pi * 2.5 * np.maximum(wait - 0.1, 0.0))
+    drive = {"field": DriveChannel("field", field, "T", False, times=wait)}
+    made = simulate(model, parameters, drive_of(Recording("walk", wait, {}, drive), Drive()), duration=0.8, rate=120)
+    channels = {}
+    for n in (0, 2, 4):
+        e = noise * rng.normal(size=(len(made.times), 2))
+        e[1:-1] = 0.25 * e[:-2] + 0.5 * e[1:-1] + 0.25 * e[2:]
+        values = np.round((made.x[:, n, 0][:, [0, 2]] + e) / (noise / 2)) * noise / 2
+        channels[f"edge{n}"] = Channel(f"edge{n}", "marker_2d", values, "m", estimate_noise(made.times, values),
+                                       {"node": n}, camera=Camera(np.zeros(3), np.eye(3)[[0, 2]]))  # fmt: skip
+    return Recording("walk", made.times, channels, drive)
+
+
+def test_each_foot_is_suspected_by_itself_of_more_or_less_friction():
+    model, parameters = walker()
+    recording = walked(model, parameters, noise=3e-4)
+    found = suspects(model, [recording], Drive(), parameters)
+    sites = {s.site: s for s in found if s.effect == "coulomb"}
+    assert set(sites) == {"rear foot", "front foot"} and sites["rear foot"].entities == (0, 1)
+    assert {s.site for s in found if s.effect == "adhesion"} == {"rear foot", "front foot", "the ground"}
+    rear = sites["rear foot"]
+    assert rear.free[0].lower == pytest.approx(-0.5)
+    for more, expected in ((0.2, 0.7), (-0.2, 0.3), (-0.9, 0.0)):
+        changed = apply(parameters, Hypothesis((rear,)), [more], model)["coulomb", "friction_coefficient"]
+        assert np.ravel(changed) == pytest.approx([expected, expected, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_stands_starts_from_rest_however_the_tracker_smooths(seed):
+    model, parameters = walker()
+    recording = walked(model, parameters, noise=3e-4, seed=seed)
+    subject = Subject.from_model(model, parameters, Drive(), [])
+    assert starting(subject, [recording]) == "rest"
+    assert starting(subject, [recording.window(0.3, 0.8)]) == "fit"

@@ -17,7 +17,7 @@ from origami_sim.scene import scene_module, scene_settings
 pytest.importorskip("mujoco", reason="the truth of the proof needs MuJoCo: pip install 'origami-sim[proof]'")
 
 
-MODULES = ("beam", "coupon", "draw", "laws", "objects", "recorder", "rigid", "rivals", "strata", "world")
+MODULES = ("beam", "coupon", "draw", "feet", "laws", "objects", "recorder", "rigid", "rivals", "strata", "world")
 
 
 @pytest.fixture
@@ -131,6 +131,62 @@ def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
     motion = simulate(model, parameters, drive, duration=0.3, rate=480, state=state)
     lag = truth["world"].STEP * np.abs(expected.rates).max()
     assert np.abs(motion.creases[:, order, 0] - expected.angles).max() < 1.5 * lag + 5e-4
+
+
+def test_a_crawler_walks_alike_in_both(truth, tmp_path):
+    """Hunt-Crossley and Dahl against spring, dashpot and bristle: 1 % of the walk, and less than the camera's noise."""
+    from origami_sim.drive import Drive, sine
+    from origami_sim.solve.dynamics import simulate
+
+    o = truth["objects"].draw("crawler", np.random.default_rng(3))
+    (tmp_path / "object.json").write_text(json.dumps(o))
+    model, parameters, _ = case.subject(tmp_path).build({})
+    world, r = truth["world"].World(o), o["recordings"][0]
+    f = r["field"] = {**r["field"], "delay": 0.0}
+    drive = Drive(field=(0, 0, sine(f["amplitude"], f["frequency"])))
+    motion = world.run(r, np.zeros(len(world.joints)), duration=1.5)
+    expected = truth["recorder"].channels(world, motion.angles)
+    made = simulate(model, parameters, drive, duration=1.5, rate=480)
+    found = np.concatenate([made.x[:, 2 * n, 0][:, [0, 2]] for n in range(3)], axis=1)
+    walked = found[-1] - found[0]
+    assert abs(walked[0]) > 4e-3
+    assert np.abs((expected[-1] - expected[0] - walked)[[0, 2, 4]]).max() < 0.02 * abs(walked[0])
+    assert np.sqrt(np.mean((found - expected) ** 2, axis=0)).max() < o["noise"] / 2
+
+
+@pytest.mark.parametrize(("law", "strength"), [("", 0.0), ("foot_friction", 0.2), ("adhesion", 5e-3)])
+def test_feet_hold_up_to_their_coefficient(truth, law, strength):
+    """On a slope without a field: what stays is below, what slides above tan = mu, larger by what is concealed."""
+    o = truth["objects"].draw("crawler", np.random.default_rng(4))
+    o["creases"][0]["stiffness"] *= 100  # as one body
+    mu, weight = o["feet"][0]["friction"], 2 * o["feet"][0]["load"]
+    height, span = o["vertices"][0][2], o["feet"][1]["at"]
+    # the lower foot, which rubs more, bears half and what the lean adds
+    one = (mu + strength * 0.5) / (1.0 - strength * height / span)
+    most = {"": mu, "foot_friction": one, "adhesion": mu * (1 + 4 * strength / weight)}[law]
+
+    def slides(lean: float, duration=0.3) -> float:
+        numbers = truth["world"].Numbers.described(o)
+        numbers.tilt[0] = lean
+        laws = (truth["laws"].build(law, strength, 1, {}),) if law else ()
+        world = truth["world"].World(o, numbers, laws)
+        motion = world.run({}, [0.0, 0.0, -o["feet"][0]["give"], 0.0], duration=duration)
+        return float(motion.rates[-1, world.count])
+
+    assert abs(slides(0.95 * most)) < 1e-3
+    assert slides(1.1 * most) == pytest.approx(o["gravity"] * 0.1 * most * 0.3, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "left"), [("ageing_friction", 0.0), ("static_friction", 0.2 / (1 + 30**2))])
+def test_friction_of_rest_is_lost_by_sliding(truth, name, left):
+    o = truth["objects"].draw("crawler", np.random.default_rng(4))
+    law = truth["laws"].build(name, 0.2, 0, {})
+    world = truth["world"].World(o, laws=(law,))
+    world.run({}, np.zeros(len(world.joints)), duration=0.5)
+    rested = o["feet"][0]["friction"] + 0.2
+    assert [f.friction for f in world.feet] == pytest.approx([rested, rested], rel=0.01)
+    world.run({}, np.zeros(len(world.joints)), [0.0, 0.33, 0.0, 0.0], duration=0.005)
+    assert [f.friction for f in world.feet] == pytest.approx([o["feet"][0]["friction"] + left] * 2, rel=0.01)
 
 
 def test_strength_gives_the_wanted_detectability(truth):
