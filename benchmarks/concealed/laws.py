@@ -311,14 +311,14 @@ HELD = ("pendulum_chain", *FOLDED)
 STRIPS = ("hanging_strip", "pendulum_chain", "magnetic_strip")
 
 INSIDE: dict[str, Concealed] = {
-    "dry_friction": Concealed(DryFriction, ("crease_friction",), number="friction_moment"),
+    "dry_friction": Concealed(DryFriction, ("crease_friction",), largest=1.0, number="friction_moment"),
     "quadratic_damping": Concealed(QuadraticDamping, ("crease_quadratic_damping",), first=5e-3, number="coefficient"),
     "air_drag": Concealed(
         AirDrag, ("air_drag",), "all panels", 2.0, False, largest=10.0, only=HELD, number="drag_coefficient"
     ),
-    "hysteresis": Concealed(Hysteresis, ("crease_hysteresis",), only=ELASTIC, number="hysteresis_moment"),
+    "hysteresis": Concealed(Hysteresis, ("crease_hysteresis",), largest=1.0, only=ELASTIC, number="hysteresis_moment"),
     "relaxation": Concealed(Relaxation, ("crease_relaxation",), first=0.3, only=ELASTIC, number="stiffness_1"),
-    "stiffening": Concealed(Stiffening, ("crease_stiffening",), first=0.3, number="cubic_stiffness"),
+    "stiffening": Concealed(Stiffening, ("crease_stiffening",), first=0.3, largest=30.0, number="cubic_stiffness"),
     "asymmetry": Concealed(
         Asymmetry, ("crease_asymmetry",), signed=True, largest=0.8, only=ELASTIC, number="valley_stiffness"
     ),

@@ -189,7 +189,7 @@ class _Weighed:
     def leaves(self) -> bool:
         """Whether the best leaves more structure than inexact laws do; one that may be small, most of it.
 
-        Several effects bend to anything: of 43 pairs that were right, none left more than a sixtieth.
+        Several effects bend to anything: of 25 pairs that were right, none left more than a sixtieth.
         """
         allowed = INEXACT / max(len(self.best.hypothesis.suspects), 1)
         return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else allowed)
