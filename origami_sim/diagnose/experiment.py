@@ -15,38 +15,44 @@ from origami_sim.drive import Drive, Signal
 WANTED = 5.0
 """Separation d' at which two explanations count as told apart."""
 
+TOLD = 1.0
+"""Separation in the best experiment of the menu below which a rival is left out: no number of repeats would do."""
+
 
 def propose(
     forward: Forward, judged, weights: Weights, *, progress: Callable[[float], None] | None = None, most: int = 4
 ) -> list[Experiment]:
-    """Experiments, best first: the expected whitened separation of the best explanation from its strongest rivals.
+    """Experiments, best first: the expected whitened separation of the best explanation from the nearest of its rivals.
 
-    Each experiment is simulated under both explanations from the same start. What the rival's numbers, known as well as
-    the recordings left them, and a new start could still absorb is projected out.
+    Rivals that nothing in the menu would tell from it do not count, unless none would. Each experiment is simulated
+    under both explanations from the same start. What the rival's numbers, known as well as the recordings left them,
+    and a new start could still absorb is projected out.
     """
     rivals = rivals_of(judged)
     if not rivals:
         return []
     menu = forward.menu() if isinstance(forward, CurveForward) else _menu(forward)
-    out = []
-    for n, (what, changed) in enumerate(menu):
-        separations = []
-        for rival in rivals:
+    apart = np.zeros((len(menu), len(rivals)))
+    for n, (_, changed) in enumerate(menu):
+        for k, rival in enumerate(rivals):
             try:
-                separations.append(separation(changed, judged.best, rival, weights))
+                apart[n, k] = separation(changed, judged.best, rival, weights)
             except (FloatingPointError, np.linalg.LinAlgError):
-                separations.append(0.0)
-        d = float(np.min(separations)) if separations else 0.0
-        if np.isfinite(d):
-            repeats = int(np.clip(np.ceil((WANTED / max(d, 0.05)) ** 2), 1, 9999))
-            labels = [judged.best.hypothesis.label, *(r.hypothesis.label for r in rivals)]
-            out.append(Experiment(what, labels, d, repeats))
+                apart[n, k] = 0.0
         if progress:
             progress((n + 1) / len(menu))
+    apart = np.where(np.isfinite(apart), apart, 0.0)
+    told = np.flatnonzero(apart.max(axis=0) >= TOLD)
+    told = told if len(told) else np.arange(len(rivals))
+    labels = [judged.best.hypothesis.label, *(rivals[k].hypothesis.label for k in told)]
+    out = []
+    for (what, _), row in zip(menu, apart, strict=True):
+        d = float(row[told].min())
+        out.append(Experiment(what, labels, d, int(np.clip(np.ceil((WANTED / max(d, 0.05)) ** 2), 1, 9999))))
     return sorted(out, key=lambda e: -e.expected)[:most]
 
 
-def rivals_of(judged, most: int = 2) -> list[Fit]:
+def rivals_of(judged, most: int = 4) -> list[Fit]:
     """The strongest other explanations that were fitted."""
     tied = [f for f in judged.tied if f is not judged.best]
     return tied[:most] if tied else judged.others[:1]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, diagnose
+from origami_sim.diagnose import Options, diagnose, experiment
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import memory, probabilities
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit
@@ -201,3 +201,22 @@ def test_bad_data_are_named():
     short = record(duration=0.05, rate=100)
     with pytest.raises(InputError, match="too short"):
         diagnose(subject(), [short])
+
+
+@pytest.mark.parametrize(("second", "told", "best"), [(0.5, [0, 2], "c"), (3.5, [0, 1, 2], "b")])
+def test_the_next_experiment_is_for_rivals_that_can_be_told(monkeypatch, second, told, best):
+    """The nearest rival counts, but for one that nothing in the menu would tell apart."""
+    apart = {"a": (6.0, 0.5, 3.0), "b": (9.0, second, 2.0), "c": (4.0, 0.1, 4.0)}
+    monkeypatch.setattr(experiment, "_menu", lambda forward: [(w, w) for w in apart])
+    monkeypatch.setattr(experiment, "separation", lambda what, one, rival, weights: apart[what][rival.number])
+
+    def explanation(number):
+        return SimpleNamespace(number=number, hypothesis=SimpleNamespace(label=f"rival {number}"))
+
+    rivals = [explanation(n) for n in range(3)]
+    named = explanation(-1)
+    judged = SimpleNamespace(best=named, tied=[named, *rivals], others=[])
+    found = experiment.propose(None, judged, None)  # pyright: ignore[reportArgumentType]
+    assert found[0].what == best and found[0].separates == ["rival -1", *(f"rival {n}" for n in told)]
+    assert [e.expected for e in found] == sorted((min(apart[w][n] for n in told) for w in apart), reverse=True)
+    assert found[0].repeats == int(np.ceil((5.0 / found[0].expected) ** 2))
