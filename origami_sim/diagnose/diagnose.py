@@ -136,6 +136,7 @@ def diagnose(
     for n, s in enumerate(finalists):
         tell("refit", n / max(len(finalists), 1))
         fits.append(refit(forward, base, s, weights, screening))
+    fits += unbent(forward, base, every, fits, weights, o)
     fits += pairs(forward, base, screening, fits, weights, o)
     rough = screening
     screening, fits, weights = settled(forward, rough, fits, weights)
@@ -384,6 +385,38 @@ def look_elsewhere(screening: Screening, draws: int, seed: int, fits: Sequence[F
             found = max(found, np.sqrt(max(gain, 0.0)))
     return float((1 + np.count_nonzero(highest >= found)) / (draws + 1))
 
+
+FAR = 4.0
+"""Standard deviations from what was recorded beyond which a fitted start makes up for what the model lacks."""
+
+
+def unbent(
+    forward: Forward, base: Fit, every: Sequence[Suspect], fits: Sequence[Fit], weights: Weights, o: Options
+) -> list[Fit]:
+    """The suspects that stand out where starts that were bent to make up for them are put back, fitted from there.
+
+    Seen from a bent start, an effect can have the wrong sign.
+    """
+    if not forward.local:
+        return []
+    told = forward.told(base.hypothesis, base.theta)
+    far = np.array([np.any(np.abs(base.local[b] - told[b]) > FAR * forward.blocks[b].known) for b in base.blocks])
+    if not np.any(far):
+        return []
+    local = base.local.copy()
+    local[np.array(base.blocks)[far]] = told[np.array(base.blocks)[far]]
+    back = fit(forward, base.hypothesis, weights, theta=base.theta, local=local, most=0)
+    if back.failed:
+        return []
+    seen = screen(forward, every, back, weights, most=o.screened)
+    known = {f.hypothesis.label for f in fits}
+    return [
+        refit(forward, back, s, weights, seen, most=8) for s in chosen(seen, UNBENT) if s.suspect.label not in known
+    ]
+
+
+UNBENT = 3
+"""How many of these are fitted."""
 
 TWINS = 5
 """Suspects that look the same as the best explanation and are fitted beside it, at most."""
