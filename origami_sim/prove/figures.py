@@ -105,8 +105,8 @@ def strengths(board: dict, file: Path) -> None:
 
 def worked(board: dict, out: Path) -> None:
     """One case whose effect was named: what was recorded and predicted, and how the explanations compare."""
-    right = [r for r in board["rows"] if r["kind"] == "single" and r["top1"]]
-    for row in sorted(right, key=lambda r: abs(np.log(r["d"] / 15.0))):
+    right = [r for r in board["rows"] if r["kind"] == "single" and r["top1"] and r["found_site"] is not False]
+    for row in sorted(right, key=lambda r: (r["verdict"] == "TIE", abs(np.log(r["d"] / 30.0)))):
         found = json.loads((out / "cases" / f"{row['case']:04d}" / "diagnosis.json").read_text())
         if found.get("worked"):
             break
