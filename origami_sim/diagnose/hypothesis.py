@@ -288,7 +288,11 @@ def _sites(model: Model, family: str):
     if family in CONTACTS:
         names = [model.name("contact", k) for k in range(len(model.contacts))]
         feet = {n: tuple(k for k, m in enumerate(names) if m == n) for n in dict.fromkeys(names) if names.count(n) > 1}
-        return [*((n, "ground", feet[n]) for n in feet if len(feet) > 1), ("the ground", "ground", None)]
+        each = [(n, "ground", k) for n, k in feet.items()] if len(feet) > 1 else []
+        every = tuple(sorted(k for _, _, mine in each for k in mine))
+        if every and len(every) < len(names):  # the belly may touch as well
+            each.append(("all feet", "ground", every))
+        return [*each, ("the ground", "ground", None)]
     if family == "crease":
         each = [(model.name("crease", c), "crease", (c,)) for c in range(len(model.creases))]
         return each if len(each) == 1 else [*each, ("all creases", "crease", None)]

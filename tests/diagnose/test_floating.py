@@ -17,7 +17,7 @@ from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scene import read_calibration
-from origami_sim.scenes import cube_toss
+from origami_sim.scenes import crawler, cube_toss
 from origami_sim.solve.dynamics import simulate
 
 NOISE, RATE = 2e-4, 300.0
@@ -161,6 +161,15 @@ def test_each_foot_is_suspected_by_itself_of_more_or_less_friction():
     for more, expected in ((0.2, 0.7), (-0.2, 0.3), (-0.9, 0.0)):
         changed = apply(parameters, Hypothesis((rear,)), [more], model)["coulomb", "friction_coefficient"]
         assert np.ravel(changed) == pytest.approx([expected, expected, 0.5, 0.5])
+
+
+def test_feet_are_suspected_together_but_without_the_belly():
+    model, parameters, drive = crawler.build(read_calibration("crawler"))
+    recording = walked(*walker(), noise=3e-4)
+    sites = {s.site: s.entities for s in suspects(model, [recording], drive, parameters) if s.effect == "stribeck"}
+    feet = [n for n in sites if n.startswith("foot at")]
+    assert len(feet) == 2 and set(sites) == {*feet, "all feet", "the ground"} and sites["the ground"] is None
+    assert sites["all feet"] == tuple(sorted(k for n in feet for k in sites[n])) and len(sites["all feet"]) == 4
 
 
 @pytest.mark.parametrize("seed", range(4))
