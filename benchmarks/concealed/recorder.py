@@ -84,7 +84,7 @@ def write(folder: Path, name: str, o: dict, recording: dict, times, values, trac
     columns |= {column: values[:, n] for n, column in enumerate(columns_of(o))}
     drive = recording.get("field")
     if drive:
-        b = drive["amplitude"] * wave(drive, times)
+        b = drive["amplitude"] * np.array([wave(drive, t) for t in times])
         columns |= {f"b{a}_T": b * drive["axis"][k] for k, a in enumerate("xyz")}
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(columns), *(",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in rows)]

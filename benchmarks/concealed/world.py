@@ -240,10 +240,9 @@ class World:
         return d.xmat[b].reshape(3, 3), spin, velocity + cross(spin, arm)
 
 
-def wave(drive: dict, t):
-    """What a field that oscillates is of its amplitude, at times; it may set in later."""
-    since = np.maximum(t - drive.get("delay", 0.0), 0.0)
-    return np.sin(2 * np.pi * drive["frequency"] * since)
+def wave(drive: dict, t: float) -> float:
+    """What a field that oscillates is of its amplitude, at a time; it may set in later."""
+    return math.sin(2 * math.pi * drive["frequency"] * max(t - drive.get("delay", 0.0), 0.0))
 
 
 def cross(a, b) -> np.ndarray:

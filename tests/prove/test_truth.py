@@ -134,7 +134,7 @@ def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
 
 
 def test_a_crawler_walks_alike_in_both(truth, tmp_path):
-    """Hunt-Crossley and Dahl against spring, dashpot and bristle: 1 % of the walk, and less than the camera's noise."""
+    """Hunt-Crossley and Dahl against spring, dashpot and bristle: 1 % of the walk, a fifth of the camera's noise."""
     from origami_sim.drive import Drive, sine
     from origami_sim.solve.dynamics import simulate
 
@@ -150,8 +150,8 @@ def test_a_crawler_walks_alike_in_both(truth, tmp_path):
     found = np.concatenate([made.x[:, 2 * n, 0][:, [0, 2]] for n in range(3)], axis=1)
     walked = found[-1] - found[0]
     assert abs(walked[0]) > 4e-3
-    assert np.abs((expected[-1] - expected[0] - walked)[[0, 2, 4]]).max() < 0.02 * abs(walked[0])
-    assert np.sqrt(np.mean((found - expected) ** 2, axis=0)).max() < o["noise"] / 2
+    assert np.abs((expected[-1] - expected[0] - walked)[[0, 2, 4]]).max() < 0.012 * abs(walked[0])
+    assert np.sqrt(np.mean((found - expected) ** 2, axis=0)).max() < o["noise"] / 5
 
 
 @pytest.mark.parametrize(("law", "strength"), [("", 0.0), ("foot_friction", 0.2), ("adhesion", 5e-3)])
