@@ -16,6 +16,9 @@ from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.statics import Equilibrium, equilibrium
 
+FAR = 5.0
+"""Sizes of a panel from its middle beyond which a point is none of its body."""
+
 
 def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> dict[str, np.ndarray]:
     """Simulated channels at the recording's times, by channel name: (n,) or (n, d) [SI].
@@ -275,7 +278,8 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
     """Whether a recording can be of this model: notes, one sentence each, on sizes that do not match.
 
     Raises:
-        InputError: a channel attached to something that the model does not have, the first one.
+        InputError: a channel attached to something that the model does not have, or to a point far off its panel; a
+            crease that turns farther than any can.
     """
     size = float(np.linalg.norm(np.ptp(model.position, axis=0)))
     rest = model.position[None]
@@ -295,8 +299,10 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
                     )
             continue
         read_channel(Poses(model, Parameters(model), rest, zero.angles.T, np.zeros(1)), channel)
+        _check_point(model, channel)
         columns = channel.values.reshape(recording.frame_count, -1)
         if channel.is_angle:
+            _check_fold(channel)
             continue
         spread = float(np.linalg.norm(np.nanmax(columns, axis=0) - np.nanmin(columns, axis=0)))
         if spread > 20.0 * size > 0.0:  # a body of one node has no size
@@ -310,6 +316,35 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
                 "metres read as millimetres?"
             )
     return notes
+
+
+def _check_point(model: Model, channel: Channel) -> None:
+    """Refuses a point that lies too far off its panel to be one of it."""
+    if "panel" not in channel.attachment or "point" not in channel.attachment:
+        return
+    panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
+    nodes = model.triangles[model.triangle_panel == panel]
+    size = float(np.linalg.norm(np.ptp(model.position[nodes].reshape(-1, 3), axis=0)))
+    far = float(np.linalg.norm(channel.attachment["point"]))
+    if far > FAR * size:
+        raise InputError(
+            f"the point is {far:.3g} m off the middle of a panel of {size:.3g} m",
+            field=f"channels.{channel.name}.point",
+            value=channel.attachment["point"],
+            allowed=f"up to {FAR * size:.3g} m (millimetres read as metres?)",
+        )
+
+
+def _check_fold(channel: Channel) -> None:
+    """Refuses a fold angle of more than a turn, or that changes by more."""
+    seen = channel.values[np.isfinite(channel.values)]
+    turned = float(max(np.abs(seen).max(initial=0.0), np.ptp(seen) if len(seen) else 0.0))
+    if channel.kind == "crease_angle" and turned > 2 * np.pi:
+        raise InputError(
+            f"channel '{channel.name}' turns by {turned:.4g} rad, more than a crease can",
+            field=f"channels.{channel.name}.unit",
+            allowed="fold angles within 2 pi (degrees read as radians?)",
+        )
 
 
 def _part(channel: Channel, vectors: np.ndarray) -> np.ndarray:
@@ -428,13 +463,17 @@ def _index(model: Model, channel: Channel, family: str, count: int) -> int:
 
 def _find(model: Model, channel: Channel, family: str, given: object, count: int) -> int:
     names = model.names.get(family, ())
-    if isinstance(given, str) and given in names:
+    if isinstance(given, str) and names.count(given) == 1:
         return names.index(given)
     if isinstance(given, int) and 0 <= given < count:
         return given
     raise InputError(
-        "the model has nothing of that name" if given is not None else f"a {channel.kind} needs a {family}",
+        f"several have that name, of which a {channel.kind} needs one"
+        if given in names
+        else "the model has nothing of that name"
+        if given is not None
+        else f"a {channel.kind} needs a {family}",
         field=f"channels.{channel.name}.{family}",
         value=given,
-        allowed=", ".join(names) or f"0 to {count - 1}",
+        allowed=", ".join(n for n in names if names.count(n) == 1) or f"0 to {count - 1}",
     )

@@ -666,8 +666,12 @@ def _write_angles(scene: _Scene, out: _Writer) -> list[tuple[int, int, int]]:
     shown = _chosen(list(angles.T))
     colours = [COLOURS["crease"]] * angles.shape[1]
     plot = _Plot("Crease angles (deg)")
+    names = scene.model.names.get("crease", ())
     for c in range(angles.shape[1]):
-        name, path = scene.model.name("crease", c), f"/angles/{c:04d}_{_slug(scene.model.name('crease', c))}"
+        name = scene.model.name("crease", c)
+        path = f"/angles/{c:04d}_{_slug(name)}"
+        if names.count(name) > 1:  # creases of one region
+            name += f" {c}"
         colour = SERIES[shown.index(c)] if c in shown else SERIES[-1]
         out.series(path, f"{name} (deg)", scene.times, angles[:, c], colour)
         if c in shown:

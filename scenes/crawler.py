@@ -17,6 +17,8 @@ from origami_sim.scene import Outcome, Progress, Settings
 from origami_sim.solve.dynamics import Trajectory, simulate
 
 CALIBRATION = "crawler"
+REGIONS = ("middle", "big end", "small end")
+"""Names of cells and of the lines between them, by owner."""
 
 
 def stations(s: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -89,6 +91,10 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("coulomb", feet, friction_coefficient=s.foot_friction)
     sheet.set("directional_friction", feet, backward_excess=s.foot_friction_back - s.foot_friction)
     sheet.set("adhesion", feet, pull_off=s.adhesion / 2)
+    patched, region = np.flatnonzero(owner), owner.copy()  # an end is a patch with its overhang
+    region[: patched[0]], region[patched[-1] :] = owner[patched[0]], owner[patched[-1]]
+    seam = np.where(region[1:] == region[:-1], region[1:], 0)  # what joins two regions bends as bare sheet
+    sheet.name("panel", [REGIONS[r] for r in region]).name("crease", [REGIONS[r] for r in seam])
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     sheet.gravity((0, 0, -s.gravity))
     model, parameters = sheet.build()

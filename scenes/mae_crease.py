@@ -24,7 +24,8 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         density=s.density,
         triangulation="center",
     )
-    sheet.fix(panels=[0]).panel([0, 1], rigidity=1e6 * s.stiffness)
+    # rigid beside the crease's order of magnitude, so that a fit of its stiffness leaves the panels alone
+    sheet.fix(panels=[0]).panel([0, 1], rigidity=1e5 * 10 ** np.floor(np.log10(s.stiffness)))
     sheet.crease(stiffness=s.stiffness, rest_angle=0.0, loss_time=s.loss_time)
     sheet.magnetise(1, remanence=s.remanence, volume=s.length * s.width * s.thickness, poling=(1, 0, 0))
     model, parameters = sheet.build()

@@ -246,7 +246,19 @@ def test_a_recording_is_held_against_the_model(motion):
     assert len(large) == 1 and "times the size of the model: millimetres or pixels read as metres?" in large[0]
     small = check_scene(recording(motion.times, channel("marker", 1e-6 * marker, unit="m", node=4)), model)
     assert len(small) == 1 and "metres read as millimetres?" in small[0]
+    far = channel("marker", marker, unit="m", panel="arm1", point=[9.0, 0.0, 0.0])
+    with pytest.raises(InputError, match=r"the point is 9 m off.*channels\.c\.point.*9\.0.*millimetres read as metres"):
+        check_scene(recording(motion.times, far), model)
+    near = channel("marker", marker, unit="m", panel="arm1", point=[0.0, 0.0, 0.3])
+    assert check_scene(recording(motion.times, near), model) == []  # on a stick
+    for fold in (np.linspace(80.0, 82.0, len(marker)), np.linspace(-3.5, 3.5, len(marker))):
+        with pytest.raises(InputError, match=r"more than a crease can .*channels\.c\.unit.*degrees read as radians"):
+            check_scene(recording(motion.times, channel("crease_angle", fold, crease=0)), model)
+        check_scene(recording(motion.times, channel("panel_angle", fold, panel=1)), model)  # an arm may go round
     with pytest.raises(InputError, match=r"nothing of that name.*crease.*5.*0 to 1"):
         check_scene(recording(motion.times, channel("crease_angle", np.zeros(len(marker)), crease=5)), model)
+    same = replace(model, names={"panel": ("mount", "arm", "arm")})
+    with pytest.raises(InputError, match=r"several have that name.*channels\.c\.panel.*arm.*mount"):
+        check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="arm")), same)
     with pytest.raises(InputError, match=r"nothing of that name.*channels\.c\.panel.*lid"):
         check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="lid")), model)

@@ -40,7 +40,7 @@ def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -
     out = [Baseline("best parameter-only refit", reference.rms.tolist())]
     motions = [motion(forward, base, r) for r in range(len(forward.recordings))] if forward.start == "fit" else [None]
     if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
-        why = "needs recorded coordinates of every crease"
+        why = "needs recorded coordinates of every crease, and segments with starts of their own"
         nan = [float("nan")] * len(forward.components)
         return [*out, Baseline("sparse regression (STLSQ)", nan, why), Baseline("Gaussian process", nan, why)]
     halves = _halves(forward)

@@ -1,15 +1,18 @@
 """`origami-sim diagnose`: from files to a verdict, and everything that it leaves behind."""
 
 import json
-import os
 import sys
+import tempfile
 import time as clock
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
+
+import numpy as np
 
 from origami_sim.diagnose.diagnose import Options, diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
@@ -18,12 +21,16 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.observed import check_recording
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
+from origami_sim.diagnose.prescribed import PATH
 from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.diagnose.subject import spreads
+from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.observe import check_scene
-from origami_sim.recording import DataSet, lint_report, read_dataset
+from origami_sim.recording import DataSet, Recording, by_component, lint_report, read_dataset
+from origami_sim.recording.drives import UNITS
+from origami_sim.recording.units import quantity
 from origami_sim.scene import NAMES, Settings, read_calibration, scene_module, scene_settings
 from origami_sim.solve.timestep import stable_step
 
@@ -36,7 +43,7 @@ def run(args: Namespace) -> int:
     """The command; returns the verdict's exit code."""
     say = (lambda *_, **__: None) if args.json else print
     folder = Path(args.out or "runs/diagnose")
-    _check_folder(folder)
+    _check_folder(folder, args.model)
     data = read_recordings(args.recordings, args.sidecar)
     for recording in data:
         say(lint_report(recording))
@@ -44,12 +51,25 @@ def run(args: Namespace) -> int:
         say(f"note: {note}")
     module, settings = model_of(args.model, data)
     name = module.__name__.rpartition(".")[2]
-    settings = settings.override([*_overrides(data, name), *args.set])
-    model, parameters = module.build(settings)[:2]
+    overrides = _overrides(data, name)
+    if overrides and args.model.endswith(".toml"):
+        say("note: the sidecar's overrides are left out: --model states the numbers of this object itself.")
+    else:
+        settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
+    settings = _assigned(settings, args.set, "--set")
+    model, parameters, drive, *_ = module.build(settings)
     step = stable_step(model, parameters).dt
+    recordings = []
     for recording in data:
-        for note in [*check_scene(recording, model), *check_recording(recording, model, step)]:
+        with _naming(recording.metadata.get("sidecar")):
+            notes = [*_assumed(recording, drive), *check_scene(recording, model)]
+        with _naming(recording.metadata.get("file")):
+            notes += check_recording(recording, model, step)
+        for note in notes:
             say(f"note: {note}")
+        recordings.append(
+            replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
+        )
     known = _priors(settings, data, args.prior)
     subject = Subject.from_scene(module, settings, spreads=known, name=name)
     if not subject.nominals:
@@ -59,7 +79,7 @@ def run(args: Namespace) -> int:
     keep = Keep(folder / RESUME)
     progress = Progress()
     try:
-        found = diagnose(subject, list(data), options, catalogue=catalogue, progress=progress, keep=keep)
+        found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
         progress.stage("replay")
         files = _write(folder, found, keep, settings, name)
     except KeyboardInterrupt:
@@ -109,9 +129,17 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
     A calibration belongs to the scene that has the same settings; of several, to the one that the sidecar names.
 
     Raises:
-        InputError: no such scene, a calibration of none, a sidecar that names another scene.
+        InputError: no such scene, a calibration of none, a sidecar that names another scene or none that exists.
     """
     stated = (data[0].metadata.get("scene") or {}).get("name")
+    if stated is not None and stated not in NAMES:
+        raise InputError(
+            "the sidecar's scene does not exist",
+            file=data[0].metadata.get("sidecar"),
+            field="scene.name",
+            value=stated,
+            allowed=", ".join(NAMES),
+        )
     if not given.endswith(".toml"):
         module = scene_module(given)
         _agree(stated, given, data)
@@ -152,6 +180,44 @@ def _overrides(data: DataSet, scene: str) -> list[str]:
     return [f"{n}={v}" for n, v in found.get("overrides", {}).items()] if found.get("name") == scene else []
 
 
+def _assigned(settings: Settings, assignments: Sequence[str], source: object) -> Settings:
+    """The settings with `name=value` applied; errors name where that was written, not the calibration."""
+    if not assignments:
+        return settings
+    changed = Settings(list(settings.values()), Path(str(source)), settings.effects).override(assignments)
+    return Settings(list(changed.values()), settings.file, settings.effects)
+
+
+@contextmanager
+def _naming(file: str | None) -> Iterator[None]:
+    """Errors that name no file name this one."""
+    try:
+        yield
+    except InputError as error:
+        raise error if error.file is not None else InputError(str(error), file=file) from None
+
+
+def _assumed(recording: Recording, drive: Drive) -> list[str]:
+    """A note on what the scene drives that the recording does not state; curves take nothing of the scene's own drive.
+
+    Raises:
+        InputError: what `by_component` refuses.
+    """
+    if recording.by_step or PATH in recording.drive:
+        return []
+    file = recording.metadata.get("sidecar")
+    stated = {c for name, d in recording.drive.items() for c in by_component(name, d, file=file)}
+    own = {}
+    for name, s in drive.signals.items():
+        if name not in stated and not s.is_zero:
+            sampled = 0.0 if s.values is None else np.abs(s.scale) * np.abs(s.values).max()
+            largest = float(np.max(np.abs(s.offset) + np.abs(s.amplitude) + sampled))
+            own[name] = f"{name} up to {quantity(largest, UNITS[name.split('_')[0]])}"
+    if not own:
+        return []
+    return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]
+
+
 def _priors(settings: Settings, data: DataSet, given: Sequence[str]) -> dict[str, float]:
     """Standard deviations [SI] from the sidecar, and over them from the command line."""
     first = data[0].metadata
@@ -175,12 +241,22 @@ def _options(args: Namespace) -> Options:
     return replace(THOROUGH if args.thorough else Options(), segment=args.segment, seed=args.seed)
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuses, before anything is computed, a folder that cannot be written."""
-    existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        what = "cannot be written" if existing.is_dir() else "is a file"
-        raise InputError(what, file=existing, field="--out", allowed="a folder that can be written")
+def _check_folder(folder: Path, model: str) -> None:
+    """Refuses, before anything is computed, a folder that cannot be written, or whose patch is the model itself."""
+    allowed = "a folder that can be written"
+    try:
+        existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
+        if existing.is_dir():
+            tempfile.TemporaryDirectory(dir=existing).cleanup()
+    except OSError as error:
+        fault = f"cannot be written ({error.strerror})"
+        raise InputError(fault, file=folder, field="--out", allowed=allowed) from None
+    if not existing.is_dir():
+        raise InputError("is a file", file=existing, field="--out", allowed=allowed)
+    if Path(model).resolve() == (folder / PATCH).resolve():
+        raise InputError(
+            "the model would be overwritten", file=model, field="--out", value=str(folder), allowed="another folder"
+        )
 
 
 # output ---------------------------------------------------------------------------------------------------------------

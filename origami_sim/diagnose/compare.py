@@ -29,7 +29,8 @@ class Score:
     """How well a hypothesis predicts what it was not fitted to.
 
     Attributes:
-        held_out: (B,) log score of each block, up to a constant shared by all hypotheses.
+        held_out: (B,) log score of each block (of stretches, if there is one only), up to a constant shared by all
+            hypotheses.
         rms: (D,) root mean square of the held-out residual [SI].
         squares: (B,) whitened sum of squares of each block, if only the stretch of its recording that it lies in is
             held out.
@@ -102,14 +103,18 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     """Held-out score by one Gauss-Newton step of every leave-one-fold-out fit from the full fit.
 
     The linearisation of the full fit is exact for small changes of the numbers; leaving out a fold changes them by
-    about a standard deviation. A single block has no folds: the score is then that of the fit with the penalty of
-    its numbers.
+    about a standard deviation. A single block without a start to fit is cut into stretches; with one it has no folds:
+    the score is then that of the fit with the penalty of its numbers.
 
     Args:
         weights: those of the fit.
     """
     line = fit.linear
     assert line is not None
+    dims = len(weights.deviation)
+    cut = len(fit.blocks) == 1 and not forward.local
+    if cut:
+        line = line.cut(FOLDS, dims)
     scale = np.array([f.scale for f in fit.free])
     prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in fit.free])
     away = np.array([f.start for f in fit.free]) - fit.theta
@@ -131,7 +136,8 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     held_out = np.array([-0.5 * float(c @ c) for c in cleared])
     left, near = [c.copy() for c in cleared], [c.copy() for c in cleared]
     several = len({forward.blocks[b].recording for b in fit.blocks}) > 1
-    for part in folds(forward, fit.blocks) if len(fit.free) else []:
+    apart = [[n] for n in range(len(left))] if cut else folds(forward, fit.blocks)
+    for part in apart if len(fit.free) else []:
         step, root = without(part)
         for n in part:
             left[n] = cleared[n] - tangent[n] @ step
@@ -140,7 +146,6 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
         step, _ = without(part)
         for n in part:
             near[n] = cleared[n] - tangent[n] @ step
-    dims = len(weights.deviation)
     squares = np.concatenate([v[line.data(n)].reshape(-1, dims) ** 2 for n, v in enumerate(left)]) / weights.part
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
     rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation

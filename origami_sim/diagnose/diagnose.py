@@ -32,6 +32,7 @@ from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
+from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import stable_step
@@ -42,7 +43,8 @@ class Options:
     """How thoroughly to look; the defaults keep the promise of a minute for four panels and ten seconds.
 
     Attributes:
-        segment: length of a segment [s]; None: chosen from how fast starts are forgotten or amplified.
+        segment: length of a segment [s], each with a start of its own; None: chosen from how fast starts are forgotten
+            or amplified.
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; the recording is thinned to it.
         steps: solver steps that one pass over the data may take; longer recordings are sampled evenly.
@@ -68,6 +70,9 @@ class Options:
 
 GROWTH = 30.0
 """Growth of a difference in the start beyond which a segment is cut: below the time in which chaos takes over."""
+
+FRAMES = 400
+"""Frames of a recording that are compared at least, if it has as many."""
 
 FEWEST = 8
 """Segments that a single recording is cut into at least, where its start is fitted, for held-out scores."""
@@ -125,17 +130,19 @@ def diagnose(
     tell("screen", 0.0)
     every = forward.admitted(suspects(forward.model, recordings, _union(forward), forward.parameters))
     if catalogue is not None:
-        every = [s for s in every if s.effect in catalogue]
+        every = among(every, catalogue)
+        idle = sorted({get(n).name for n in catalogue} - {s.effect for s in every})
+        if idle:
+            noted.append(
+                f"Not suspected, as it cannot act on this device or show in these recordings: {', '.join(idle)}."
+            )
     screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("locate", 0.0)
     places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, base)
     lap("locate")
-    fits = [base]
     finalists = chosen(screening, o.finalists)
-    for n, s in enumerate(finalists):
-        tell("refit", n / max(len(finalists), 1))
-        fits.append(refit(forward, base, s, weights, screening))
+    fits = contest(forward, base, finalists, screening, weights, lambda part: tell("refit", part))
     fits += unbent(forward, base, every, fits, weights, o)
     fits += pairs(forward, base, screening, fits, weights, o)
     rough = screening
@@ -201,6 +208,7 @@ def diagnose(
         settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
         seconds=seconds,
         patch=patch(best),
+        changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
         impulses=[] if isinstance(forward, CurveForward) else impulses(forward, base),
@@ -212,8 +220,26 @@ def diagnose(
 # --- preparation
 
 
+def among(every: Sequence[Suspect], catalogue: Sequence[str]) -> list[Suspect]:
+    """The suspects of some effects.
+
+    Raises:
+        InputError: an effect that the catalogue lacks; effects of which none can act here.
+    """
+    wanted = {get(n).name for n in catalogue}
+    out = [s for s in every if s.effect in wanted]
+    if not out:
+        raise InputError(
+            "none of these can act on this device, or show in these recordings",
+            field="suspects",
+            value=", ".join(sorted(wanted)),
+            allowed=", ".join(sorted({s.effect for s in every})),
+        )
+    return out
+
+
 def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
-    """The recordings, thinned to about `rate` frames per second.
+    """The recordings, thinned to about `rate` frames per second, but to no fewer than FRAMES frames.
 
     Raises:
         InputError: none, different channels, too few frames.
@@ -238,8 +264,8 @@ def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
                 value=len(r.times),
                 allowed=f"at least {fewest}",
             )
-        every = max(1, int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6))
-        out.append(thinned(r, every))
+        every = int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6)
+        out.append(thinned(r, max(1, min(every, len(r.times) // FRAMES))))
     return out
 
 
@@ -264,10 +290,15 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
     curve = curves(subject, recordings, o.threads)
     if curve is not None:
         return curve
-    start = o.start or starting(subject, recordings)
-    if start == "rest":
-        return Forward(subject, recordings, segment=o.segment, start="rest", threads=o.threads)
     whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
+    shortest = 8 * max(float(np.median(np.diff(r.times))) for r in recordings)
+    if o.segment is not None and not shortest <= o.segment < np.inf:
+        raise InputError(
+            "a segment needs frames to be compared", field="segment", value=o.segment, allowed=f">= {shortest:.3g} s"
+        )
+    start = o.start or ("fit" if o.segment is not None else starting(subject, recordings))
+    if start == "rest":  # later segments would not begin there
+        return Forward(subject, recordings, start="rest", threads=o.threads)
     step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
     step = min(step, float(np.median(np.diff(recordings[0].times))))  # without stiffness any step is stable
     length = o.segment
@@ -506,10 +537,36 @@ def settled(
             continue
         given = {"theta": f.theta, "blocks": f.blocks}
         out[n] = fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, **given)
-        if new is not weights and place <= AGAIN and forward.local:
+        if new is not weights and place <= AGAIN and forward.local and f.cost < least:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
             out[n] = min(out[n], fit(forward, f.hypothesis, new, **given), key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new
+
+
+HOPE, NEAR = 0.5, 50.0
+"""A rough fit is carried on if it gains, or promises, this part of what the best one gains, or all but so much cost."""
+
+
+def contest(
+    forward: Forward,
+    base: Fit,
+    finalists: Sequence[Signature],
+    screening: Screening,
+    weights: Weights,
+    tell: Callable[[float], None],
+) -> list[Fit]:
+    """The model without any effect and with each finalist; those that neither are nor promise to be good stay rough."""
+    fits = [base]
+    for n, s in enumerate(finalists):
+        tell(0.5 * n / len(finalists))
+        fits.append(roughly(forward, base, s, weights, screening))
+    gain = base.cost - min(f.cost for f in fits)
+    enough = base.cost - min(HOPE * gain, gain - NEAR)
+    for n, f in enumerate(fits):
+        tell(0.5 + 0.5 * n / len(fits))
+        if n and min(f.cost, f.promise) <= enough:
+            fits[n] = finished(forward, f, weights)
+    return fits
 
 
 SHAPES = (0.3, 3.0)
@@ -517,7 +574,21 @@ SHAPES = (0.3, 3.0)
 
 
 def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, screening: Screening, most: int = 5) -> Fit:
-    """The nominal model with one more suspect: from the fit without it and its signature, which cannot become worse.
+    """The nominal model with one more suspect: from the fit without it and its signature, which cannot become worse."""
+    return finished(forward, roughly(forward, base, found, weights, screening, most), weights, most)
+
+
+def finished(forward: Forward, f: Fit, weights: Weights, most: int = 5) -> Fit:
+    """A rough fit, carried on with derivatives of its own."""
+    if f.failed or f.promise == np.inf:
+        return f
+    return fit(forward, f.hypothesis, weights, theta=f.theta, local=f.local, begin=f.linear, most=most)
+
+
+def roughly(
+    forward: Forward, base: Fit, found: Signature, weights: Weights, screening: Screening, most: int = 5
+) -> Fit:
+    """The same, with the derivatives by nominals and starts that the fit without the suspect had.
 
     Of a suspect with a second number, which sets the shape of its signature, several values are tried.
     """
@@ -545,6 +616,7 @@ def refit(forward: Forward, base: Fit, found: Signature, weights: Weights, scree
             known=base.linear,
             kept=len(base.free),
             begin=begin,
+            rough=True,
         )
 
     tried = [fitted(1.0, begin)]
@@ -876,10 +948,13 @@ def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
 
 
 def _varying_drive(forward: Forward):
-    for name, s in forward._drives[0].signals.items():
-        if s.times is not None or np.any(s.amplitude):
-            return name, f"drive {name}"
-    return None, "rate"
+    """Name of the drive channel that varies most; None: nothing varies."""
+    spans = {}
+    for name, signal in forward._drives[0].signals.items():
+        values = [np.squeeze(signal(r.times - r.times[0])) for r in forward.recordings]
+        spans[name] = max(float(np.ptp(v)) if v.ndim else 0.0 for v in values)
+    name = max(spans, key=lambda n: spans[n], default="")
+    return (name, f"drive {name}") if spans.get(name) else (None, "rate")
 
 
 def _against(forward: Forward, f: Fit, d: int, drive: str | None) -> list[np.ndarray]:

@@ -194,7 +194,8 @@ class Diagnosis:
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
         components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
         notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
-        patch: numbers to write into the calibration: label -> value.
+        patch: numbers to write into the calibration: label -> value. changed: effects of it that the model has
+            already: their numbers are changes of what it has.
     """
 
     verdict: str
@@ -227,6 +228,7 @@ class Diagnosis:
     subject: str = ""
     recordings: list[str] = field(default_factory=list)
     impulses: list[Impulse] = field(default_factory=list)
+    changed: list[str] = field(default_factory=list)
 
     @property
     def exit_code(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.refit import Fit, Weights, linearise
+from origami_sim.diagnose.refit import Fit, Linearisation, Weights, linearise
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.drive import Drive, Signal
 
@@ -34,9 +34,10 @@ def propose(
     menu = forward.menu() if isinstance(forward, CurveForward) else _menu(forward)
     apart = np.zeros((len(menu), len(rivals)))
     for n, (_, changed) in enumerate(menu):
+        known = None
         for k, rival in enumerate(rivals):
             try:
-                apart[n, k] = separation(changed, judged.best, rival, weights)
+                apart[n, k], known = separation(changed, judged.best, rival, weights, known)
             except (FloatingPointError, np.linalg.LinAlgError):
                 apart[n, k] = 0.0
         if progress:
@@ -58,16 +59,23 @@ def rivals_of(judged, most: int = 4) -> list[Fit]:
     return tied[:most] if tied else judged.others[:1]
 
 
-def separation(forward: Forward, a: Fit, b: Fit, weights: Weights) -> float:
-    """Expected separation d' of two fitted explanations in an experiment."""
+def separation(
+    forward: Forward, a: Fit, b: Fit, weights: Weights, known: Linearisation | None = None
+) -> tuple[float, Linearisation | None]:
+    """Expected separation d' of two fitted explanations in an experiment, and the derivatives under b.
+
+    Args:
+        known: derivatives under another explanation, of which those by nominal numbers and starts hold here too.
+    """
     blocks = list(range(len(forward.blocks)))
     local = np.zeros((len(blocks), forward.local))
     truth = forward.predict(a.hypothesis, a.theta[None], local[None], soft=True)
     for n, v in enumerate(truth):
         if not np.all(np.isfinite(v[0])):
-            return 0.0
+            return 0.0, known
         forward.blocks[n] = replace(forward.blocks[n], values=v[0])
-    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights, soft=True)
+    own = len(b.free) - len(b.hypothesis.free)
+    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights, known=known, kept=own, soft=True)
     rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
     scale = np.array([f.scale for f in b.free])
@@ -76,9 +84,9 @@ def separation(forward: Forward, a: Fit, b: Fit, weights: Weights) -> float:
     stacked = np.concatenate([rows, known])
     target = np.concatenate([gap, np.zeros(len(known))])
     if not np.all(np.isfinite(stacked)) or not np.all(np.isfinite(target)):
-        return 0.0
+        return 0.0, known
     x, *_ = np.linalg.lstsq(stacked, target, rcond=None)
-    return float(np.linalg.norm(target - stacked @ x))
+    return float(np.linalg.norm(target - stacked @ x)), line
 
 
 def _menu(forward: Forward) -> list[tuple[str, Forward]]:

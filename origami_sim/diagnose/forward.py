@@ -9,14 +9,14 @@ from scipy.signal import savgol_filter
 
 from origami_sim.diagnose.articulation import Articulation, Pose
 from origami_sim.diagnose.channels import angle_mask, channel_values, component_names, depths, stacked
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times, told_apart
 from origami_sim.diagnose.track import coordinates, placed
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.recording import Recording
+from origami_sim.recording import Recording, by_component
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import gradient_norms, stable_step
 
@@ -297,10 +297,13 @@ class Forward:
         return [out[b] for b in wanted]
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
-        """The suspects that these recordings can be asked about; those with a time constant with several."""
+        """The suspects that these recordings can be asked about; those with a time constant with several.
+
+        See also `told_apart`.
+        """
         frame = float(np.median(np.diff(self.recordings[0].times)))
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
-        return at_several_times(every, FASTEST * frame, longest)
+        return at_several_times(told_apart(every, len(self.components)), FASTEST * frame, longest)
 
     def soften(self) -> None:
         """Finds how much softer panels may be for derivatives: at most so much that the motion stays the same.
@@ -365,19 +368,59 @@ class Forward:
         recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
         k, count = len(worlds), len(blocks)
         model = worlds[0][0]
-        parameters = softened(model, Parameters.join([p for _, p in worlds], repeat=count), softness)
+        parameters = Parameters.join([p for _, p in worlds], repeat=count)
         times = blocks[0].times
         step = float(np.median(np.diff(recording.times)))
         frames = int(np.ceil(times[-1] / step - 1e-6)) + 1 + SPARE
-        span = frames * step
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
-        late = self._late(model, parameters, each, begins)
-        if np.any(late):
-            drive = shifted(self._drives[r], np.tile(begins, k) + late, span, 1)
+        late = self._late(model, parameters, each, begins).reshape(k, count)
+        starts = None if local is None else local[:, group]
+        moves, of = distinct_motions(worlds, late, starts)
+        raw = self._film(
+            r,
+            blocks,
+            [worlds[m] for m in moves],
+            late[moves],
+            None if starts is None else starts[moves],
+            frames,
+            softness,
+        )
+        turning = angle_mask(recording)
+        continuous(raw[:, : len(turning)], turning, np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T)
+        channels = raw[:, :, (of[:, None] * count + np.arange(count)).ravel()]
+        plain = channels[:, : len(turning)]  # without the depths
+        grid = np.arange(frames) * step
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        if distort:
+            values = self._measured(model, parameters, recording, distort, each, grid, channels, times)
+        elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+            values = plain[: len(times)]
         else:
-            drive = shifted(self._drives[r], begins, span, k)
-        drive = distorted(model, parameters, drive, span)
-        state = self._state(model, worlds, blocks, None if local is None else local[:, group])
+            values = spline(grid, plain)(times)
+        values = values.reshape(len(times), -1, k, count)
+        return [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)]
+
+    def _film(
+        self,
+        r: int,
+        blocks: list[Block],
+        worlds: list[tuple[Model, Parameters]],
+        late,
+        local,
+        frames: int,
+        softness: float,
+    ) -> np.ndarray:
+        """Channels and depths [frames, D + k, W] as they are, before anything measures them."""
+        recording, model, count = self.recordings[r], worlds[0][0], len(blocks)
+        parameters = softened(model, Parameters.join([p for _, p in worlds], repeat=count), softness)
+        step = float(np.median(np.diff(recording.times)))
+        begins = recording.times[[b.first for b in blocks]] - recording.times[0]
+        if np.any(late):
+            drive = shifted(self._drives[r], (begins + late).ravel(), frames * step, 1)
+        else:
+            drive = shifted(self._drives[r], begins, frames * step, len(worlds))
+        drive = distorted(model, parameters, drive, frames * step)
+        state = self._state(model, worlds, blocks, local)
         memory = self._memory(r, worlds, blocks)
         if memory is not None:
             state.memory[:] = memory
@@ -393,21 +436,9 @@ class Forward:
             state = _with_effects(batch.state(), model, step=calm * substeps)
         batch = self._batch(model, parameters, drive, state)
         raw += filmed(batch, recording, frames - sum(map(len, raw)), substeps, step, first=not calm)
-        channels = np.concatenate(raw)  # [frames, D, W]
-        channels[:, :, batch.status() >= 0] = np.nan
-        turning = angle_mask(recording)
-        plain = channels[:, : len(turning)]  # without the depths
-        continuous(plain, turning, np.tile(np.stack([_begin(b) for b in blocks]), (k, 1)).T)
-        grid = np.arange(frames) * step
-        distort = [e for e in model.effects if get(e).family == "measurement"]
-        if distort:
-            values = self._measured(model, parameters, recording, distort, each, grid, channels, times)
-        elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
-            values = plain[: len(times)]
-        else:
-            values = spline(grid, plain)(times)
-        values = values.reshape(len(times), -1, k, count)
-        return [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)]
+        out = np.concatenate(raw)
+        out[:, :, batch.status() >= 0] = np.nan
+        return out
 
     def _late(self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], begins: np.ndarray) -> np.ndarray:
         """By how much later than its clock says a recording's frames at `begins` were taken [s], for all worlds (W,).
@@ -540,6 +571,27 @@ class Forward:
         own = name in self.model.effects  # a measurement that the model itself describes holds for all
         here = np.repeat([own or _acts(h, name, channel) for h in each], repeat)
         return {n: np.where(here, v[0], get(name).parameter(n).default) for n, v in parameters.of(name).items()}
+
+
+def distinct_motions(
+    worlds: Sequence[tuple[Model, Parameters]], *more: np.ndarray | None
+) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two move alike, and (K,) which of them each world moves like: a measurement moves nothing.
+
+    Args:
+        more: what else makes worlds differ, [K, ...] each.
+    """
+    shown = {e for e in worlds[0][0].effects if get(e).family == "measurement"}
+    found: dict[tuple, int] = {}
+    first, of = [], []
+    for k, (model, parameters) in enumerate(worlds):
+        felt = b"".join(parameters[p].tobytes() for p in parameters if p[0] not in shown)
+        key = (model.position.tobytes(), felt, *(m[k].tobytes() for m in more if m is not None))
+        if key not in found:
+            found[key] = len(first)
+            first.append(k)
+        of.append(found[key])
+    return first, np.array(of)
 
 
 def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
@@ -717,29 +769,22 @@ def drive_of(recording: Recording, default: Drive) -> Drive:
     """The drive that was recorded, over the model's own.
 
     Raises:
-        InputError: a drive channel of the recording that no model knows.
+        InputError: what `by_component` refuses, or a drive that this model lacks.
     """
     changed: dict[str, Signal] = {}
-    times = recording.times - recording.times[0]
-    for name, channel in recording.drive.items():
-        columns = np.atleast_2d(np.asarray(channel.values, float).T)
-        clock = times if channel.times is None else channel.times - recording.times[0]
-        if channel.constant:
-            columns = np.asarray(channel.values, float).reshape(-1, 1)
-        names = [f"{name}_{a}" for a in "xyz"] if name == "field" else [name]
-        if name == "field" and len(columns) == 1:
-            names = ["field_z"]
-        if name == "voltage":
-            names = [f"voltage_{i}" for i in range(len(columns))]
-        for one, column in zip(names, columns, strict=True):
-            if one not in default.signals:
+    file = recording.metadata.get("sidecar")
+    for name, drive in recording.drive.items():
+        clock = (recording.times if drive.times is None else drive.times) - recording.times[0]
+        for channel, values in by_component(name, drive, file=file).items():
+            if channel not in default.signals:
                 raise InputError(
                     "the model has no such drive channel",
+                    file=file,
                     field=f"drive.{name}",
-                    value=one,
+                    value=channel,
                     allowed=", ".join(default.signals),
                 )
-            changed[one] = Signal(offset=float(column[0])) if channel.constant else series(*refined(clock, column))
+            changed[channel] = Signal(offset=float(values[0])) if drive.constant else series(*refined(clock, values))
     return default.replace(**changed)
 
 

@@ -49,6 +49,7 @@ class Suspect:
         effect: name in the catalogue. site: where, in words. kind: crease, panel, body, ground, drive or measurement.
         free: numbers to fit, the strength first.
         entities: entities of the family; None for all. sites: at how many sites the effect is suspected in all.
+        more: whether the model has the effect, and more or less of it is suspected.
     """
 
     effect: str
@@ -57,6 +58,7 @@ class Suspect:
     free: tuple[Free, ...]
     entities: tuple[int, ...] | None = None
     sites: int = 1
+    more: bool = False
 
     @property
     def label(self) -> str:
@@ -210,8 +212,8 @@ def suspects(
     """Everything in the catalogue that could act on this object, and more or less of what its model has at one place.
 
     An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
-    channel of its kind was recorded; one of the ground, if the device has contact points. Creases, panels and feet
-    (contact points of one name) are suspected one by one and all together. An effect that the model has to state
+    channel of its kind was recorded; one of the ground, if the device has contact points. Creases, panels and feet are
+    suspected one by one and all together; those that share a name are one. An effect that the model has to state
     (`Effect.stated`) is a suspect where it does so and leaves it at no strength.
     """
     kinds = {c.kind for r in recordings for c in r.channels.values()}
@@ -255,7 +257,7 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
             strength = replace(
                 strength, lower=strength.lower - float(np.min(parameters[name, strength.name][list(entities)]))
             )
-        out.append(Suspect(name, site, kind, (strength,), entities, len(each)))
+        out.append(Suspect(name, site, kind, (strength,), entities, len(each), more=True))
     return out
 
 
@@ -281,26 +283,33 @@ def _channel_sites(recording: Recording, kinds: Sequence[str]):
     return [("the measurement", "measurement", None), *(each if len(each) > 1 else [])]
 
 
+def named(names: Sequence[str]) -> dict[str, list[int]]:
+    """Indices by name, in the order in which names occur."""
+    out: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        out.setdefault(name, []).append(k)
+    return out
+
+
 def _sites(model: Model, family: str):
     """(site in words, kind, entities) of a family."""
     if family in DISTORTIONS:
         return [("the " + family, family, None)]
     if family in CONTACTS:
         names = [model.name("contact", k) for k in range(len(model.contacts))]
-        feet = {n: tuple(k for k, m in enumerate(names) if m == n) for n in dict.fromkeys(names) if names.count(n) > 1}
-        each = [(n, "ground", k) for n, k in feet.items()] if len(feet) > 1 else []
+        feet = [(n, "ground", tuple(k)) for n, k in named(names).items() if len(k) > 1]
+        each = feet if len(feet) > 1 else []
         every = tuple(sorted(k for _, _, mine in each for k in mine))
         if every and len(every) < len(names):  # the belly may touch as well
-            each.append(("all feet", "ground", every))
+            each = [*each, ("all feet", "ground", every)]
         return [*each, ("the ground", "ground", None)]
     if family == "crease":
-        each = [(model.name("crease", c), "crease", (c,)) for c in range(len(model.creases))]
+        names = [model.name("crease", c) for c in range(len(model.creases))]
+        each = [(n, "crease", tuple(c)) for n, c in named(names).items()]
         return each if len(each) == 1 else [*each, ("all creases", "crease", None)]
     if family == "triangle":
-        panels = model.triangle_panel
-        each = [
-            (model.name("panel", p), "panel", tuple(map(int, np.flatnonzero(panels == p)))) for p in np.unique(panels)
-        ]
+        names = [model.name("panel", p) for p in model.triangle_panel]
+        each = [(n, "panel", tuple(t)) for n, t in named(names).items()]
         free = [e for e in each if np.any(model.free[np.unique(model.triangles[list(e[2])])])]
         return free if len(free) == 1 else [*free, ("all panels", "panel", None)]
     return [("the body", "body", None)]
@@ -311,14 +320,13 @@ def _edges(model: Model):
     sides = np.sort(np.concatenate([model.triangles[:, k] for k in ([0, 1], [1, 2], [2, 0])]), axis=1)
     sides, count = np.unique(sides, axis=0, return_counts=True)
     edge = np.intersect1d(sides[count == 1], np.flatnonzero(model.free.any(axis=1)))
-    panels = {
-        p: np.intersect1d(model.triangles[model.triangle_panel == p], edge) for p in np.unique(model.triangle_panel)
-    }
+    labels = named([model.name("panel", p) for p in model.triangle_panel])
+    panels = {n: np.intersect1d(model.triangles[t], edge) for n, t in labels.items()}
     out = []
     for p, mine in panels.items():
         own = [n for n in mine if not any(n in nodes for q, nodes in panels.items() if q != p)]
         if len(mine):
-            out.append((model.name("panel", p), "panel", tuple(map(int, own or mine))))
+            out.append((p, "panel", tuple(map(int, own or mine))))
     return out if len(out) > 1 else []
 
 
@@ -338,6 +346,19 @@ def _free(effect: str, name: str, entities) -> Free:
         spread=np.inf if strength else PLAUSIBLE * scale,
         entities=entities,
     )
+
+
+SITES = 4
+"""Creases that one channel may be asked to tell apart."""
+
+
+def told_apart(every: Sequence[Suspect], channels: int) -> list[Suspect]:
+    """The suspects; of many more creases or panels than channels (a beam of cells), only all of them together."""
+    for kind in ("crease", "panel"):
+        sites = {s.site for s in every if s.kind == kind and s.entities is not None}
+        if len(sites) > SITES * channels:
+            every = [s for s in every if s.kind != kind or s.entities is None]
+    return list(every)
 
 
 CONSTANTS = 4

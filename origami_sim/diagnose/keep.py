@@ -12,6 +12,7 @@ import time as clock
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -146,11 +147,12 @@ def _read(file: Path, count: int) -> list[np.ndarray] | None:
 
 
 def _write(file: Path, values: list[np.ndarray]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
+    """Stores predictions, if the disk takes them: without, only an interruption costs more."""
     part = file.with_name(f".{file.stem}.{os.getpid()}.part")
-    try:
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
         with open(part, "wb") as f:
             np.savez(f, allow_pickle=False, **{str(n): v for n, v in enumerate(values)})
         part.replace(file)
-    finally:
+    with suppress(OSError):
         part.unlink(missing_ok=True)

@@ -9,7 +9,8 @@ It is a calibration as any other, with one table more:
     yield_angle = 0.01
 
 Parameters that are not stated are those of an effect of the scene that has one of the same name for the same family (a
-magnet keeps its remanence), else their typical value. An effect that the scene already has keeps what is not stated.
+magnet keeps its remanence), else their typical value. An effect that the scene already has, or that a table above has
+added, keeps what is not stated; with `more = true` the numbers are added to what it has, and may be negative.
 """
 
 import json
@@ -37,6 +38,7 @@ class Addition:
     Attributes:
         effect: name in the catalogue. values: its parameters [SI].
         entities: of the effect's family; None for all. site, source: for readers.
+        more: whether the values are added to those that the effect has.
     """
 
     effect: str
@@ -44,6 +46,7 @@ class Addition:
     entities: tuple[int, ...] | None = None
     site: str = ""
     source: str = ""
+    more: bool = False
 
 
 def read_additions(tree: object, file: Path) -> tuple[Addition, ...]:
@@ -70,13 +73,17 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
     if not isinstance(entry, dict):
         raise InputError("an effect is a table of its parameters", file=file, field=where, value=entry)
     known = {p.name: p for p in effect.parameters if p.knots == 1}
-    words, values, entities = {}, {}, None
+    words, values, entities, more = {}, {}, None, entry.get("more", False)
+    if not isinstance(more, bool):
+        raise InputError("not a switch", file=file, field=f"{where}.more", value=more, allowed="true, false")
     for key, value in entry.items():
         at = f"{where}.{key}"
         if key in _WORDS:
             if not isinstance(value, str):
                 raise InputError("not a word", file=file, field=at, value=value)
             words[key] = value
+        elif key == "more":
+            continue
         elif key == "entities":
             whole = isinstance(value, list) and all(type(v) is int and v >= 0 for v in value)
             if not whole or not value:
@@ -87,10 +94,10 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
                 "the effect has no such parameter",
                 file=file,
                 field=at,
-                allowed=", ".join([*known, "entities", *_WORDS]),
+                allowed=", ".join([*known, "entities", "more", *_WORDS]),
             )
         else:
-            low, high = known[key].bounds
+            low, high = (-np.inf, np.inf) if more else known[key].bounds
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
                 raise InputError(
                     "out of its bounds",
@@ -100,7 +107,7 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
                     allowed=f"{low:g} to {high:g} {known[key].unit}",
                 )
             values[key] = float(value)
-    return Addition(name, values, entities, **words)
+    return Addition(name, values, entities, more=more, **words)
 
 
 def switched_on(
@@ -109,7 +116,7 @@ def switched_on(
     """Model and parameters with these effects.
 
     Raises:
-        InputError: an entity that the model does not have.
+        InputError: an entity that the model does not have; more of an effect that nothing has switched on.
     """
     for a in additions:
         count = model.count(get(a.effect).family)
@@ -121,15 +128,22 @@ def switched_on(
                 value=max(a.entities),
                 allowed=f"0 to {count - 1}",
             )
-    new = [a for a in additions if a.effect not in model.effects]
+    new = [a for a in additions if a.effect not in model.effects and not a.more]
     richer = model.with_effects(*(a.effect for a in new))
     numbers = [_numbers(a) for a in new]
     missing = Hypothesis(tuple(Suspect(a.effect, a.site, "", n, a.entities) for a, n in zip(new, numbers, strict=True)))
     out = apply(parameters, missing, [f.start for n in numbers for f in n], richer)
     for a in additions:
-        if a.effect in model.effects:
+        if a.effect not in richer.effects:
+            raise InputError(
+                "there is no such effect to have more of", file=file, field=f"effects.{a.effect}.more", value=True
+            )
+        if a.effect in model.effects or a.more:
+            mine = np.arange(model.count(get(a.effect).family)) if a.entities is None else np.array(a.entities)
             for name, value in a.values.items():
-                out.set(a.effect, name, value, None if a.entities is None else np.array(a.entities))
+                bounds = get(a.effect).parameter(name).bounds
+                there = out[a.effect, name][mine] if a.more else 0.0
+                out.set(a.effect, name, np.clip(there + value, *bounds), mine)
     return richer, out
 
 
@@ -157,7 +171,14 @@ def additions(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Ad
     sites = best.sites if best is not None else [""] * len(found)
     source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
     return tuple(
-        Addition(effect, values, tuple(map(int, entities.split(","))) if entities else None, site, source)
+        Addition(
+            effect,
+            values,
+            tuple(map(int, entities.split(","))) if entities else None,
+            site,
+            source,
+            effect in diagnosis.changed,
+        )
         for ((effect, entities), values), site in zip(found.items(), sites, strict=True)
     )
 
@@ -195,6 +216,8 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
         lines += [f"{word} = {_toml(getattr(a, word))}" for word in _WORDS if getattr(a, word)]
         if a.entities is not None:
             lines.append(f"entities = {_toml(list(a.entities))}")
+        if a.more:
+            lines.append("more = true")
         for name, value in a.values.items():
             p = get(a.effect).parameter(name)
             lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")

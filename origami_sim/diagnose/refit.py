@@ -60,6 +60,7 @@ class Fit:
         at_bound: (P,) whether a number lies on a bound.
         failed: why the fit could not be made, or "".
         wider: (P,) by how much effects that are too small to be told widen what is known of theta; None: not asked.
+        promise: of a rough fit that did not settle, the cost that a further step promised; else infinite.
     """
 
     hypothesis: Hypothesis
@@ -75,6 +76,7 @@ class Fit:
     failed: str = ""
     linear: "Linearisation | None" = None
     wider: np.ndarray | None = None
+    promise: float = np.inf
 
     @property
     def cost(self) -> float:
@@ -142,6 +144,16 @@ class Linearisation:
         """The first `kept` columns of the tangent, and others after them."""
         joined = [np.concatenate([t[:, :kept], c], axis=1) for t, c in zip(self.tangent, columns, strict=True)]
         return Linearisation(self.residual, joined, self.slopes, self.basis, self.starts)
+
+    def cut(self, count: int, width: int) -> "Linearisation":
+        """One block without a start, of frames of so many components, as so many stretches of it."""
+        frames = len(self.residual[0]) // width
+        rows = np.array_split(np.arange(frames * width), np.arange(1, count) * frames // count * width)
+
+        def split(columns: list[np.ndarray]) -> list[np.ndarray]:
+            return [columns[0][r] for r in rows]
+
+        return Linearisation.of(split(self.residual), split(self.tangent), split(self.slopes))
 
     def reweighted(self, old: Weights, new: Weights) -> "Linearisation":
         """The same for other weights."""
@@ -308,6 +320,7 @@ def fit(
     known: Linearisation | None = None,
     kept: int = 0,
     begin: Linearisation | None = None,
+    rough: bool = False,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
@@ -320,6 +333,7 @@ def fit(
         blocks: fit these only. fixed: keep theta and fit the starts only.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
         begin: residuals and all derivatives of the point where the fit begins.
+        rough: keep the derivatives that are known; only those by the hypothesis' own numbers are renewed.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
     free = (*forward.subject.nominals, *hypothesis.free)
@@ -339,6 +353,7 @@ def fit(
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     slowest = forward.step(hypothesis, theta) / SLOWEST
     floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
+    finest, promised, settled = (OWN if rough else ALL), np.inf, False
     for n in range(most):
         assert theta is not None and local is not None
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
@@ -347,6 +362,7 @@ def fit(
         enough = max(LITTLE, done * (best - floor))
         whole, gain, found = best - promised, 0.0, None
         if whole < enough and (level > STALE or not width):
+            settled = level == ALL or doubts <= 1  # then these derivatives are as good as new
             break
         trying = STEPS if level == ALL or not n else CHORD
         for part in trying:
@@ -362,7 +378,7 @@ def fit(
             if best - cost > FAITHFUL * whole * part * (2.0 - part):
                 break
         faithful, stuck = gain > FAITHFUL * whole, gain < enough
-        if stuck and level == ALL:
+        if stuck and level == finest:
             break
         if found is not None:
             (theta, local, predicted), best = found, best - gain
@@ -371,13 +387,14 @@ def fit(
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
-            level = OWN if kept and doubts == 1 else ALL
+            level = OWN if kept and doubts == 1 else finest
             line = derived(theta, local, line if level == OWN else None, line.residual)
     if width and level == STALE:  # the intervals are those of the place where the fit ended
         line = derived(theta, local, line, line.residual)
     if not all(np.all(np.isfinite(t)) for t in line.tangent):
         return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite where the fit ends")
-    return _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
+    out = _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
+    return out if settled or not rough else replace(out, promise=promised)
 
 
 def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple[np.ndarray, np.ndarray, float]:

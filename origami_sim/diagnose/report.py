@@ -378,7 +378,9 @@ def _overlay(t: Trace, onset: float) -> Html:
 
 
 def _where(d: Diagnosis, geometry: dict | None) -> list:
-    shares = {p.site: p.share for p in d.places}
+    shares: dict[str, float] = {}
+    for p in d.places:  # those of one name are one region
+        shares[p.site] = shares.get(p.site, 0.0) + p.share
     panels = _panel_shares(d)
     out: list = []
     if geometry is not None:

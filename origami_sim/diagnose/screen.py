@@ -236,10 +236,13 @@ def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
     goal = np.sqrt(_size(base, few[0], weights)) + 1.0
     size = np.array([_affordable(forward, base, s, s.free[0].scale) for s in group])
     change = _changes(forward, group, size, base, few)  # on one block first
-    size, _ = _resized(forward, group, size, change[0], goal, base, weights)
-    change = _changes(forward, group, size, base, blocks)
-    wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
-    redo = np.flatnonzero(off & (wanted != size))
+    wanted, _ = _resized(forward, group, size, change[0], goal, base, weights)
+    if few == blocks:
+        redo = np.flatnonzero(wanted != size)
+    else:
+        change, size = _changes(forward, group, wanted, base, blocks), wanted
+        wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
+        redo = np.flatnonzero(off & (wanted != size))
     if len(redo):
         size[redo] = wanted[redo]
         for c, new in zip(change, _changes(forward, [group[k] for k in redo], size[redo], base, blocks), strict=True):

@@ -11,8 +11,17 @@ import numpy as np
 
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Curve, Place
-from origami_sim.diagnose.forward import Block, Forward, angle_mask, component_names, continuous, drive_of, stacked
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, at_several_times
+from origami_sim.diagnose.forward import (
+    Block,
+    Forward,
+    angle_mask,
+    component_names,
+    continuous,
+    distinct_motions,
+    drive_of,
+    stacked,
+)
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, at_several_times, told_apart
 from origami_sim.diagnose.locate import BINS, PASSIVE
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.track import coordinates
@@ -33,9 +42,6 @@ HOLD = 1e6
 
 TIMED = ("clock_delay", "clock_rate", "exposure", "tracker_lag")
 """Effects of the measurement that need a clock, which load steps do not have."""
-
-SITES = 4
-"""Creases that one channel may be asked to tell apart."""
 
 CLOSE = 1e-10
 """A Newton step shorter than this part of the device ends the search for an equilibrium."""
@@ -105,13 +111,14 @@ class CurveForward(Forward, ABC):
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
         effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
         worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
+        moves, of = distinct_motions(worlds)
         curves = {}
         for r in sorted({self.blocks[b].recording for b in wanted}):
             recording = self.recordings[r]
-            curve = self._curve(r, worlds)
-            first = np.repeat(stacked(recording)[0][0][:, None], len(worlds), axis=1)
+            curve = self._curve(r, [worlds[m] for m in moves])
+            first = np.repeat(stacked(recording)[0][0][:, None], len(moves), axis=1)
             continuous(curve, angle_mask(recording), first)
-            curves[r] = self._read(each, worlds, recording, curve)
+            curves[r] = self._read(each, worlds, recording, curve[:, :, of])
         out = []
         for b in wanted:
             block = self.blocks[b]
@@ -131,13 +138,9 @@ class CurveForward(Forward, ABC):
         """The suspects that curves can be asked about.
 
         Load steps have no clock: what needs one is left out. In time, an effect with a time constant is suspected with
-        several, spread over the recording, because its signature changes with it altogether. Where there are many more
-        creases or panels than channels (a beam of cells), only all of them together are suspected.
+        several, spread over the recording, because its signature changes with it altogether. See also `told_apart`.
         """
-        for kind in ("crease", "panel"):
-            sites = {s.entities for s in every if s.kind == kind and s.entities is not None}
-            if len(sites) > SITES * len(self.components):
-                every = [s for s in every if s.kind != kind or s.entities is None]
+        every = told_apart(every, len(self.components))
         if all(r.by_step for r in self.recordings):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]

@@ -143,7 +143,8 @@ class _Weighed:
             ones, of probability `total`. gain, error: held-out log score of the best over the base.
         p_value, p_small: that noise, and that noise and effects too small to be told, give so good a suspect.
         holds: whether the gain is reproducible. tested: whether any suspect could be.
-        over, left, removed: held-out error over the noise before and after; part of what can be removed that was.
+        over, left, removed: held-out error over the noise before and after, root mean square over components; part of
+            what can be removed that was.
         before, after: structure of the residuals.
     """
 
@@ -247,8 +248,8 @@ def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, scree
         level=o.level,
         holds=repeats and nearer(scores[id(best)], scores[id(base)]),
         tested=bool(screening.signatures),
-        over=float(before.max()),
-        left=float(after.max()),
+        over=pooled(before),
+        left=pooled(after),
         removed=removable(before, after),
         before=structure(base, best),
         after=structure(best, best),
@@ -348,8 +349,9 @@ def _named(w: _Weighed) -> _Said:
         text += f" (p = {probability:.2f})"
     else:
         where = "" if len(same) == 1 or w.probability(w.best) > 0.9 * probability else " (the site is less certain)"
-        site = w.best.hypothesis.suspects[0].site
-        word, text = "MECHANISM", f"At {site} the model lacks {_say(w.best)}{where}, p = {probability:.2f}"
+        s = w.best.hypothesis.suspects[0]
+        lacks = "there is" if s.more else "the model lacks"
+        word, text = "MECHANISM", f"At {s.site} {lacks} {_say(w.best)}{where}, p = {probability:.2f}"
     return _Said(word, f"{text}; {w.fall}.", probability, [s.label for s in suspects], w.best)
 
 
@@ -413,6 +415,11 @@ def kind(f: Fit) -> str:
     if not kinds:
         return "nominal"
     return "measurement" if kinds == {"measurement"} else "mechanism"
+
+
+def pooled(errors: np.ndarray) -> float:
+    """Root mean square of what components miss, in multiples of their noise (D,)."""
+    return float(np.sqrt(np.nanmean(np.square(errors))))
 
 
 def removable(before: np.ndarray, after: np.ndarray) -> float:
@@ -545,7 +552,9 @@ def distrust(f: Fit, forward) -> str:
 
 def _notes(forward, screening: Screening) -> list[str]:
     notes = []
-    if len({b.recording for b in forward.blocks}) == 1:
+    if len(forward.blocks) == 1 and forward.local:
+        notes.append("One segment only: nothing is held out, and all errors are those of the fit.")
+    elif len({b.recording for b in forward.blocks}) == 1:
         notes.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
     lost = [s.suspect.label for s in screening.untestable]
     if lost:
@@ -580,9 +589,13 @@ def _say(f: Fit) -> str:
     for s in f.hypothesis.suspects:
         n = s.free[0]
         t, d = value[id(n)], deviation[id(n)]
-        low, high = (said(v, n.unit, 2) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
+        digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
+        low, high = (said(v, n.unit, digits) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
         what = title(s.effect)
-        out.append(f"{what} at {s.site} ({n.name.replace('_', ' ')} {said(t, n.unit, 2)}, 95 %: {low} to {high})")
+        if s.more:
+            what = f"{'more' if t > 0 else 'less'} {what} than stated"
+        strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
+        out.append(f"{what} at {s.site} ({strength}, 95 %: {low} to {high})")
     return _join(out)
 
 

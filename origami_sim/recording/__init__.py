@@ -2,7 +2,7 @@
 
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.dataset import DataSet, read_dataset
-from origami_sim.recording.drives import applied_drive
+from origami_sim.recording.drives import applied_drive, by_component
 from origami_sim.recording.initial_state import AngleEstimate, initial_angles
 from origami_sim.recording.lint import Series, lint, lint_report
 from origami_sim.recording.noise import NoiseReport, noise_report
@@ -22,6 +22,7 @@ __all__ = [
     "Recording",
     "Series",
     "applied_drive",
+    "by_component",
     "double_pendulum_rhs",
     "estimate_noise",
     "initial_angles",

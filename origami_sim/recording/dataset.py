@@ -25,7 +25,8 @@ class DataSet:
         notes: what stood out when they were put together, e.g. replicates.
 
     Raises:
-        InputError: names or files that stand twice, channels, kinds, units, attachments or scenes that differ.
+        InputError: names or files that stand twice; channels, kinds, units, attachments, scenes, overrides or priors
+            that differ.
     """
 
     name: str
@@ -200,6 +201,19 @@ def _same(first: Recording, other: Recording):
             value=scenes[1].get("name"),
             allowed=str(scenes[0].get("name")),
         )
+    for what, mine, theirs in (
+        ("scene.overrides", *(s.get("overrides") or {} for s in scenes)),
+        ("priors", *(r.metadata.get("priors") or {} for r in (first, other))),
+    ):
+        if mine != theirs:
+            raise InputError(
+                f"'{first.name}' ({first.metadata.get('sidecar')}) and '{other.name}' are of one object but state "
+                f"different {what.rpartition('.')[2]}",
+                file=other.metadata.get("sidecar"),
+                field=what,
+                value=theirs,
+                allowed=str(mine),
+            )
     for name in first.drive.keys() & other.drive.keys():
         if first.drive[name].unit != other.drive[name].unit:
             raise InputError(

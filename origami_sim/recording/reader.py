@@ -15,7 +15,7 @@ from origami_sim.recording.noise import noise_report
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.recording.table import Table, read_bytes, read_table
-from origami_sim.recording.trackers import detect, read_export
+from origami_sim.recording.trackers import FORMATS, detect, read_export
 from origami_sim.recording.units import si_unit, unit_factor
 
 
@@ -90,6 +90,13 @@ def _read_any(path: Path, data: bytes, side: Sidecar) -> tuple[Table, str]:
     """The table of any format, and which format it was."""
     form = side.source["format"] or detect(path, data)
     if form == "table":
+        if path.suffix.lower() in (".csv", ".txt") and b"\0" in data[:1000]:
+            raise InputError(
+                "is no text, and its first lines show no known format",
+                file=path,
+                field="source.format",
+                allowed=", ".join(FORMATS),
+            )
         if side.source["likelihood"] is not None:
             raise InputError("a plain table has no scores", file=side.file, field="source.likelihood")
         return read_table(path, data, side.columns, list(side.select)).select(side.select), form

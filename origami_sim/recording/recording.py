@@ -1,5 +1,6 @@
 """What was measured: channels over time with noise, drive and attachment, whatever wrote the file."""
 
+import re
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import comb
@@ -128,6 +129,11 @@ class Recording:
     metadata: dict = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for what, text in (("name", self.name), *(("channels", name) for name in self.channels)):
+            if re.search(r"[\x00-\x1f\x7f]", text):  # it stands in comments and tables of what is written
+                raise InputError(
+                    "a name must have no control characters", file=self.metadata.get("sidecar"), field=what, value=text
+                )
         for channel in self.channels.values():
             if channel.kind not in CHANNEL_KINDS:
                 raise InputError(

@@ -51,7 +51,7 @@
 
     [scene]
     name = "pendulum_chain"             # the scene that simulates this object
-    overrides = { arm1_mass = 0.09 }    # arguments of its build()
+    overrides = { mass_1 = 0.09 }       # settings of this object that differ; not over a calibration of its own
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
     mass_1 = 0.5e-3                     # in the unit of the scene's setting, or "5 %" of its value, or "0.5 mm"
@@ -311,6 +311,8 @@ def _drive_spec(path: Path, name: str, table: object) -> dict[str, Any]:
         if key in given and "file" not in given:
             section.refuse("is only for a drive in a file of its own", section.prefix + key, given[key])
     for key in ("value", "values"):
+        if key in given and (given[key] == [] or [] in _listed(given[key])):
+            section.refuse("must not be empty", section.prefix + key, given[key])
         for row in _listed(given.get(key, [])):
             for component in _listed(row) if key == "values" else [row]:
                 section.check_number(key, component)

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay
 from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.report import read_report
 from origami_sim.diagnose.subject import spreads
+from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
 from origami_sim.recording import read_recording
@@ -310,7 +312,6 @@ def test_a_drive_on_its_own_clock_reaches_the_model():
     """Samples between the frames are kept, also where the recording is thinned and starts later than the drive."""
     from origami_sim.diagnose.diagnose import thinned
     from origami_sim.diagnose.forward import drive_of
-    from origami_sim.drive import Drive
     from origami_sim.recording import Channel, DriveChannel, Recording
 
     times = 2.0 + np.arange(40) / 20.0
@@ -327,6 +328,145 @@ def test_the_first_value_that_is_not_missing_tells_the_turn():
 
     values = np.array([[np.nan, 1.0, np.nan], [5.0, 2.0, np.nan], [6.0, 3.0, np.nan]])
     np.testing.assert_array_equal(seen_first(values), [5.0, 1.0, np.nan])
+
+
+def recorded_drive(name: str, values, unit: str = "T", *, constant: bool = False):
+    """A recording of nothing but this drive."""
+    from origami_sim.recording import DriveChannel, Recording
+
+    return Recording("r", np.arange(20) / 10, {}, {name: DriveChannel(name, np.array(values), unit, constant)})
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit", "said"),
+    [
+        ("field", np.ones(20), "T", "value 1.; allowed: 3, or one with a direction"),
+        ("field", np.ones((20, 2)), "T", "value 2.; allowed: 3"),
+        ("field", np.ones((20, 4)), "T", "value 4.; allowed: 3"),
+        ("field", np.ones((20, 3)), "V", "another unit .*'V'.; allowed: T"),
+        ("gradient", np.ones((20, 3)), "T/m", "value 3.; allowed: 9"),
+        ("temperature", np.ones((20, 2)), "K", "value 2.; allowed: 1"),
+        ("current", np.ones(20), "A", "knows no such drive"),
+        ("field_q", np.ones(20), "T", "knows no such drive"),
+        ("voltage_3", np.ones(20), "V", "the model has no such drive channel .*voltage_3"),
+    ],
+)
+def test_drives_that_cannot_be_are_refused(name, values, unit, said):
+    from origami_sim.diagnose.forward import drive_of
+
+    recording = recorded_drive(name, values, unit)
+    recording.metadata["sidecar"] = "r.toml"
+    with pytest.raises(InputError, match=said) as caught:
+        drive_of(recording, Drive())
+    assert str(caught.value).startswith("r.toml: ")
+
+
+def test_drives_of_several_components_reach_their_channels():
+    from origami_sim.diagnose.forward import drive_of
+
+    gradient = drive_of(recorded_drive("gradient", np.arange(9.0), "T/m", constant=True), Drive())
+    assert [float(gradient[f"gradient_{i}{j}"](0.3)) for i in "xyz" for j in "xyz"] == list(range(9))
+    assert float(drive_of(recorded_drive("field", [0.0, 0.0, 0.2], constant=True), Drive())["field_z"](1.0)) == 0.2
+    two = drive_of(recorded_drive("voltage", np.outer(np.arange(20), [1.0, 2.0]), "V"), Drive(voltage=[0.0, 0.0]))
+    assert float(two["voltage_1"](0.55)) == pytest.approx(11.0)
+
+
+def test_what_the_scene_drives_by_itself_is_told():
+    """A note names what no recording states and how large it is; a curve takes nothing from the scene."""
+    own = Drive(field=(0.0, 0.0, sine(0.2, 3.0)), temperature=5.0)
+    silent = recorded_drive("load", 0.0, "1", constant=True)
+    (note,) = command._assumed(silent, own)
+    assert note.startswith("'r' states no field_z, temperature: the scene's own is assumed ")
+    assert note.endswith("(field_z up to 200 mT, temperature up to 5.0 K).")
+    assert command._assumed(silent, Drive()) == []
+    (note,) = command._assumed(recorded_drive("field", np.zeros((20, 3))), own)
+    assert "field" not in note and "temperature" in note
+    silent.metadata["time_base"] = "step"
+    assert command._assumed(silent, own) == []
+
+
+FLAP = """\
+name = "flap"
+[time]
+column = "time_s"
+[channels.fold]
+column = "fold"
+kind = "crease_angle"
+unit = "rad"
+crease = 0
+[scene]
+name = "mae_crease"
+overrides = { stiffness = 0.03 }
+[priors]
+stiffness = "5 %"
+"""
+
+
+@pytest.fixture
+def reached(monkeypatch) -> list:
+    """What the command hands to the diagnosis, which is left out."""
+    handed = []
+
+    def stop(*arguments, **_):
+        handed.append(arguments)
+        raise InputError("stopped here")
+
+    monkeypatch.setattr(command, "diagnose", stop)
+    return handed
+
+
+def test_a_drive_that_is_not_stated_is_a_note_of_the_diagnosis(reached, tmp_path, capfd):
+    path = table(tmp_path / "flap.csv", T, {"fold": 0.1 * WAVE}, FLAP)
+    assert main("diagnose", path, "--model", "mae_crease", "--out", tmp_path / "out") == 2
+    note = "'flap' states no field_z: the scene's own is assumed (field_z up to 200 mT)."
+    assert f"note: {note}" in capfd.readouterr().out
+    subject, (recording,), _ = reached[0]
+    assert recording.metadata["notes"][-1] == note
+    assert subject.nominals[0].start == 0.03
+
+
+def test_overrides_do_not_undo_what_was_refitted(reached, tmp_path, capfd):
+    """A calibration of this object states its numbers; the sidecar's are over those of the scene only."""
+    path = table(tmp_path / "flap.csv", T, {"fold": 0.1 * WAVE}, FLAP)
+    settings = scene_settings(scene_module("mae_crease")).replace(stiffness=0.021)
+    nothing = SimpleNamespace(patch={}, candidates=[], recordings=["r"], verdict="ADEQUATE", sentence="Noise.")
+    own = write_patch(tmp_path / "own.toml", settings, nothing, scene="mae_crease")  # type: ignore[arg-type]
+    assert main("diagnose", path, "--model", own, "--out", tmp_path / "out") == 2
+    assert "overrides are left out" in capfd.readouterr().out
+    assert main("diagnose", path, "--model", own, "--set", "stiffness=0.04", "--out", tmp_path / "out") == 2
+    assert [handed[0].nominals[0].start for handed in reached] == [0.021, 0.04]
+
+
+def test_the_worked_sidecar_of_the_manual_works(reached, tmp_path, capfd):
+    """With a table and a log of the supply that are made up."""
+    text = (Path(__file__).resolve().parents[2] / "docs" / "recordings.md").read_text()
+    (tmp_path / "flap.toml").write_text(text.split("```toml\n")[1].split("```")[0])
+    rng, head = np.random.default_rng(2), ["scorer" + 6 * ",net", "bodyparts" + 3 * ",tip" + 3 * ",corner"]
+    rows = [",".join(f"{v:.3f},{w:.3f},0.99" for v, w in rng.normal([(650, 655)] * 2, 1.0)) for _ in range(60)]
+    lines = [*head, "coords" + 2 * ",x,y,likelihood", *(f"{k},{row}" for k, row in enumerate(rows))]
+    (tmp_path / "flap.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "supply.csv").write_text("ms,b\n" + "".join(f"{k},{5 * np.sin(k / 30):.6f}\n" for k in range(340, 620)))
+    assert main("diagnose", tmp_path / "flap.csv", "--model", "mae_crease", "--out", tmp_path / "out") == 2
+    assert "stopped here" in capfd.readouterr().err
+    subject, (recording,), _ = reached[0]
+    assert recording.metadata["notes"] == []
+    assert [f.name for f in subject.nominals] == ["stiffness"]
+
+
+def test_a_full_disk_costs_only_what_would_have_been_kept(tmp_path, monkeypatch):
+    from origami_sim.diagnose import keep
+
+    def full(file, **_):
+        file.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as m:
+        m.setattr(keep.np, "savez", full)
+        keep._write(tmp_path / "one.npz", [np.zeros(3)])
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "taken").write_text("")
+    keep._write(tmp_path / "taken" / "one.npz", [np.zeros(3)])
+    assert keep._read(tmp_path / "taken" / "one.npz", 1) is None
 
 
 # what it refuses -------------------------------------------------------------------------------------------------
@@ -418,6 +558,25 @@ BAD = {
     "another scene": (T, {"theta1_rad": WAVE}, SIDECAR.replace("pendulum_chain", "box"), "another scene"),
     "a prior of nothing": (T, {"theta1_rad": WAVE}, SIDECAR.replace("mass_1", "weight"), "weight"),
     "an override of nothing": (T, {"theta1_rad": WAVE}, SIDECAR.replace("mass_2", "load_2"), "load_2"),
+    "a scene that does not exist": (T, {"theta1_rad": WAVE}, SIDECAR.replace("pendulum_chain", "chian"), "not exist"),
+    "a drive that nothing knows": (
+        T,
+        {"theta1_rad": WAVE},
+        SIDECAR + '[drive.current]\nvalue = 1.0\nunit = "A"\n',
+        "knows no such drive (field 'drive.current'); allowed: field, gradient, voltage",
+    ),
+    "a field without a direction": (
+        T,
+        {"theta1_rad": WAVE, "b": 1e-3 * T},
+        SIDECAR + '[drive.field]\ncolumn = "b"\nunit = "T"\n',
+        "wrong number of components (field 'drive.field', value 1); allowed: 3, or one with a direction",
+    ),
+    "degrees read as a crease's radians": (
+        T,
+        {"theta1_rad": 25 * WAVE},
+        CREASE.replace("crease = 7", "crease = 0"),
+        "degrees read as radians?",
+    ),
 }
 
 
@@ -429,6 +588,7 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
     err = [line for line in capfd.readouterr().err.splitlines() if line.startswith("origami-sim: ")]
     assert len(err) == 1
     assert said in err[0]
+    assert str(tmp_path / "bad.") in err[0]  # the table or its sidecar
     assert err[0].endswith(".")
     assert not [p for p in (tmp_path / "out").rglob("*") if p.is_file()]
 
@@ -443,10 +603,14 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
         (("--model", "pendulum_chain", "--prior", "mass_1=-1%"), "not a standard deviation"),
         (("--model", "pendulum_chain", "--prior", "mass_1=2 mm"), "wrong unit"),
         (("--model", "pendulum_chain", "--prior", "nothing=1"), "for a number of the model"),
-        (("--model", "pendulum_chain", "--set", "gravity=0"), "out of its range"),
+        (("--model", "pendulum_chain", "--set", "gravity=0"), "--set: out of its range"),
+        (("--model", "pendulum_chain", "--set", "weight=1"), "--set: cannot apply"),
         (("--model", "pendulum_chain", "--segment", "0"), "must be positive"),
         (("--model", "pendulum_chain", "--seed", "-1"), "must not be negative"),
         (("--model", "pendulum_chain", "--out", "taken"), "is a file"),
+        (("--model", "pendulum_chain", "--out", "/proc/x"), "/proc/x: cannot be written"),
+        (("--model", "pendulum_chain", "--out", 300 * "x"), "cannot be written"),
+        (("--model", "patched.toml", "--out", "."), "the model would be overwritten (field '--out'"),
     ],
 )
 def test_bad_arguments_are_one_sentence(arguments, said, recorded, tmp_path, monkeypatch, capfd):
@@ -613,8 +777,6 @@ def test_entities_that_the_model_lacks_are_refused():
 
 def test_a_patch_reads_back_as_it_was_written(diagnosed, tmp_path):
     """Words, choices, ranges and numbers of every scene, to the last digit."""
-    from types import SimpleNamespace
-
     nothing = SimpleNamespace(patch={}, candidates=[], recordings=["r"], verdict="ADEQUATE", sentence="Noise.")
     for name in NAMES:
         settings = scene_settings(scene_module(name))

@@ -10,8 +10,8 @@ from scipy.stats import multivariate_normal
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
 from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
-from origami_sim.diagnose.forward import FINER, NEAR, local_line, refined
-from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects
+from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
+from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, rated, screen, widening
 from origami_sim.diagnose.trust import trust
@@ -353,6 +353,44 @@ def test_a_tether_is_suspected_at_the_edge_of_each_panel_and_relaxation_at_sever
     span = forward.recordings[0].times[-1] - forward.recordings[0].times[0]
     assert len(slow) == 4 and 0.03 < slow[0] and slow[-1] < span
     assert np.diff(np.log(slow)) == pytest.approx(np.log(slow[1] / slow[0]))
+
+
+def test_creases_and_panels_of_one_name_are_one_suspect(stiff):
+    forward = stiff[0]
+    model = replace(forward.model, names={"crease": ("upper", "lower"), "panel": ("held", "flap", "flap")})
+    every = suspects(model, forward.recordings, forward.drive)
+    found = [(s.site, s.entities) for s in every if s.effect == "crease_set"]
+    assert found == [("upper", (0,)), ("lower", (1,)), ("all creases", None)]
+    (drag,) = (s for s in every if s.effect == "air_drag")
+    assert drag.site == "flap" and np.all(model.triangle_panel[list(drag.entities or ())] > 0)
+    assert len(drag.entities or ()) == np.count_nonzero(model.triangle_panel > 0)
+    same = replace(model, names={"crease": ("fold", "fold")})
+    sites = [s.site for s in suspects(same, forward.recordings, forward.drive) if s.effect == "crease_set"]
+    assert sites == ["fold"]
+
+
+def test_of_many_more_creases_than_channels_all_are_suspected_together(stiff):
+    forward = stiff[0]
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    assert told_apart(every, 1) == every
+    assert {s.site for s in told_apart(every, 0) if s.kind in ("crease", "panel")} == {"all creases", "all panels"}
+
+
+def test_a_motion_that_is_measured_in_several_ways_is_simulated_once(stiff, monkeypatch):
+    forward, base, *_ = stiff
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    measured = [s for s in every if s.effect in ("angle_scale", "angle_offset")]
+    hypotheses = [Hypothesis(), *(Hypothesis((s,)) for s in measured), Hypothesis((stiff[3],))]
+    thetas = [np.concatenate([base.theta, [f.scale for f in h.free]]) for h in hypotheses]
+    local = np.repeat(base.local[None], len(hypotheses), axis=0)
+    alone = [forward.predict(h, t[None], base.local[None]) for h, t in zip(hypotheses, thetas, strict=True)]
+    worlds, make = [], Forward._batch
+    monkeypatch.setattr(Forward, "_batch", lambda self, *a: (b := make(self, *a), worlds.append(b.worlds))[0])
+    found = forward.predict(hypotheses, thetas, local)
+    assert set(worlds) >= {2 * len(forward.blocks)} and max(worlds) == 2 * len(forward.blocks), "plain, and stiffer"
+    for b, values in enumerate(found):
+        for k, v in enumerate(values):
+            np.testing.assert_allclose(v, alone[k][b][0], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("cosine", "left"), [(0.0, 1.0), (-0.8, 0.2), (0.6, 1.6)])

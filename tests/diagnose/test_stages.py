@@ -1,6 +1,7 @@
 """The diagnosis on constructed cases with known answers, stage by stage."""
 
 from dataclasses import replace
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,16 +9,19 @@ import pytest
 
 from origami_sim.diagnose import Options, diagnose, experiment
 from origami_sim.diagnose.articulation import Articulation
-from origami_sim.diagnose.compare import memory, probabilities
+from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit, unbent
 from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.screen import _affordable, screen
+from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import dihedral_angles
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from tests.diagnose.strips import hanging, record, subject
+
+diagnosis = import_module("origami_sim.diagnose.diagnose")
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
 LOOPS = ("crease_friction", "crease_hysteresis", "air_drag", "crease_stiffening", "crease_offset", "mass_damping")
@@ -107,6 +111,22 @@ def test_a_nested_model_never_fits_worse(rubbing):
     assert chosen(screening, 2)[0] is screening.signatures[0]
 
 
+def test_fits_that_are_left_far_behind_stay_rough(rubbing, monkeypatch):
+    """A rough fit is no better than the finished one; only those that come near the best one are carried on."""
+    forward, _, base, weights, screening = rubbing
+    carried, plain = [], diagnosis.finished
+    monkeypatch.setattr(diagnosis, "finished", lambda f, r, *a: (carried.append(r), plain(f, r, *a))[1])
+    finalists = [*chosen(screening, 4), screening.signatures[-1]]
+    fits = diagnosis.contest(forward, base, finalists, screening, weights, lambda part: None)
+    assert fits[0] is base and [f.hypothesis.suspects for f in fits[1:]] == [(s.suspect,) for s in finalists]
+    rough = [diagnosis.roughly(forward, base, s, weights, screening) for s in finalists]
+    assert all(f.cost <= r.cost <= base.cost * (1 + 1e-9) for f, r in zip(fits[1:], rough, strict=True))
+    gain = base.cost - min(r.cost for r in rough)
+    near = [r for r in rough if base.cost - min(r.cost, r.promise) >= min(0.5 * gain, gain - 50.0)]
+    labels = {r.hypothesis.label for r in near}
+    assert {r.hypothesis.label for r in carried} == labels and 0 < len(labels) < len(rough)
+
+
 def test_what_keeps_panels_in_shape_is_screened_as_strongly_beside_softer_panels():
     forward = arranged(subject(3), [record(duration=2.0, panels=3)], Options(threads=1))
     theta = np.array([f.start for f in forward.subject.nominals])
@@ -180,7 +200,7 @@ def test_a_large_error_of_the_scale_is_the_measurement():
     found = diagnose(subject(3), [record(scale=0.7, **SMALL)], catalogue=(*LOOPS, "angle_scale"))
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_scale at the measurement"
     scale = next(n for n in found.candidates[0].numbers if n.label == "angle_scale.angle_scale")
-    assert scale.low < -0.3 < scale.high and scale.value == pytest.approx(-0.3, abs=0.02)
+    assert scale.low < -0.3 < scale.high and scale.high - scale.low < 0.06
 
 
 def test_more_loss_at_one_crease_is_found_where_the_model_has_that_loss():
@@ -213,6 +233,61 @@ def test_false_alarms_are_counted_over_a_hundred_nulls():
     assert len(alarms) <= 9, alarms
 
 
+def test_frames_are_thinned_but_not_below_what_a_comparison_needs():
+    swing = record(**SMALL)
+    (same,) = prepared([replace(swing, times=swing.times / 100)], 200.0)
+    assert len(same.times) == len(swing.times), "40 ms at 10 kHz are few frames, not many"
+    long = record(panels=3, duration=5.0, rate=400)
+    (half,) = prepared([long], 200.0)
+    assert len(half.times) == pytest.approx(len(long.times) / 2, abs=1)
+
+
+def test_a_segment_that_is_asked_for_has_a_start_of_its_own(monkeypatch):
+    monkeypatch.setattr(diagnosis, "starting", lambda *_: "rest")
+    at_rest = record(**SMALL)
+    assert arranged(subject(3), [at_rest], Options()).start == "rest"
+    cut = arranged(subject(3), [at_rest], Options(segment=0.5))
+    assert cut.start == "fit" and len(cut.blocks) > 1
+    for length in (0.0, 1e-9, np.inf, np.nan):
+        with pytest.raises(InputError, match=r"segment.*allowed: >= 0\.08 s"):
+            arranged(subject(3), [at_rest], Options(segment=length))
+
+
+def test_one_recording_from_rest_is_held_out_stretch_by_stretch(rubbing):
+    """A number that one stretch tells alone is not known when that is left out."""
+    at_rest = arranged(subject(3), [record(size=0.0, **SMALL)], Options(start="rest"))
+    _, base, weights = nominal_fits(at_rest)
+    assert len(base.blocks) == 1
+    found = score(at_rest, base, weights)
+    assert len(found.held_out) == len(found.squares) == FOLDS
+    pieces = base.linear.cut(FOLDS, len(weights.deviation))
+    assert np.concatenate(pieces.residual) == pytest.approx(base.linear.residual[0])
+    early = [(1.0 if n == 1 else 1e-2) * np.ones_like(t) for n, t in enumerate(pieces.tangent)]
+    alone = score(at_rest, replace(base, linear=replace(base.linear, tangent=[np.concatenate(early)])), weights)
+    squares = [float(r @ r) for r in pieces.residual]
+    assert alone.squares[1] > 2.0 * squares[1] and np.delete(alone.squares, 1) == pytest.approx(
+        np.delete(squares, 1), rel=0.3
+    )
+
+
+def test_effects_that_cannot_act_are_not_left_out_without_a_word(rubbing):
+    forward = rubbing[0]
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    assert {s.effect for s in diagnosis.among(every, ["crease_friction", "adhesion"])} == {"crease_friction"}
+    with pytest.raises(InputError, match=r"none of these can act.*adhesion.*air_drag.*crease_friction"):
+        diagnosis.among(every, ["adhesion"])
+    with pytest.raises(InputError, match="no such effect"):
+        diagnosis.among(every, ["crease_frictn"])
+
+
+def test_residuals_are_held_against_the_drive_that_varies(rubbing):
+    forward = rubbing[0]
+    assert diagnosis._varying_drive(forward) == (None, "rate")
+    driven = Drive(field=(0, 0, sine(0.01, 1.0)))
+    turned = SimpleNamespace(_drives=[driven], recordings=forward.recordings)
+    assert diagnosis._varying_drive(turned) == ("field_z", "drive field_z")
+
+
 def test_bad_data_are_named():
     with pytest.raises(InputError, match="nothing to diagnose"):
         diagnose(subject(), [])
@@ -221,12 +296,22 @@ def test_bad_data_are_named():
         diagnose(subject(), [short])
 
 
+def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
+    forward, _, base, weights, screening = rubbing
+    best, rival = (refit(forward, base, s, weights, screening) for s in chosen(screening, 2))
+    for n, (what, _) in enumerate(experiment._menu(forward)[:3]):
+        fresh, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights)
+        _, known = experiment.separation(experiment._menu(forward)[n][1], best, base, weights)
+        again, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights, known)
+        assert again == pytest.approx(fresh, rel=0.25, abs=0.3), what
+
+
 @pytest.mark.parametrize(("second", "told", "best"), [(0.5, [0, 2], "c"), (3.5, [0, 1, 2], "b")])
 def test_the_next_experiment_is_for_rivals_that_can_be_told(monkeypatch, second, told, best):
     """The nearest rival counts, but for one that nothing in the menu would tell apart."""
     apart = {"a": (6.0, 0.5, 3.0), "b": (9.0, second, 2.0), "c": (4.0, 0.1, 4.0)}
     monkeypatch.setattr(experiment, "_menu", lambda forward: [(w, w) for w in apart])
-    monkeypatch.setattr(experiment, "separation", lambda what, one, rival, weights: apart[what][rival.number])
+    monkeypatch.setattr(experiment, "separation", lambda what, one, rival, *_: (apart[what][rival.number], None))
 
     def explanation(number):
         return SimpleNamespace(number=number, hypothesis=SimpleNamespace(label=f"rival {number}"))

@@ -93,6 +93,8 @@ def test_replicates_are_told_and_copies_refused(folder):
         ),
         (lambda s: s.replace('"arch"', '"box"'), "name different scenes"),
         (lambda s: s.replace('[time]\ncolumn = "t"\n', ""), "mix load steps and times"),
+        (lambda s: s + "overrides = { gap = 1e-3 }\n", r"weak\.toml: .*strong\.toml.* different overrides .*gap.*: {}"),
+        (lambda s: s + '[priors]\ngap = "5 %"\n', r"weak\.toml: .*strong\.toml.* different priors .*5 %.*: {}"),
     ],
 )
 def test_recordings_of_different_objects_are_refused(folder, change, words):

@@ -232,6 +232,10 @@ TABLE_FAULTS = {
         "is stated in rad but reaches 178, which looks like degrees",
     ),
     "not text": (lambda s: s.encode() + b"\xff\xfe,1,2\n", "line 52 (is not UTF-8|holds no number)"),
+    "binary": (
+        lambda s: bytes(range(256)) * 4,
+        "is no text, .*allowed: table, motive, deeplabcut, sleap, c3d, tracker",
+    ),
     "header not text": (lambda s: b"\xff\xfe" + s.encode(), "the header in line 1 is not UTF-8 text"),
 }
 
@@ -300,7 +304,14 @@ SIDECAR_FAULTS = {
     "drive nested": (lambda s: s + '[drive.b]\nvalue = [[1.0]]\nunit = "T"\n', "must be a finite number"),
     "channel no table": (lambda s: "[channels]\ntheta = 1\n", "must be a table"),
     "drive no table": (lambda s: "drive = 1\n" + s, "must be a table .*'drive'"),
+    "drive empty": (lambda s: s + '[drive.voltage]\nvalue = []\nunit = "V"\n', "must not be empty"),
+    "samples empty": (
+        lambda s: s + '[drive.voltage]\ntimes = [0, 1]\nvalues = [[], []]\nunit = "V"\n',
+        "must not be empty",
+    ),
     "name empty": (lambda s: 'name = ""\n' + s, "must be a text"),
+    "name of two lines": (lambda s: 'name = "a\\nb"\n' + s, r"no control characters .*'name', value 'a\\nb'"),
+    "channel of two lines": (lambda s: s.replace("theta", '"a\\u0000"'), "no control characters .*'channels'"),
 }
 
 

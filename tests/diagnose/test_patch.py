@@ -1,0 +1,85 @@
+"""Calibrations that change an effect which a model has, and what a verdict says of such a finding."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
+from origami_sim.diagnose.patch import additions, read_additions, switched_on
+from origami_sim.diagnose.verdict import _say
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from tests.diagnose.strips import hanging, record
+
+VISCOSITY = ("crease_viscosity", "viscosity")
+
+
+def table(text: dict, tmp_path):
+    return read_additions({"crease_viscosity": text}, tmp_path / "patched.toml")
+
+
+@pytest.mark.parametrize("change", [2e-6, -3e-6])
+def test_more_of_an_effect_is_patched_in_as_it_was_fitted(tmp_path, change):
+    """The simulator runs a patched calibration with the numbers of the hypothesis that was fitted."""
+    model, parameters = hanging(3)
+    (lower,) = (
+        s
+        for s in suspects(model, [record(panels=3, duration=1.0)], Drive(), parameters)
+        if s.effect == "crease_viscosity" and s.entities == (1,)
+    )
+    assert lower.more
+    fitted = apply(parameters, Hypothesis((lower,)), [change], model)
+    (found,) = additions(
+        SimpleNamespace(
+            patch={"crease_viscosity.viscosity@1": change},
+            changed=["crease_viscosity"],
+            candidates=[],
+            recordings=["swing"],
+            verdict="MECHANISM",
+        ),  # type: ignore[arg-type]
+        {},
+    )
+    assert found.more
+    again = table({"entities": list(found.entities or ()), "more": True, **found.values}, tmp_path)
+    _, patched = switched_on(again, model, parameters)
+    np.testing.assert_array_equal(patched[VISCOSITY], fitted[VISCOSITY])
+    assert patched[VISCOSITY][1, 0] - parameters[VISCOSITY][1, 0] == pytest.approx(change)
+    assert patched[VISCOSITY][0, 0] == parameters[VISCOSITY][0, 0]
+
+
+def test_more_adds_to_a_table_above_it_and_stays_within_bounds(tmp_path):
+    model, parameters = hanging(3)
+    first = {"entities": [1], "friction_moment": 1e-4}
+    trees = [
+        {"crease_friction": [first, {"entities": [1], "more": True, "friction_moment": by}]} for by in (5e-5, -3e-4)
+    ]
+    values = [
+        switched_on(read_additions(t, tmp_path / "p.toml"), model, parameters)[1]["crease_friction", "friction_moment"]
+        for t in trees
+    ]
+    assert values[0].ravel() == pytest.approx([0.0, 1.5e-4]) and values[1].ravel() == pytest.approx([0.0, 0.0])
+    with pytest.raises(InputError, match=r"no such effect to have more of.*effects\.crease_friction\.more"):
+        switched_on(read_additions({"crease_friction": [{"more": True}]}, tmp_path / "p.toml"), model, parameters)
+    with pytest.raises(InputError, match=r"not a switch.*effects\.crease_viscosity\.more.*2"):
+        table({"more": 2}, tmp_path)
+    with pytest.raises(InputError, match="out of its bounds"):
+        table({"viscosity": -1e-6}, tmp_path)
+
+
+@pytest.mark.parametrize(("change", "words"), [(2e-6, "more"), (-2e-6, "less")])
+def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
+    model, parameters = hanging(3)
+    every = suspects(model, [record(panels=3, duration=1.0)], Drive(), parameters)
+    lower = next(s for s in every if s.effect == "crease_viscosity" and s.entities == (1,))
+    f = SimpleNamespace(
+        hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], deviations=lambda: np.array([1e-9])
+    )
+    said = _say(f)  # type: ignore[arg-type]
+    assert said.startswith(words) and "than stated at crease 1" in said
+    low, high = said.partition("95 %: ")[2].rstrip(")").split(" to ")
+    assert low != high, "an interval has two ends"
+    lacking = replace(lower, more=False)
+    other = SimpleNamespace(**{**vars(f), "hypothesis": Hypothesis((lacking,))})
+    assert "stated" not in _say(other)  # type: ignore[arg-type]
