@@ -320,7 +320,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
             lines.append(f"{c.label:48s}      failed: {c.failed}")
             continue
         mark = f"   {c.distrust}" if c.distrust else ""
-        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.gain:9.1f} +- {c.error:5.1f}{mark}")
+        error = f"{c.error:5.1f}" if np.isfinite(c.error) else "    -"
+        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.gain:9.1f} +- {error}{mark}")
     best = patched(d)
     for n in best.numbers if best is not None else []:
         bound = ", at its bound" if n.at_bound else ""

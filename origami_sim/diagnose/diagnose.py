@@ -4,6 +4,7 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.recording import Recording
+from origami_sim.recording import Recording, read_dataset
 from origami_sim.solve.timestep import stable_step
 
 
@@ -82,7 +83,7 @@ Report = Callable[[str, float], None]
 
 def diagnose(
     subject: Source,
-    recordings: Sequence[Recording] | Recording,
+    recordings: Sequence[Recording | str | Path] | Recording | str | Path,
     options: Options | None = None,
     *,
     catalogue: Sequence[str] | None = None,
@@ -94,15 +95,15 @@ def diagnose(
 
     Args:
         subject: the model and what is uncertain in it; or a scene, or (model, parameters), see `subject_of`.
-        recordings: of one object, with their drives.
+        recordings: of one object, with their drives; or their files.
         options: see `Options`. catalogue: suspect only these effects (default: all that can act).
         priors: standard deviations of the model's numbers, see `subject_of`.
         progress: called with the stage and the fraction done.
         keep: remembers predictions, so that an interrupted diagnosis resumes, and the fits.
 
     Raises:
-        InputError: no recording, recordings of different channels, too few frames, a drive that the model does not
-        know.
+        InputError: no recording, a file that cannot be read, recordings of different channels, too few frames, a drive
+            that the model does not know.
     """
     o = options or Options()
     tell = progress or (lambda stage, part: None)
@@ -114,7 +115,8 @@ def diagnose(
 
     tell("prepare", 0.0)
     subject = subject_of(subject, priors)
-    recordings = prepared([recordings] if isinstance(recordings, Recording) else list(recordings), o.rate)
+    each = [recordings] if isinstance(recordings, (Recording, str, Path)) else recordings
+    recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
     forward = arranged(subject, recordings, o)
     forward.soften()
     if keep is not None:

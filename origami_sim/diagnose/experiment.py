@@ -80,9 +80,9 @@ def separation(
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
     scale = np.array([f.scale for f in b.free])
     value, vector = np.linalg.eigh(b.covariance / np.outer(scale, scale))  # a number on its bound has next to no spread
-    known = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
-    stacked = np.concatenate([rows, known])
-    target = np.concatenate([gap, np.zeros(len(known))])
+    learnt = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
+    stacked = np.concatenate([rows, learnt])
+    target = np.concatenate([gap, np.zeros(len(learnt))])
     if not np.all(np.isfinite(stacked)) or not np.all(np.isfinite(target)):
         return 0.0, known
     x, *_ = np.linalg.lstsq(stacked, target, rcond=None)

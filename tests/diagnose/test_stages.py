@@ -260,10 +260,12 @@ def test_one_recording_from_rest_is_held_out_stretch_by_stretch(rubbing):
     assert len(base.blocks) == 1
     found = score(at_rest, base, weights)
     assert len(found.held_out) == len(found.squares) == FOLDS
-    pieces = base.linear.cut(FOLDS, len(weights.deviation))
-    assert np.concatenate(pieces.residual) == pytest.approx(base.linear.residual[0])
+    line = base.linear
+    assert line is not None
+    pieces = line.cut(FOLDS, len(weights.deviation))
+    assert np.concatenate(pieces.residual) == pytest.approx(line.residual[0])
     early = [(1.0 if n == 1 else 1e-2) * np.ones_like(t) for n, t in enumerate(pieces.tangent)]
-    alone = score(at_rest, replace(base, linear=replace(base.linear, tangent=[np.concatenate(early)])), weights)
+    alone = score(at_rest, replace(base, linear=replace(line, tangent=[np.concatenate(early)])), weights)
     squares = [float(r @ r) for r in pieces.residual]
     assert alone.squares[1] > 2.0 * squares[1] and np.delete(alone.squares, 1) == pytest.approx(
         np.delete(squares, 1), rel=0.3
