@@ -268,7 +268,7 @@ def test_one_recording_from_rest_is_held_out_stretch_by_stretch(rubbing):
     alone = score(at_rest, replace(base, linear=replace(line, tangent=[np.concatenate(early)])), weights)
     squares = [float(r @ r) for r in pieces.residual]
     assert alone.squares[1] > 2.0 * squares[1] and np.delete(alone.squares, 1) == pytest.approx(
-        np.delete(squares, 1), rel=0.3
+        np.delete(squares, 1), rel=1e-3
     )
 
 
@@ -305,7 +305,7 @@ def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
         fresh, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights)
         _, known = experiment.separation(experiment._menu(forward)[n][1], best, base, weights)
         again, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights, known)
-        assert again == pytest.approx(fresh, rel=0.25, abs=0.3), what
+        assert again == pytest.approx(fresh, abs=0.25), what  # measured: 0.01, 0.24, 0.17 of 1.1, 0.3, 0.7
 
 
 @pytest.mark.parametrize(("second", "told", "best"), [(0.5, [0, 2], "c"), (3.5, [0, 1, 2], "b")])
