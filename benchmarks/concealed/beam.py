@@ -175,6 +175,10 @@ class BeamCase:
         x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
         return np.concatenate([d - t @ x, -x])
 
+    def beside(self, entries: list[dict], other: dict) -> np.ndarray:
+        """The signature of another, small effect, about the curves with these."""
+        return self.signature([*entries, other]) - self.signature(entries)
+
     def _whitened(self, curves: list[np.ndarray]) -> np.ndarray:
         return np.concatenate([c.ravel() for c in curves]) / self._sigma
 

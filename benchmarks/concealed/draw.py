@@ -7,13 +7,15 @@
 The case's folder gets object.json (what an experimenter knows) and the recordings; the answer goes elsewhere. Nothing
 here imports the simulator under test. What kind of case it is, and of what mechanism, structure and strength, follows
 from the number of the case, so that any first cases of a seed are balanced (strata.py). The strength is set by
-detectability d': the norm of an effect's signature (rigid.py, beam.py).
+detectability d': the norm of an effect's signature (rigid.py, beam.py); of an effect outside the catalogue, of what
+neither one law of the catalogue nor two take up of it (`imitation`).
 """
 
 import argparse
 import json
 import shutil
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import beam
@@ -61,6 +63,16 @@ def table(structure: str, outside: bool = False) -> dict[str, Concealed]:
         return (module.OUTSIDE if outside else module.INSIDE)[structure]
     known = laws.OUTSIDE if outside else laws.INSIDE
     return {n: c for n, c in known.items() if not c.only or structure in c.only}
+
+
+def imitators(structure: str) -> dict[str, Concealed]:
+    """What may be mistaken for an effect in a structure: also what never shows enough there to be concealed."""
+    known = table(structure)
+    if structure not in laws.HELD:
+        return known
+    field = structure in laws.DRIVEN
+    others = {n: c for n, c in laws.INSIDE.items() if set(c.only) & set(laws.HELD)}
+    return known | {n: c for n, c in others.items() if field or not set(c.only) <= set(laws.DRIVEN)}
 
 
 def cells(structures=STRUCTURES, kinds=tuple(PROPORTIONS)) -> dict[str, list[tuple]]:
@@ -113,7 +125,7 @@ def draw_extra(name: str, rng: np.random.Generator, duration: float) -> dict:
 
 def placed(o: dict, mechanism: str, place: int, extra: dict, outside: bool = False) -> dict:
     """What is concealed, but for its strength."""
-    c = table(o["structure"], outside)[mechanism]
+    c = (table(o["structure"], True) if outside else imitators(o["structure"]))[mechanism]
     site = c.site if c.site.startswith("all") else ""
     if c.site == "crease":
         site = o["creases"][place]["name"]
@@ -139,14 +151,18 @@ def places(o: dict, c: Concealed) -> list[int]:
     return [p for p in range(len(o["faces"])) if p != o["held"]] if c.site == "panel" else [0]
 
 
-def strengthened(case: Case, what: dict, c: Concealed, wanted: float, sign: float) -> tuple[dict, np.ndarray]:
+def strengthened(case: Case, what: dict, c: Concealed, wanted: float, sign: float, first: float = 0.0):
     """The effect at the strength with the wanted d', and its signature: secant steps in the logarithms.
+
+    Args:
+        first: strength to begin with, if not the law's.
 
     Raises:
         Unsuited: there is no such strength.
     """
     scale = case.scale(what["place"]) if c.stiff else 1.0
-    largest, s = c.largest * scale, c.first * scale
+    largest = c.largest * scale
+    s = min(first or c.first * scale, largest)
     fresh, last, power = False, None, 1.0
     for _ in range(STEPS):
         now = entry(what["mechanism"], sign * s, what["place"], what["extra"])
@@ -277,7 +293,38 @@ def single(wanted: float, mechanism: str, structure: str, rng: np.random.Generat
     """An object with one effect."""
     o = drawn_object(structure, rng)
     case = case_of(o, drawn_factors(o, rng))
-    return case, concealed(case, chosen(o, mechanism, rng, outside), wanted, rng, outside)[0], None
+    what = chosen(o, mechanism, rng, outside)
+    return case, unlike(case, what, wanted, rng) if outside else concealed(case, what, wanted, rng)[0], None
+
+
+def unlike(case: Case, what: dict, wanted: float, rng: np.random.Generator) -> dict:
+    """The answer's account of an effect outside the catalogue, so strong that the catalogue leaves the wanted d' of it.
+
+    What part of d' is left is taken from the first recording, to save time.
+
+    Raises:
+        Unsuited: the catalogue can take up nearly all of it, at any strength.
+    """
+    c = table(case.o["structure"], True)[what["mechanism"]]
+    sign = float(rng.choice([-1, 1])) if c.signed else 1.0
+    recordings = case.o["recordings"]
+    some = case if case.o["structure"] in CURVES else case_of({**case.o, "recordings": recordings[:1]}, case.factors)
+    share = np.sqrt(len(some.o["recordings"]) / len(recordings))
+    goal, first = wanted * share, 0.0
+    for _ in range(3):
+        now, mine = strengthened(some, what, c, goal, sign, first)
+        like, d = imitation(some, now, what, mine), float(np.linalg.norm(mine))
+        more = min(wanted * share / max(like["apart"], 1e-9), STRONGEST / goal)
+        if more < 1.4 or d < 0.85 * goal:
+            break
+        goal, first = goal * more, abs(now["strength"]) * more
+    part, d = like["apart"] / d, float(np.linalg.norm(case.signature([now], fresh=True)))
+    like["apart"] = part * d
+    if like["apart"] < APART:
+        raise Unsuited(f"the catalogue takes up {what['mechanism']} in {case.o['structure']}")
+    wanted = min(LEVELS, key=lambda level: abs(np.log(level / like["apart"])))
+    strength = {"strength": now["strength"], "number": "", "names": []}
+    return {**what, **strength, "d_wanted": wanted, "d": d, "like": like}
 
 
 def null(what: str, structure: str, rng: np.random.Generator) -> tuple[Case, dict, None]:
@@ -364,34 +411,74 @@ def realise(what: str, folder: Path, answer: Path, into: Path, repeats: int = 1)
     add(folder, into, sealed, [more] * repeats)
 
 
-def nearest(sealed: dict) -> dict:
-    """Of all other mechanisms at all sites, the one that is hardest to tell from what is concealed.
+# --- what is alike
 
-    Returns: its `mechanism` and `site`, their `overlap` |cos|, and `apart`: d' between the two at its best strength.
+
+def imitation(case: Case, truth: dict, what: dict, mine: np.ndarray, names=()) -> dict:
+    """The law of the catalogue that is hardest to tell from an effect, or the two of those most like it.
+
+    They are taken as small effects about its motion, for which signatures were found last; those of a crease or a panel
+    act where it does, or anywhere if it acts on the whole object.
+
+    Args:
+        truth: the effect as an entry. what: its place. mine: its signature. names: what it may be called itself.
+
+    Returns: `mechanism` and `site`; `overlap`, |cos| with the first; `apart`: d' that is left at their best strengths.
     """
-    case = case_of(sealed["object"], sealed["factors"])
-    truth = sealed["concealed"][0]
-    mine = case.signature([truth], fresh=True)
-    best = {"mechanism": "", "site": "", "overlap": 0.0, "apart": float(np.linalg.norm(mine))}
-    for name, c in table(sealed["structure"]).items():
-        if set(c.names) & set(sealed["names"]):
+    found = []
+    for name, c in imitators(case.o["structure"]).items():
+        if set(c.names) & set(names):
             continue
-        for place in places(case.o, c):
+        for place in beside(case.o, c, what):
             for extra in EXTRAS.get(name, ({},)):
-                what = placed(case.o, name, place, extra)
-                _, theirs = _like(case, what, float(np.linalg.norm(mine)), mine, most=2)
-                found = {"overlap": overlap(mine, theirs), "apart": apart(mine, theirs)}
-                if found["apart"] < best["apart"]:
-                    best = {"mechanism": name, "site": what["site"], **found}
+                first = c.first * (case.scale(place) if c.stiff else 1.0)
+                shape = case.beside([truth], entry(name, first, place, extra))
+                if np.linalg.norm(shape) > 1e-6:
+                    found.append((placed(case.o, name, place, extra), shape))
+    found.sort(key=lambda f: -overlap(mine, f[1]))
+    best = {"mechanism": "", "site": "", "overlap": 0.0, "apart": float(np.linalg.norm(mine))}
+    for some in [found[:1], *combinations(found[:PAIRED], 2)]:
+        if not some:
+            continue
+        shapes = np.stack([s for _, s in some], axis=1)
+        left = float(np.linalg.norm(mine - shapes @ np.linalg.lstsq(shapes, mine, rcond=None)[0]))
+        if left < best["apart"]:
+            said = {k: " + ".join(w[k] for w, _ in some) for k in ("mechanism", "site")}
+            best = {**said, "overlap": overlap(mine, some[0][1]), "apart": left}
     return best
 
 
+def beside(o: dict, c: Concealed, what: dict) -> list[int]:
+    """Where a law may act to be like an effect: at its crease, or on the panels next to it."""
+    if not what["site"] or c.site not in ("crease", "panel") or "creases" not in o:
+        return places(o, c)
+    names = [crease["name"] for crease in o["creases"]]
+    if what["site"] not in names:
+        return places(o, c)
+    k = names.index(what["site"])
+    return [k] if c.site == "crease" else [p for p in o["creases"][k]["panels"] if p != o["held"]]
+
+
+def nearest(sealed: dict) -> dict:
+    """What of the catalogue, but for its own names, is hardest to tell from what is concealed; see `imitation`."""
+    case = case_of(sealed["object"], sealed["factors"])
+    truth = sealed["concealed"][0]
+    mine = case.signature([truth], fresh=True)
+    return imitation(case, truth, sealed, mine, sealed["names"])
+
+
+PAIRED = 6
+"""Laws that are tried two at a time: those that are most like the effect."""
+
+STRONGEST = 1000.0
+"""Largest d' of an effect outside the catalogue."""
+
 EXTRAS = {
-    "hysteresis": ({"angle": 0.05}, {"angle": 0.2}),
-    "relaxation": ({"time": 0.05}, {"time": 0.2}, {"time": 1.0}),
+    "hysteresis": ({"angle": 0.1},),
+    "relaxation": ({"time": 0.1}, {"time": 0.5}),
     "field_offset": ({"angle": 0.0}, {"angle": np.pi / 2}),
 }
-"""Second numbers that a rival is tried with."""
+"""Second numbers that an imitation is tried with."""
 
 
 def main() -> None:

@@ -48,6 +48,8 @@ class RigidCase:
     def __init__(self, o: dict, factors: dict[str, float]):
         self.o, self.factors = o, factors
         self._tangents: list | None = None
+        self._about: list = []
+        self._without: list[Motion] = []
         self._rest = o["held"] is None
         self._plain: dict[int, np.ndarray] = {}
         noise = np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12))
@@ -86,6 +88,7 @@ class RigidCase:
         stretches = list(self._stretches(self.motions(laws)))
         if fresh or self._tangents is None:
             self._tangents = [self._tangent(r, m, k) for r, m, k in stretches]
+            self._about, self._without = stretches, []
         rows = []
         for n, ((r, m, k), (basis, _)) in enumerate(zip(stretches, self._tangents, strict=True)):
             times = m.times[k : k + round(self._length(r) * FINE) + 1 : EVERY]
@@ -97,7 +100,26 @@ class RigidCase:
             gap = readings(plain, m, times, chain) - without
             d = gap.ravel() / self._sigma
             rows.append(d - basis @ (basis.T @ d))
-        t, d = np.concatenate([c for _, c in self._tangents]), np.concatenate(rows)
+        return self._cleared(rows)
+
+    def beside(self, entries: list[dict], other: dict) -> np.ndarray:
+        """The signature of another, small effect, about the motion for which signatures were last found afresh."""
+        (laws, chain), plain, rows = entered([other]), self.world(), []
+        self._without = self._without or self._repeated(plain)
+        changed = self._repeated(self.world(laws)) if laws else self._without
+        for a, b, (basis, _) in zip(changed, self._without, self._tangents or (), strict=True):
+            d = (readings(plain, a, a.times, chain) - channels(plain, b.angles))[::EVERY].ravel() / self._sigma
+            rows.append(d - basis @ (basis.T @ d))
+        return self._cleared(rows)
+
+    def _repeated(self, world: World) -> list[Motion]:
+        """The stretches of that motion, from where they start."""
+        given = [{"duration": self._length(r), "start": m.times[k]} for r, m, k in self._about]
+        return [world.run(r, m.angles[k], m.rates[k], **g) for (r, m, k), g in zip(self._about, given, strict=True)]
+
+    def _cleared(self, rows: list[np.ndarray]) -> np.ndarray:
+        """Differences over the stretches without what the numbers can take up, and by how much they would change."""
+        t, d = np.concatenate([c for _, c in self._tangents or ()]), np.concatenate(rows)
         x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
         return np.concatenate([d - t @ x, -x])
 

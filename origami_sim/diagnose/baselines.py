@@ -191,4 +191,7 @@ def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weig
     )
     other.subject = Subject(corrected, nominals)
     other._built = {}
-    return fit(other, Hypothesis(), weights, theta=base.theta[:count], local=base.local, blocks=held, fixed=True)
+    assert base.linear is not None
+    known = base.linear.only([base.blocks.index(b) for b in held])
+    given = {"theta": base.theta[:count], "local": base.local, "blocks": held, "known": known}
+    return fit(other, Hypothesis(), weights, fixed=True, **given)

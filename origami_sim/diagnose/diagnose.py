@@ -29,7 +29,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.prescribed import curves
-from origami_sim.diagnose.refit import Fit, Weights, fit
+from origami_sim.diagnose.refit import Fit, Weights, fit, onward, promised
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
@@ -128,6 +128,7 @@ def diagnose(
         noted.append(unseen)
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
+    first = weights
     lap("nominal")
     tell("screen", 0.0)
     every = forward.admitted(suspects(forward.model, recordings, _union(forward), forward.parameters))
@@ -168,7 +169,7 @@ def diagnose(
     noise = words.floor_of(forward, base if best is None else best)
     lap("combine")
     tell("verdict", 0.0)
-    given = fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=4)
+    given = onward(forward, given.reweighted(first, weights), weights, fixed=True)
     judged = words.judge(forward, given, base, noise, fits, scores, screening, (p_value, p_small), weights, o)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
@@ -385,7 +386,7 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights]:
             forward, Hypothesis(), w, theta=base.theta, local=base.local, most=5, done=0.01, known=known, kept=kept
         )
     if not base.failed:
-        base = fit(forward, Hypothesis(), w, theta=base.theta, local=base.local)
+        base = onward(forward, base, w)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
     return given.reweighted(first, w), base, w
@@ -432,12 +433,11 @@ def unbent(
     """
     if not forward.local:
         return []
-    told = forward.told(base.hypothesis, base.theta)
-    far = np.array([np.any(np.abs(base.local[b] - told[b]) > FAR * forward.blocks[b].known) for b in base.blocks])
-    if not np.any(far):
+    far = bent(forward, base, FAR)
+    if not len(far):
         return []
     local = base.local.copy()
-    local[np.array(base.blocks)[far]] = told[np.array(base.blocks)[far]]
+    local[far] = forward.told(base.hypothesis, base.theta)[far]
     back = fit(forward, base.hypothesis, weights, theta=base.theta, local=local, most=0)
     if back.failed:
         return []
@@ -446,6 +446,14 @@ def unbent(
     return [
         refit(forward, back, s, weights, seen, most=8) for s in chosen(seen, UNBENT) if s.suspect.label not in known
     ]
+
+
+def bent(forward: Forward, f: Fit, by: float = 1.0) -> list[int]:
+    """The blocks whose fitted start is further from what was recorded than so many of its standard deviations."""
+    if not forward.local:
+        return []
+    away = np.abs(f.local - forward.told(f.hypothesis, f.theta))
+    return [b for b in f.blocks if np.any(away[b] > by * forward.blocks[b].known)]
 
 
 UNBENT = 3
@@ -530,18 +538,20 @@ def settled(
     if same and abs(np.log(new.part / weights.part)) < 0.2:
         new = weights
     out = [f if f.failed else f.reweighted(weights, new) for f in fits]
-    least = HOPELESS * min(f.cost for f in out)
-    order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < least]
+    least = min(f.cost for f in out)
+    order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < HOPELESS * least]
     order.sort(key=lambda n: out[n].cost)
     for place, n in enumerate([0, *order[:CONTENDERS]]):
         f = out[n]
         if new is weights and any(fits[n] is r for r in refined):
             continue
-        given = {"theta": f.theta, "blocks": f.blocks}
-        out[n] = fit(forward, f.hypothesis, new, local=f.local, begin=f.linear, **given)
-        if new is not weights and place <= AGAIN and forward.local and f.cost < least:
+        if n and f.cost > least + NEAR and promised(forward, f) > least + NEAR:
+            continue
+        out[n] = onward(forward, f, new)
+        if new is not weights and place <= AGAIN and bent(forward, out[n]) and f.cost < HOPELESS * least:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
-            out[n] = min(out[n], fit(forward, f.hypothesis, new, **given), key=lambda f: f.cost)
+            near = {"theta": f.theta, "blocks": f.blocks, "known": out[n].linear, "kept": len(f.free)}
+            out[n] = min(out[n], fit(forward, f.hypothesis, new, **near), key=lambda f: f.cost)
     return reweighted(screening, out[0], weights, new), out, new
 
 
@@ -555,9 +565,9 @@ def contest(
     finalists: Sequence[Signature],
     screening: Screening,
     weights: Weights,
-    tell: Callable[[float], None],
+    tell: Callable[[float], None] = lambda part: None,
 ) -> list[Fit]:
-    """The model without any effect and with each finalist; those that neither are nor promise to be good stay rough."""
+    """A fit, and that with each finalist more; those that neither are nor promise to be good stay rough."""
     fits = [base]
     for n, s in enumerate(finalists):
         tell(0.5 * n / len(finalists))
@@ -584,7 +594,7 @@ def finished(forward: Forward, f: Fit, weights: Weights, most: int = 5) -> Fit:
     """A rough fit, carried on with derivatives of its own."""
     if f.failed or f.promise == np.inf:
         return f
-    return fit(forward, f.hypothesis, weights, theta=f.theta, local=f.local, begin=f.linear, most=most)
+    return onward(forward, f, weights, most=most)
 
 
 def roughly(
@@ -710,7 +720,7 @@ def combine(forward, fits, scores, screening: Screening, weights, o: Options, te
             break
         known = [*fits, *more]
         wanted = [(g, (*best.hypothesis.suspects, g.suspect)) for g in found[:RIVALS]]
-        tried = [refit(forward, best, g, weights, screening) for g, w in wanted if not _made(known, w)]
+        tried = contest(forward, best, [g for g, w in wanted if not _made(known, w)], screening, weights)[1:]
         tried = [f for f in (*tried, *(_made(known, w) for _, w in wanted)) if f is not None and not f.failed]
         if not tried:
             break
@@ -748,12 +758,12 @@ def stands_out(
 def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, weights) -> list[Fit]:
     """Of several effects, each is left out in turn, and the others that could take its place are tried."""
     out: list[Fit] = []
+    near = {"known": best.linear, "kept": len(forward.subject.nominals)}
     for s in best.hypothesis.suspects:
         rest = tuple(t for t in best.hypothesis.suspects if t is not s)
+        place = _kept(best, rest)
         known = [f for f in (*fits, *out) if _same(f.hypothesis, rest) and not f.failed]
-        inner = (
-            known[0] if known else fit(forward, Hypothesis(rest), weights, theta=_kept(best, rest), local=best.local)
-        )
+        inner = known[0] if known else fit(forward, Hypothesis(rest), weights, theta=place, local=best.local, **near)
         if inner.failed:
             continue
         if not known:
@@ -764,10 +774,13 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
             wanted = (*inner.hypothesis.suspects, g.suspect)
             if any(_same(f.hypothesis, wanted) for f in (*fits, *out)):
                 continue
-            f = refit(forward, inner, g, weights, screening)
+            f = roughly(forward, inner, g, weights, screening)
+            theta = np.concatenate([place, f.theta[len(inner.free) :]])
+            other = fit(forward, f.hypothesis, weights, theta=theta, local=best.local, rough=True, **near)
+            f = min(f, other, key=lambda f: f.cost)
+            if min(f.cost, f.promise) < best.cost + NEAR:
+                f = finished(forward, f, weights)
             if not f.failed:
-                near = np.concatenate([_kept(best, rest), f.theta[len(inner.free) :]])
-                f = min(f, fit(forward, f.hypothesis, weights, theta=near, local=best.local), key=lambda f: f.cost)
                 scores[id(f)] = score(forward, f, weights)
                 out.append(f)
     return out
@@ -791,7 +804,8 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
             near = [g for g in (*fits, *out) if _same(g.hypothesis, rest) and g.cost < f.cost + words.CLOSE]
             if abs(value - s.free[0].start) > 2.0 * deviation or near:
                 continue
-            fewer = fit(forward, Hypothesis(rest), weights, theta=_kept(f, rest), local=f.local)
+            near = {"known": f.linear, "kept": len(forward.subject.nominals)}
+            fewer = fit(forward, Hypothesis(rest), weights, theta=_kept(f, rest), local=f.local, **near)
             if not fewer.failed:
                 scores[id(fewer)] = score(forward, fewer, weights)
                 out.append(fewer)

@@ -61,6 +61,7 @@ class Fit:
         failed: why the fit could not be made, or "".
         wider: (P,) by how much effects that are too small to be told widen what is known of theta; None: not asked.
         promise: of a rough fit that did not settle, the cost that a further step promised; else infinite.
+        exact: whether all derivatives are those of the place where the fit ended.
     """
 
     hypothesis: Hypothesis
@@ -77,6 +78,7 @@ class Fit:
     linear: "Linearisation | None" = None
     wider: np.ndarray | None = None
     promise: float = np.inf
+    exact: bool = False
 
     @property
     def cost(self) -> float:
@@ -139,6 +141,11 @@ class Linearisation:
     def at(self, residual: list[np.ndarray]) -> "Linearisation":
         """The same derivatives with other residuals."""
         return Linearisation(residual, self.tangent, self.slopes, self.basis, self.starts)
+
+    def only(self, blocks: Sequence[int]) -> "Linearisation":
+        """That of some blocks, by their place in the lists."""
+        parts = (self.residual, self.tangent, self.slopes, self.basis, self.starts)
+        return Linearisation(*([p[n] for n in blocks] for p in parts))
 
     def beside(self, columns: list[np.ndarray], kept: int) -> "Linearisation":
         """The first `kept` columns of the tangent, and others after them."""
@@ -320,6 +327,7 @@ def fit(
     known: Linearisation | None = None,
     kept: int = 0,
     begin: Linearisation | None = None,
+    exact: bool = False,
     rough: bool = False,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
@@ -332,7 +340,7 @@ def fit(
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
         blocks: fit these only. fixed: keep theta and fit the starts only.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
-        begin: residuals and all derivatives of the point where the fit begins.
+        begin: residuals and all derivatives of the point where the fit begins; `exact` if none is of a point before.
         rough: keep the derivatives that are known; only those by the hypothesis' own numbers are renewed.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
@@ -347,20 +355,20 @@ def fit(
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
     line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
-    level = STALE if begin else ALL if known is None else OWN
+    level = (ALL if exact else STALE) if begin else ALL if known is None else OWN
     best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     slowest = forward.step(hypothesis, theta) / SLOWEST
     floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
-    finest, promised, settled = (OWN if rough else ALL), np.inf, False
+    finest, hoped, settled = (OWN if rough else ALL), np.inf, False
     for n in range(most):
         assert theta is not None and local is not None
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
-        change, moves, promised = _proposed(forward, free, theta, local, blocks, line)
+        change, moves, hoped = _proposed(forward, free, theta, local, blocks, line)
         enough = max(LITTLE, done * (best - floor))
-        whole, gain, found = best - promised, 0.0, None
+        whole, gain, found = best - hoped, 0.0, None
         if whole < enough and (level > STALE or not width):
             settled = level == ALL or doubts <= 1  # then these derivatives are as good as new
             break
@@ -394,7 +402,29 @@ def fit(
     if not all(np.all(np.isfinite(t)) for t in line.tangent):
         return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite where the fit ends")
     out = _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
-    return out if settled or not rough else replace(out, promise=promised)
+    return replace(out, exact=level == ALL, promise=np.inf if settled or not rough else hoped)
+
+
+def onward(forward, f: Fit, weights: Weights, *, fixed: bool = False, most: int = 8) -> Fit:
+    """A fit carried on from where it ended, with the derivatives that it has; they are of these weights."""
+    return fit(
+        forward,
+        f.hypothesis,
+        weights,
+        theta=f.theta,
+        local=f.local,
+        blocks=f.blocks,
+        begin=f.linear,
+        exact=f.exact,
+        fixed=fixed,
+        most=most,
+    )
+
+
+def promised(forward, f: Fit) -> float:
+    """The cost that one more step promises a fit, by the derivatives that it has."""
+    assert f.linear is not None
+    return _proposed(forward, f.free, f.theta, f.local, f.blocks, f.linear)[2]
 
 
 def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple[np.ndarray, np.ndarray, float]:

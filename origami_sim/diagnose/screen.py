@@ -234,14 +234,15 @@ def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
     """Changes by suspects that share a program; strengths are scaled for a change as large as the residual."""
     few = [max(blocks, key=lambda b: _size(base, b, weights))]
     goal = np.sqrt(_size(base, few[0], weights)) + 1.0
-    size = np.array([_affordable(forward, base, s, s.free[0].scale) for s in group])
+    least = _least(forward, base, group[0])
+    size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
     change = _changes(forward, group, size, base, few)  # on one block first
-    wanted, _ = _resized(forward, group, size, change[0], goal, base, weights)
+    wanted, _ = _resized(forward, group, size, change[0], goal, base, weights, least)
     if few == blocks:
         redo = np.flatnonzero(wanted != size)
     else:
         change, size = _changes(forward, group, wanted, base, blocks), wanted
-        wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights)
+        wanted, off = _resized(forward, group, size, change[blocks.index(few[0])], goal, base, weights, least)
         redo = np.flatnonzero(off & (wanted != size))
     if len(redo):
         size[redo] = wanted[redo]
@@ -255,7 +256,7 @@ def _changes_of(forward, group, base: Fit, weights: Weights, blocks):
     return out
 
 
-def _resized(forward, group, size, change, goal: float, base: Fit, weights: Weights):
+def _resized(forward, group, size, change, goal: float, base: Fit, weights: Weights, least: float):
     """Sizes [S] that would change a block by as much as the goal, and whether the present ones are far from it."""
     with np.errstate(invalid="ignore", over="ignore"):
         norm = np.array([np.linalg.norm(whitened(c, weights)) for c in change])
@@ -263,7 +264,7 @@ def _resized(forward, group, size, change, goal: float, base: Fit, weights: Weig
     ratio = np.where(lost, 0.01, np.where(norm > 0, goal / np.maximum(norm, 1e-30), 100.0))
     off = (ratio < 0.1) | (ratio > 10.0)
     new = [
-        _affordable(forward, base, s, z * np.clip(r, 1e-4, 1e4)) if not 0.2 < r < 5.0 else z
+        _affordable(forward, base, s, z * np.clip(r, 1e-4, 1e4), least) if not 0.2 < r < 5.0 else z
         for s, z, r in zip(group, size, ratio, strict=True)
     ]
     return np.array(new), off
@@ -274,16 +275,22 @@ def _size(base: Fit, block: int, weights: Weights) -> float:
     return float(r @ r)
 
 
-def _affordable(forward, base: Fit, s: Suspect, change: float) -> float:
-    """A change within the bounds that does not make the solver's step much smaller than it is."""
+def _least(forward, base: Fit, s: Suspect) -> float:
+    """The smallest step of the solver that a change by such a suspect may ask for."""
+    return forward.step(base.hypothesis, base.theta, soft=not stiff(s.effect)) / SLOWEST
+
+
+def _affordable(forward, base: Fit, s: Suspect, change: float, least: float) -> float:
+    """A change within the bounds with which the solver's step is no smaller than the least."""
     change = _admissible(s, change)
-    enough = forward.step(base.hypothesis, base.theta, soft=not stiff(s.effect)) / SLOWEST
+    if get(s.effect).family == "measurement":  # does not move anything
+        return change
     rest = [f.start for f in s.free[1:]]
     hypothesis = base.hypothesis.plus(s)
     for _ in range(12):
         try:
             theta = np.concatenate([base.theta, [s.free[0].start + change], rest])
-            if forward.step(hypothesis, theta, soft=True) >= enough:
+            if forward.step(hypothesis, theta, soft=True) >= least:
                 break
         except InputError:
             pass

@@ -1,10 +1,12 @@
 """The verdict: which explanation the recordings support, in one of eight words and one sentence."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2
 
 from origami_sim.diagnose.compare import (
@@ -88,6 +90,12 @@ FAST = (1 / 4, 3 / 8, 1 / 2)
 WHITE, TINTED = 0.8, 0.35
 """Ratio of the powers in these bands from which on noise counts as white, and the part that it may still differ by."""
 
+NEIGHBOURS = 9
+"""Frequencies over which the noise of trackers hardly changes."""
+
+SEVERAL = 5
+"""Segments from which on most of them tell what is usual."""
+
 MOST = 2 / 3
 """Part of the structure that a suspect must leave to be refuted where it may itself be small."""
 
@@ -102,11 +110,14 @@ class Structure:
     Attributes:
         power: [B, O] sums of squares. count: [B, O] how many. doubt: (O,) relative variance of the noise that they
             are compared with.
+        uneven: (B,) standard deviations by which the band of the noise is fuller in one segment than in most, see
+            `uneven_of`; nothing where that cannot be told.
     """
 
     power: np.ndarray
     count: np.ndarray
     doubt: np.ndarray
+    uneven: np.ndarray
 
     @property
     def excess(self) -> float:
@@ -116,7 +127,7 @@ class Structure:
     @property
     def score(self) -> float:
         """Standard deviations of noise by which the worst octave exceeds it and small effects."""
-        return self._worst(self.power.sum(axis=0), self.count.sum(axis=0))
+        return max(self._worst(self.power.sum(axis=0), self.count.sum(axis=0)), self._shaken)
 
     @property
     def repeated(self) -> float:
@@ -124,7 +135,12 @@ class Structure:
         if len(self.power) < 3:
             return self.score
         power, count = (v.sum(axis=0) - v for v in (self.power, self.count))
-        return min(self._worst(p, c) for p, c in zip(power, count, strict=True))
+        return max(self._shaken, min(self._worst(p, c) for p, c in zip(power, count, strict=True)))
+
+    @property
+    def _shaken(self) -> float:
+        """What shakes the device now and then: how uneven the second segment is."""
+        return float(np.sort(self.uneven)[-2]) if len(self.uneven) else 0.0
 
     def _worst(self, power: np.ndarray, count: np.ndarray) -> float:
         seen = count > 0
@@ -458,7 +474,36 @@ def structure(f: Fit, reference: Fit) -> Structure:
     # of second differences, or of the median of a spectrum
     doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
     slow = COLOUR**2 + float(doubt.mean() / len(noise))
-    return Structure(power, count, np.append(np.full(octaves, slow), TINTED**2))
+    return Structure(power, count, np.append(np.full(octaves, slow), TINTED**2), uneven_of(f.residuals))
+
+
+def uneven_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """(B,) by how much the band of each segment exceeds what its fast noise and most segments suggest; see `Structure`.
+
+    A tracker may smooth, and its noise may grow with the motion, but both hold for neighbouring frequencies alike.
+    Powers are therefore taken over what most segments have about each frequency, and over the segment's own fast ones.
+    """
+    lengths = set(map(len, residuals))
+    if len(residuals) < SEVERAL or len(lengths) > 1 or min(lengths) < SHORT:
+        return np.zeros(0)
+    left = np.stack(residuals)
+    size = np.abs(np.fft.rfft(np.nan_to_num(left), axis=1)) ** 2  # [B, K, D]
+    frequency = np.fft.rfftfreq(min(lengths))
+    band = (frequency > BAND[0]) & (frequency <= BAND[1])
+    fast = (frequency > FAST[0]) & (frequency <= FAST[-1])
+    seen = np.any(np.isfinite(left), axis=1)  # [B, D]
+    size = np.where(np.expand_dims(seen, 1), size, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a component that is never seen
+        size = np.nan_to_num(size / uniform_filter1d(np.nanmedian(size, axis=0), NEIGHBOURS, axis=0))
+        slow, quick = (np.count_nonzero(part) * seen.sum(axis=1) for part in (band, fast))
+        level = size[:, fast].sum(axis=(1, 2)) / quick
+        usual = size[:, band].sum(axis=(1, 2)) / level / slow
+        found = usual - ALLOWED / (2.0 * slow)
+        spread = 1.0 / slow + 1.0 / quick
+    most = float(np.nanmedian(usual))
+    score = (np.cbrt(np.maximum(found, 0.0) / most) - 1.0) / np.sqrt(spread / 9.0 * (1.0 + np.pi / 2.0 / len(usual)))
+    return np.nan_to_num(score)
 
 
 def floor_of(forward, best: Fit) -> np.ndarray:

@@ -318,6 +318,22 @@ def test_what_shakes_a_device_in_the_band_of_the_noise_is_found_if_noise_is_whit
     assert smooth or structure(shaken, shaken).repeated > STRUCTURED
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_what_shakes_a_device_now_and_then_is_found_beside_segments_without_it(smooth):
+    """Also through a tracker that smooths; not what shows in one segment only, nor noise that grows with the motion."""
+    rng, alarms, found = np.random.default_rng(6), 0, 0
+    ring = np.exp(-np.arange(120) / 30.0) * np.sin(2 * np.pi * 0.09 * np.arange(120))
+    for _ in range(50):
+        noise = rng.normal(size=(8, 122, 3)) * np.linspace(0.8, 1.3, 8)[:, None, None]
+        noise = 0.25 * noise[:, :-2] + 0.5 * noise[:, 1:-1] + 0.25 * noise[:, 2:] if smooth else noise[:, 1:-1]
+        blow = (5.0 if smooth else 3.0) * noise.std() * ring[:, None]
+        struck = [noise + np.isin(np.arange(8), where)[:, None, None] * blow for where in ([], [3], [2, 6])]
+        quiet, once, twice = (structure(f, f) for f in (SimpleNamespace(residuals=list(r)) for r in struck))
+        alarms += quiet.repeated > STRUCTURED or once.repeated > STRUCTURED
+        found += twice.repeated > STRUCTURED
+    assert alarms <= 1 and found >= (35 if smooth else 45)
+
+
 @pytest.mark.parametrize(("length", "segments"), [(240, 8), (10, 12)])
 def test_structure_is_found_in_the_octave_where_it_lies(length, segments):
     """White noise passes; a tone of ten standard deviations in all does not, nor is a drift of segments lost."""

@@ -3,6 +3,7 @@
 import json
 import sys
 from importlib import import_module
+from itertools import product
 
 import numpy as np
 import pytest
@@ -352,14 +353,47 @@ def test_the_nearest_other_effect(truth):
     draw = truth["draw"]
     o = truth["beam"].draw("de_bender", np.random.default_rng(2))
     one = truth["rigid"].entry("rest_angle", 1e-5)
-    sealed = {"object": o, "factors": {}, "concealed": [one], "structure": "de_bender", "names": ["crease_offset"]}
+    sealed = {"object": o, "factors": {}, "concealed": [one], "site": "", "names": ["crease_offset"]}
     found = draw.nearest(sealed)
     made = draw.case_of(o, {})
     mine = made.signature([one], fresh=True)
     for name in ("stiffening", "length_scale", "voltage_offset"):  # all others, at any strength
-        theirs = made.signature([truth["rigid"].entry(name, truth["beam"].INSIDE["de_bender"][name].first * 1e-3)])
-        assert truth["rivals"].apart(mine, theirs) > 0.9 * found["apart"]
-    assert found["mechanism"] == "length_scale" and found["apart"] < np.linalg.norm(mine)
+        scale = made.scale(0) if truth["beam"].INSIDE["de_bender"][name].stiff else 1.0
+        small = truth["rigid"].entry(name, truth["beam"].INSIDE["de_bender"][name].first * scale * 1e-3)
+        assert truth["rivals"].apart(mine, made.beside([one], small)) > 0.9 * found["apart"]
+    assert "length_scale" in found["mechanism"] and found["apart"] < np.linalg.norm(mine)
+
+
+def test_an_effect_outside_is_as_strong_as_no_two_laws_can_imitate(truth):
+    draw, o = truth["draw"], truth["coupon"].draw("crease_coupon", np.random.default_rng(3))
+    case = draw.case_of(o, {})
+    what = draw.placed(o, "fatigue", 0, {}, outside=True)
+    account = draw.unlike(case, what, 10.0, np.random.default_rng(0))
+    assert 7.0 < account["like"]["apart"] < account["d"] and account["d_wanted"] in (10.0, 20.0)
+    one = truth["rigid"].entry("fatigue", account["strength"])
+    mine = case.signature([one], fresh=True)
+    assert np.linalg.norm(mine) == pytest.approx(account["d"], rel=1e-6)
+    shapes = []  # of what is said to be most like it
+    for name in account["like"]["mechanism"].split(" + "):
+        c = truth["coupon"].INSIDE["crease_coupon"][name]
+        extras = draw.EXTRAS.get(name, ({},))
+        each = [truth["rigid"].entry(name, c.first * (case.scale(0) if c.stiff else 1.0), 0, x) for x in extras]
+        shapes.append([case.beside([one], e) for e in each])
+    left = min(
+        np.linalg.norm(mine - np.stack(s, axis=1) @ np.linalg.lstsq(np.stack(s, axis=1), mine, rcond=None)[0])
+        for s in product(*shapes)
+    )
+    assert left == pytest.approx(account["like"]["apart"], rel=1e-6)
+
+
+def test_what_starts_alike_is_repeated_by_its_stretches(truth):
+    """Beside its own motion, a small effect shows as it does from rest."""
+    draw = truth["draw"]
+    o = truth["objects"].draw("pendulum_chain", np.random.default_rng(1))
+    case = draw.case_of(o, {})
+    small = truth["rigid"].entry("rest_angle", 1e-4)
+    mine = case.signature([small], fresh=True)
+    assert np.linalg.norm(case.beside([small], small) - mine) < 0.02 * np.linalg.norm(mine)
 
 
 def test_structures_are_those_of_the_command(truth):
