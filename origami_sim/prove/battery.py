@@ -20,7 +20,7 @@ from origami_sim.prove import DEVELOPMENT
 from origami_sim.prove.case import write_json
 from origami_sim.prove.freeze import freeze
 
-TIMEOUT = 900.0
+TIMEOUT = 1800.0
 """Longest diagnosis or drawing of one case [s]."""
 
 RUN = "run.json"
