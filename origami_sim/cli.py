@@ -205,6 +205,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output left; nothing more can be said there, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = OK
+    except OSError as e:  # a disk that is full, a folder that must not be written
+        print(f"origami-sim: {e.strerror or e}{f': {e.filename}' if e.filename else ''}.", file=sys.stderr)
+        code = BAD_INPUT
     sys.exit(code)
 
 

@@ -1,5 +1,6 @@
 """The command line: what it prints, its exit codes, and that bad input leaves everything as it was."""
 
+import errno
 import hashlib
 import json
 import re
@@ -210,6 +211,15 @@ def test_code_130_and_earlier_results_untouched_after_an_interrupt(call, tmp_pat
     assert process.returncode == 130
     assert err == "origami-sim: interrupted; earlier results are untouched.\n"
     assert contents(tmp_path) == before
+
+
+def test_a_disk_that_is_full_is_one_sentence(call, monkeypatch, tmp_path):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "runs" / "positions.npy"))
+
+    monkeypatch.setattr("origami_sim.cli._save", full)
+    code, _, err = call("run", "fold_file", *QUICK)
+    assert (code, err) == (2, f"origami-sim: No space left on device: {tmp_path}/runs/positions.npy.\n")
 
 
 def test_a_reader_that_leaves_is_no_error(tmp_path):

@@ -18,19 +18,15 @@ from origami_sim.diagnose.diagnose import Options, diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.observed import check_recording
+from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
-from origami_sim.diagnose.prescribed import PATH
 from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.diagnose.subject import spreads
-from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.observe import check_scene
-from origami_sim.recording import DataSet, Recording, by_component, lint_report, read_dataset
-from origami_sim.recording.drives import UNITS
-from origami_sim.recording.units import quantity
+from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.scene import NAMES, Settings, read_calibration, scene_module, scene_settings
 from origami_sim.solve.timestep import stable_step
 
@@ -62,7 +58,7 @@ def run(args: Namespace) -> int:
     recordings = []
     for recording in data:
         with _naming(recording.metadata.get("sidecar")):
-            notes = [*_assumed(recording, drive), *check_scene(recording, model)]
+            notes = [*assumed(recording, drive), *check_scene(recording, model)]
         with _naming(recording.metadata.get("file")):
             notes += check_recording(recording, model, step)
         for note in notes:
@@ -195,27 +191,6 @@ def _naming(file: str | None) -> Iterator[None]:
         yield
     except InputError as error:
         raise error if error.file is not None else InputError(str(error), file=file) from None
-
-
-def _assumed(recording: Recording, drive: Drive) -> list[str]:
-    """A note on what the scene drives that the recording does not state; curves take nothing of the scene's own drive.
-
-    Raises:
-        InputError: what `by_component` refuses.
-    """
-    if recording.by_step or PATH in recording.drive:
-        return []
-    file = recording.metadata.get("sidecar")
-    stated = {c for name, d in recording.drive.items() for c in by_component(name, d, file=file)}
-    own = {}
-    for name, s in drive.signals.items():
-        if name not in stated and not s.is_zero:
-            sampled = 0.0 if s.values is None else np.abs(s.scale) * np.abs(s.values).max()
-            largest = float(np.max(np.abs(s.offset) + np.abs(s.amplitude) + sampled))
-            own[name] = f"{name} up to {quantity(largest, UNITS[name.split('_')[0]])}"
-    if not own:
-        return []
-    return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]
 
 
 def _priors(settings: Settings, data: DataSet, given: Sequence[str]) -> dict[str, float]:

@@ -27,9 +27,9 @@ from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspec
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
-from origami_sim.diagnose.observed import unobserved
+from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.prescribed import curves
-from origami_sim.diagnose.refit import Fit, Weights, fit, onward, promised
+from origami_sim.diagnose.refit import Fit, Weights, carried_on, fit, promised
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
@@ -122,7 +122,8 @@ def diagnose(
     if keep is not None:
         keep.follow(forward)
     loop = closed_loop(recordings)
-    noted = [n for r in recordings for n in r.metadata.get("notes", [])]
+    noted = [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
+    noted = list(dict.fromkeys(noted))
     unseen = unobserved(forward)
     if unseen is not None:
         noted.append(unseen)
@@ -169,7 +170,7 @@ def diagnose(
     noise = words.floor_of(forward, base if best is None else best)
     lap("combine")
     tell("verdict", 0.0)
-    given = onward(forward, given.reweighted(first, weights), weights, fixed=True)
+    given = carried_on(forward, given.reweighted(first, weights), weights, fixed=True)
     judged = words.judge(forward, given, base, noise, fits, scores, screening, (p_value, p_small), weights, o)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
@@ -386,7 +387,7 @@ def nominal_fits(forward: Forward) -> tuple[Fit, Fit, Weights]:
             forward, Hypothesis(), w, theta=base.theta, local=base.local, most=5, done=0.01, known=known, kept=kept
         )
     if not base.failed:
-        base = onward(forward, base, w)
+        base = carried_on(forward, base, w)
     if base.failed:
         raise InputError(f"the nominal model cannot be fitted: {base.failed}", field="model")
     return given.reweighted(first, w), base, w
@@ -547,7 +548,7 @@ def settled(
             continue
         if n and f.cost > least + NEAR and promised(forward, f) > least + NEAR:
             continue
-        out[n] = onward(forward, f, new)
+        out[n] = carried_on(forward, f, new)
         if new is not weights and place <= AGAIN and bent(forward, out[n]) and f.cost < HOPELESS * least:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
             near = {"theta": f.theta, "blocks": f.blocks, "known": out[n].linear, "kept": len(f.free)}
@@ -594,7 +595,7 @@ def finished(forward: Forward, f: Fit, weights: Weights, most: int = 5) -> Fit:
     """A rough fit, carried on with derivatives of its own."""
     if f.failed or f.promise == np.inf:
         return f
-    return onward(forward, f, weights, most=most)
+    return carried_on(forward, f, weights, most=most)
 
 
 def roughly(

@@ -5,10 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.diagnose.forward import Forward, seen_first, stacked
+from origami_sim.diagnose.prescribed import PATH
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model
 from origami_sim.observe import _index, body_point
-from origami_sim.recording import Channel, Recording
+from origami_sim.recording import Channel, Recording, by_component
+from origami_sim.recording.drives import UNITS
+from origami_sim.recording.units import quantity
 
 BENT = 0.3
 """Fold [rad] of a second pose that is asked: flat creases may lie where a channel has an extremum."""
@@ -156,3 +160,24 @@ def channel_tangents(forward: Forward) -> np.ndarray:
 
 def _join(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def assumed(recording: Recording, drive: Drive) -> list[str]:
+    """A note on what the scene drives that the recording does not state; curves take nothing of the scene's own drive.
+
+    Raises:
+        InputError: what `by_component` refuses.
+    """
+    if recording.by_step or PATH in recording.drive:
+        return []
+    file = recording.metadata.get("sidecar")
+    stated = {c for name, d in recording.drive.items() for c in by_component(name, d, file=file)}
+    own = {}
+    for name, s in drive.signals.items():
+        if name not in stated and not s.is_zero:
+            sampled = 0.0 if s.values is None else np.abs(s.scale) * np.abs(s.values).max()
+            largest = float(np.max(np.abs(s.offset) + np.abs(s.amplitude) + sampled))
+            own[name] = f"{name} up to {quantity(largest, UNITS[name.split('_')[0]])}"
+    if not own:
+        return []
+    return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]

@@ -405,7 +405,7 @@ def fit(
     return replace(out, exact=level == ALL, promise=np.inf if settled or not rough else hoped)
 
 
-def onward(forward, f: Fit, weights: Weights, *, fixed: bool = False, most: int = 8) -> Fit:
+def carried_on(forward, f: Fit, weights: Weights, *, fixed: bool = False, most: int = 8) -> Fit:
     """A fit carried on from where it ended, with the derivatives that it has; they are of these weights."""
     return fit(
         forward,

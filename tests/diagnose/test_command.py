@@ -12,6 +12,7 @@ import pytest
 import origami_sim
 from origami_sim import cli
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
+from origami_sim.diagnose.observed import assumed
 from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.report import read_report
 from origami_sim.diagnose.subject import spreads
@@ -375,14 +376,14 @@ def test_what_the_scene_drives_by_itself_is_told():
     """A note names what no recording states and how large it is; a curve takes nothing from the scene."""
     own = Drive(field=(0.0, 0.0, sine(0.2, 3.0)), temperature=5.0)
     silent = recorded_drive("load", 0.0, "1", constant=True)
-    (note,) = command._assumed(silent, own)
+    (note,) = assumed(silent, own)
     assert note.startswith("'r' states no field_z, temperature: the scene's own is assumed ")
     assert note.endswith("(field_z up to 200 mT, temperature up to 5.0 K).")
-    assert command._assumed(silent, Drive()) == []
-    (note,) = command._assumed(recorded_drive("field", np.zeros((20, 3))), own)
+    assert assumed(silent, Drive()) == []
+    (note,) = assumed(recorded_drive("field", np.zeros((20, 3))), own)
     assert "field" not in note and "temperature" in note
     silent.metadata["time_base"] = "step"
-    assert command._assumed(silent, own) == []
+    assert assumed(silent, own) == []
 
 
 FLAP = """\
