@@ -134,6 +134,7 @@ class BeamCase:
         self.settings = {**o["settings"], **{n: o["settings"][n] * f for n, f in factors.items()}}
         self._sigma = float(np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12)))
         self._tangent: np.ndarray | None = None
+        self._about: tuple = ()
 
     def scale(self, place: int) -> float:
         """What the strengths of elastic effects are measured in: the stiffness of one cell [N m/rad]."""
@@ -173,11 +174,15 @@ class BeamCase:
             self._tangent = np.stack(columns, axis=1)
         d, t = concealed - self._whitened(self.curves([])), self._tangent
         x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
-        return np.concatenate([d - t @ x, -x])
+        out = np.concatenate([d - t @ x, -x])
+        if fresh or not self._about:
+            self._about = entries, out
+        return out
 
-    def beside(self, entries: list[dict], other: dict) -> np.ndarray:
-        """The signature of another, small effect, about the curves with these."""
-        return self.signature([*entries, other]) - self.signature(entries)
+    def beside(self, other: dict) -> np.ndarray:
+        """The signature of another, small effect, about the curves for which signatures were last found afresh."""
+        entries, mine = self._about
+        return self.signature([*entries, other]) - mine
 
     def _whitened(self, curves: list[np.ndarray]) -> np.ndarray:
         return np.concatenate([c.ravel() for c in curves]) / self._sigma

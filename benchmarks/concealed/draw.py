@@ -28,6 +28,7 @@ from coupon import CouponCase
 from laws import Concealed
 from rigid import RigidCase, entry
 from rivals import ALIKE, APART, PAIRS, TIED, Pair, apart, changed, overlap, proposed
+from scipy.optimize import lsq_linear
 from strata import PROPORTIONS, stratum
 
 LEVELS = (2.0, 5.0, 10.0, 20.0, 50.0)
@@ -180,9 +181,9 @@ def strengthened(case: Case, what: dict, c: Concealed, wanted: float, sign: floa
     raise Unsuited(f"no strength of {what['mechanism']} has d' = {wanted:g} in {case.o['structure']}")
 
 
-def concealed(case: Case, what: dict, wanted: float, rng: np.random.Generator, outside: bool = False):
+def concealed(case: Case, what: dict, wanted: float, rng: np.random.Generator):
     """The answer's account of an effect, and its signature; where d' cannot be reached, the nearest level is wanted."""
-    c = table(case.o["structure"], outside)[what["mechanism"]]
+    c = table(case.o["structure"])[what["mechanism"]]
     sign = float(rng.choice([-1, 1])) if c.signed else 1.0
     now, signature = strengthened(case, what, c, wanted, sign)
     account = {**what, "names": list(c.names), "strength": now["strength"], "number": c.number}
@@ -254,12 +255,12 @@ def _rates(case: Case, wide: Case | None, a: dict, b: dict) -> tuple[float, floa
     return d / max(far, 1e-9), d / apart(mine, theirs)
 
 
-def _like(case: Case, b: dict, wanted: float, mine: np.ndarray, most: int = 4) -> tuple[dict, np.ndarray]:
+def _like(case: Case, b: dict, wanted: float, mine: np.ndarray) -> tuple[dict, np.ndarray]:
     """The rival as strong as the effect, with the sign that is more like it, about the effect's motion."""
     c = table(case.o["structure"])[b["mechanism"]]
     scale = case.scale(b["place"]) if c.stiff else 1.0
     s, sign = c.first * scale, 1.0
-    for _ in range(most):
+    for _ in range(4):
         now = entry(b["mechanism"], sign * s, b["place"], b["extra"])
         theirs = case.signature([now])
         if c.signed and mine @ theirs < 0:
@@ -313,7 +314,7 @@ def unlike(case: Case, what: dict, wanted: float, rng: np.random.Generator) -> d
     goal, first = wanted * share, 0.0
     for _ in range(3):
         now, mine = strengthened(some, what, c, goal, sign, first)
-        like, d = imitation(some, now, what, mine), float(np.linalg.norm(mine))
+        like, d = imitation(some, mine, site=what["site"], most=2), float(np.linalg.norm(mine))
         more = min(wanted * share / max(like["apart"], 1e-9), STRONGEST / goal)
         if more < 1.4 or d < 0.85 * goal:
             break
@@ -414,14 +415,14 @@ def realise(what: str, folder: Path, answer: Path, into: Path, repeats: int = 1)
 # --- what is alike
 
 
-def imitation(case: Case, truth: dict, what: dict, mine: np.ndarray, names=()) -> dict:
-    """The law of the catalogue that is hardest to tell from an effect, or the two of those most like it.
+def imitation(case: Case, mine: np.ndarray, *, site: str = "", names=(), most: int = 1) -> dict:
+    """The law of the catalogue that is hardest to tell from an effect, or so many of the laws that are most like it.
 
-    They are taken as small effects about its motion, for which signatures were found last; those of a crease or a panel
-    act where it does, or anywhere if it acts on the whole object.
+    They are taken as small effects about its motion, for which signatures were last found afresh.
 
     Args:
-        truth: the effect as an entry. what: its place. mine: its signature. names: what it may be called itself.
+        mine: signature of the effect. site: where it acts; there laws of creases and panels act, too, else anywhere.
+        names: what the effect may be called itself.
 
     Returns: `mechanism` and `site`; `overlap`, |cos| with the first; `apart`: d' that is left at their best strengths.
     """
@@ -429,49 +430,48 @@ def imitation(case: Case, truth: dict, what: dict, mine: np.ndarray, names=()) -
     for name, c in imitators(case.o["structure"]).items():
         if set(c.names) & set(names):
             continue
-        for place in beside(case.o, c, what):
+        for place in around(case.o, c, site):
             for extra in EXTRAS.get(name, ({},)):
-                first = c.first * (case.scale(place) if c.stiff else 1.0)
-                shape = case.beside([truth], entry(name, first, place, extra))
+                shape = case.beside(entry(name, c.first * (case.scale(place) if c.stiff else 1.0), place, extra))
                 if np.linalg.norm(shape) > 1e-6:
-                    found.append((placed(case.o, name, place, extra), shape))
+                    found.append((placed(case.o, name, place, extra), shape, -np.inf if c.signed else 0.0))
     found.sort(key=lambda f: -overlap(mine, f[1]))
     best = {"mechanism": "", "site": "", "overlap": 0.0, "apart": float(np.linalg.norm(mine))}
-    for some in [found[:1], *combinations(found[:PAIRED], 2)]:
-        if not some:
-            continue
-        shapes = np.stack([s for _, s in some], axis=1)
-        left = float(np.linalg.norm(mine - shapes @ np.linalg.lstsq(shapes, mine, rcond=None)[0]))
+    for some in (c for n in range(1, most + 1) for c in combinations(found[:PAIRED] if n > 1 else found, n)):
+        shapes = np.stack([shape for _, shape, _ in some], axis=1)
+        size = np.linalg.norm(shapes, axis=0)
+        fit = lsq_linear(shapes / size, mine, ([least for *_, least in some], np.inf))
+        left = float(np.sqrt(2.0 * fit.cost))
         if left < best["apart"]:
-            said = {k: " + ".join(w[k] for w, _ in some) for k in ("mechanism", "site")}
+            said = {k: " + ".join(what[k] for what, *_ in some) for k in ("mechanism", "site")}
             best = {**said, "overlap": overlap(mine, some[0][1]), "apart": left}
     return best
 
 
-def beside(o: dict, c: Concealed, what: dict) -> list[int]:
-    """Where a law may act to be like an effect: at its crease, or on the panels next to it."""
-    if not what["site"] or c.site not in ("crease", "panel") or "creases" not in o:
+def around(o: dict, c: Concealed, site: str) -> list[int]:
+    """Where a law may act to be like an effect at a site: at that crease, or on the panels next to it."""
+    names = [crease["name"] for crease in o.get("creases", ())]
+    if site not in names or c.site not in ("crease", "panel"):
         return places(o, c)
-    names = [crease["name"] for crease in o["creases"]]
-    if what["site"] not in names:
-        return places(o, c)
-    k = names.index(what["site"])
+    k = names.index(site)
     return [k] if c.site == "crease" else [p for p in o["creases"][k]["panels"] if p != o["held"]]
 
 
 def nearest(sealed: dict) -> dict:
-    """What of the catalogue, but for its own names, is hardest to tell from what is concealed; see `imitation`."""
+    """What of the catalogue, but for its own names, is hardest to tell from what is concealed; see `imitation`.
+
+    One law; of an effect outside the catalogue also two.
+    """
     case = case_of(sealed["object"], sealed["factors"])
-    truth = sealed["concealed"][0]
-    mine = case.signature([truth], fresh=True)
-    return imitation(case, truth, sealed, mine, sealed["names"])
+    mine = case.signature([sealed["concealed"][0]], fresh=True)
+    return imitation(case, mine, names=sealed["names"], most=1 if sealed["names"] else 2)
 
 
 PAIRED = 6
 """Laws that are tried two at a time: those that are most like the effect."""
 
 STRONGEST = 1000.0
-"""Largest d' of an effect outside the catalogue."""
+"""Largest d' in the first recording of an effect outside the catalogue."""
 
 EXTRAS = {
     "hysteresis": ({"angle": 0.1},),

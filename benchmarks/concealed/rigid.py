@@ -102,15 +102,23 @@ class RigidCase:
             rows.append(d - basis @ (basis.T @ d))
         return self._cleared(rows)
 
-    def beside(self, entries: list[dict], other: dict) -> np.ndarray:
-        """The signature of another, small effect, about the motion for which signatures were last found afresh."""
-        (laws, chain), plain, rows = entered([other]), self.world(), []
-        self._without = self._without or self._repeated(plain)
-        changed = self._repeated(self.world(laws)) if laws else self._without
-        for a, b, (basis, _) in zip(changed, self._without, self._tangents or (), strict=True):
-            d = (readings(plain, a, a.times, chain) - channels(plain, b.angles))[::EVERY].ravel() / self._sigma
-            rows.append(d - basis @ (basis.T @ d))
-        return self._cleared(rows)
+    def beside(self, other: dict) -> np.ndarray:
+        """The signature of another, small effect, about the motion for which signatures were last found afresh.
+
+        Laws with memory begin each stretch without one.
+        """
+        (laws, chain), plain, gaps = entered([other]), self.world(), []
+        if laws:
+            self._without = self._without or self._repeated(plain)
+            for a, b in zip(self._repeated(self.world(laws)), self._without, strict=True):
+                gaps.append((channels(plain, a.angles) - channels(plain, b.angles))[::EVERY])
+        else:  # as it is seen, since the recording began
+            for r, m, k in self._about:
+                times = m.times[k : k + round(self._length(r) * FINE) + 1 : EVERY]
+                gaps.append(readings(plain, m, times, chain) - readings(plain, m, times, {}))
+        rows = [gap.ravel() / self._sigma for gap in gaps]
+        bases = [basis for basis, _ in self._tangents or ()]
+        return self._cleared([d - basis @ (basis.T @ d) for d, basis in zip(rows, bases, strict=True)])
 
     def _repeated(self, world: World) -> list[Motion]:
         """The stretches of that motion, from where they start."""

@@ -102,8 +102,7 @@ class World:
         self.torque = np.zeros(self.count)
         self.wrench = np.zeros((len(o["faces"]), 6))
         moment = {m["panel"]: np.array(m["poling"]) * m["moment"] for m in o["magnets"]}
-        self.magnets = np.array([m * self.numbers.remanence[p] for p, m in moment.items()]).reshape(-1, 3, 1)
-        self.magnetic = list(moment)
+        self.magnets = {p: (m * self.numbers.remanence[p]).tolist() for p, m in moment.items()}
         self.body = {p: self.model.body(f"p{p}").id for p in range(len(o["faces"]))}
 
     def _xml(self) -> str:
@@ -178,8 +177,7 @@ class World:
             foot.rest()
         out, rates = np.empty((2, frames, len(order)))
         bodies = [self.body[p] for p in range(len(self.o["faces"]))]
-        turned = [self.body[p] for p in self.magnetic]
-        turn, crossed = d.xmat.reshape(-1, 3, 3), np.zeros((3, 3))  # a view, and what turns m into m x b: m @ crossed
+        magnets = [(p, self.body[p], m) for p, m in self.magnets.items()]
         acting = [law for law in self.laws if type(law).act is not Law.act]
         fielding = [law for law in self.laws if type(law).field is not Law.field]
         for n in range(frames):
@@ -195,9 +193,10 @@ class World:
                     for law in fielding:
                         b = law.field(b, dt)
                     bx, by, bz = b.tolist()
-                    crossed[0, 1], crossed[0, 2], crossed[1, 2] = -bz, by, -bx
-                    crossed[1, 0], crossed[2, 0], crossed[2, 1] = bz, -by, bx
-                    self.wrench[self.magnetic, 3:] = (turn[turned] @ self.magnets)[..., 0] @ crossed
+                    for p, body, (x, y, z) in magnets:  # in plain numbers: arrays as short as these take longer
+                        turn = d.xmat[body].tolist()
+                        mx, my, mz = (turn[i] * x + turn[i + 1] * y + turn[i + 2] * z for i in (0, 3, 6))
+                        self.wrench[p, 3:] = my * bz - mz * by, mz * bx - mx * bz, mx * by - my * bx
                 if acting:
                     q, w = d.qpos[order].tolist(), d.qvel[dofs].tolist()
                     for law in acting:

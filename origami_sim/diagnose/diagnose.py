@@ -29,7 +29,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.prescribed import curves
-from origami_sim.diagnose.refit import Fit, Weights, carried_on, fit, promised
+from origami_sim.diagnose.refit import LITTLE, Fit, Weights, carried_on, fit, promised
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
@@ -551,8 +551,10 @@ def settled(
         out[n] = carried_on(forward, f, new)
         if new is not weights and place <= AGAIN and bent(forward, out[n]) and f.cost < HOPELESS * least:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
-            near = {"theta": f.theta, "blocks": f.blocks, "known": out[n].linear, "kept": len(f.free)}
-            out[n] = min(out[n], fit(forward, f.hypothesis, new, **near), key=lambda f: f.cost)
+            near = {"known": out[n].linear, "kept": len(forward.subject.nominals) if n else 0}
+            other = fit(forward, f.hypothesis, new, theta=f.theta, blocks=f.blocks, **near)
+            if other.cost < out[n].cost - LITTLE:
+                out[n] = carried_on(forward, other, new)
     return reweighted(screening, out[0], weights, new), out, new
 
 
@@ -762,8 +764,9 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
     near = {"known": best.linear, "kept": len(forward.subject.nominals)}
     for s in best.hypothesis.suspects:
         rest = tuple(t for t in best.hypothesis.suspects if t is not s)
-        place = _kept(best, rest)
         known = [f for f in (*fits, *out) if _same(f.hypothesis, rest) and not f.failed]
+        rest = known[0].hypothesis.suspects if known else rest
+        place = _kept(best, rest)
         inner = known[0] if known else fit(forward, Hypothesis(rest), weights, theta=place, local=best.local, **near)
         if inner.failed:
             continue
@@ -778,7 +781,7 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
             f = roughly(forward, inner, g, weights, screening)
             theta = np.concatenate([place, f.theta[len(inner.free) :]])
             other = fit(forward, f.hypothesis, weights, theta=theta, local=best.local, rough=True, **near)
-            f = min(f, other, key=lambda f: f.cost)
+            f = min(f, other, key=lambda f: min(f.cost, f.promise))
             if min(f.cost, f.promise) < best.cost + NEAR:
                 f = finished(forward, f, weights)
             if not f.failed:
@@ -823,10 +826,10 @@ def _same(hypothesis: Hypothesis, wanted: tuple[Suspect, ...]) -> bool:
 
 
 def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
-    """The numbers of a fit that a smaller hypothesis still has."""
-    keep = {id(n) for s in rest for n in s.free}
-    count = len(f.free) - len(f.hypothesis.free)
-    return np.array([t for n, t in zip(f.free, f.theta, strict=True) if id(n) in keep or n in f.free[:count]])
+    """The numbers of a fit that a smaller hypothesis of these suspects still has."""
+    ends = np.cumsum([len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
+    own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends, ends[1:], strict=True)}
+    return np.concatenate([f.theta[: ends[0]], *(own[s.label] for s in rest)])
 
 
 def leader(fits: Sequence[Fit], scores: dict[int, Score]) -> Fit | None:

@@ -200,7 +200,7 @@ class _Weighed:
     @property
     def share(self) -> float:
         """Part of the slow structure that the best leaves."""
-        return self.after.excess / max(self.before.excess, self.after.excess, 1e-300)
+        return max(self.after.excess, 0.0) / max(self.before.excess, self.after.excess, 1e-300)
 
     @property
     def leaves(self) -> bool:
