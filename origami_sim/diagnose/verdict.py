@@ -364,10 +364,17 @@ def _named(w: _Weighed) -> _Said:
         word, text = "MEASUREMENT", f"The measurement, not the device, explains the mismatch: {_say(w.best)}"
         text += f" (p = {probability:.2f})"
     else:
-        where = "" if len(same) == 1 or w.probability(w.best) > 0.9 * probability else " (the site is less certain)"
+        others = [_elsewhere(f) for f in kept if f is not w.best and len(f.hypothesis.suspects) == 1]
+        sure = len(same) == 1 or w.probability(w.best) > 0.9 * probability
+        where = (
+            f" (these recordings do not tell that from {_join(others)})" if others else " (the site is less certain)"
+        )
         s = w.best.hypothesis.suspects[0]
         lacks = "there is" if s.more else "the model lacks"
-        word, text = "MECHANISM", f"At {s.site} {lacks} {_say(w.best)}{where}, p = {probability:.2f}"
+        word, text = (
+            "MECHANISM",
+            f"At {s.site} {lacks} {_say(w.best)}{'' if sure else f' ({where})'}, p = {probability:.2f}",
+        )
     return _Said(word, f"{text}; {w.fall}.", probability, [s.label for s in suspects], w.best)
 
 
@@ -642,6 +649,13 @@ def _say(f: Fit) -> str:
         strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
         out.append(f"{what} at {s.site} ({strength}, 95 %: {low} to {high})")
     return _join(out)
+
+
+def _elsewhere(f: Fit) -> str:
+    """A single effect somewhere else, in words."""
+    s = f.hypothesis.suspects[0]
+    change = f.theta[len(f.free) - len(s.free)] - s.free[0].start
+    return f"{'more' if change > 0 else 'less'} at {s.site}" if s.more else f"the same at {s.site}"
 
 
 def said(value: float, unit: str, digits: int = 3) -> str:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, diagnose, experiment
+from origami_sim.diagnose import Options, diagnose, experiment, verdict
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit, unbent
@@ -325,3 +325,15 @@ def test_the_next_experiment_is_for_rivals_that_can_be_told(monkeypatch, second,
     assert found[0].what == best and found[0].separates == ["rival -1", *(f"rival {n}" for n in told)]
     assert [e.expected for e in found] == sorted((min(apart[w][n] for n in told) for w in apart), reverse=True)
     assert found[0].repeats == int(np.ceil((5.0 / found[0].expected) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("more", "value", "words"), [(True, 0.7, "more"), (True, 0.3, "less"), (False, 0.7, "the same")]
+)
+def test_where_else_an_effect_may_act_is_said(more, value, words):
+    free = SimpleNamespace(start=0.5)
+    suspect = SimpleNamespace(free=(free, SimpleNamespace(start=0.1)), site="fold1", more=more)
+    fitted = SimpleNamespace(
+        hypothesis=SimpleNamespace(suspects=(suspect,)), free=(None, *suspect.free), theta=[1.0, value, 0.1]
+    )
+    assert verdict._elsewhere(fitted) == f"{words} at fold1"  # pyright: ignore[reportArgumentType]
