@@ -828,7 +828,7 @@ def _same(hypothesis: Hypothesis, wanted: tuple[Suspect, ...]) -> bool:
 def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
     """The numbers of a fit that a smaller hypothesis of these suspects still has."""
     ends = np.cumsum([len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
-    own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends, ends[1:], strict=True)}
+    own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends[:-1], ends[1:], strict=True)}
     return np.concatenate([f.theta[: ends[0]], *(own[s.label] for s in rest)])
 
 
