@@ -366,15 +366,11 @@ def _named(w: _Weighed) -> _Said:
     else:
         others = [_elsewhere(f) for f in kept if f is not w.best and len(f.hypothesis.suspects) == 1]
         sure = len(same) == 1 or w.probability(w.best) > 0.9 * probability
-        where = (
-            f" (these recordings do not tell that from {_join(others)})" if others else " (the site is less certain)"
-        )
+        where = f"these recordings do not tell that from {_join(others)}" if others else "the site is less certain"
         s = w.best.hypothesis.suspects[0]
         lacks = "there is" if s.more else "the model lacks"
-        word, text = (
-            "MECHANISM",
-            f"At {s.site} {lacks} {_say(w.best)}{'' if sure else f' ({where})'}, p = {probability:.2f}",
-        )
+        word = "MECHANISM"
+        text = f"At {s.site} {lacks} {_say(w.best)}{'' if sure else f' ({where})'}, p = {probability:.2f}"
     return _Said(word, f"{text}; {w.fall}.", probability, [s.label for s in suspects], w.best)
 
 
