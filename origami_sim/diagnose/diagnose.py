@@ -149,7 +149,7 @@ def diagnose(
     fits = contest(forward, base, finalists, screening, weights, lambda part: tell("refit", part))
     fits += unbent(forward, base, every, fits, weights, o)
     fits += pairs(forward, base, screening, fits, weights, o)
-    rough = screening
+    rough, seen = screening, (base, screening, weights)
     screening, fits, weights = settled(forward, rough, fits, weights)
     refined = tuple(fits)
     alike_ones = twins(forward, rough, screening, fits, weights)
@@ -163,6 +163,10 @@ def diagnose(
     more = combine(forward, fits, scores, screening, weights, o, tell)
     if alike_ones or more:
         screening, fits, weights = settled(forward, screening, [*fits, *more], weights, refined)
+    rest = others(forward, seen, fits, weights, tell)
+    if rest:
+        noted.append(f"No explanation left noise alone, so that {len(rest)} more suspects were fitted than stood out.")
+        screening, fits, weights = settled(forward, screening, [*fits, *rest], weights, tuple(fits))
     fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
@@ -505,6 +509,34 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)} - done
     again = [s for s in distinct(screening.signatures) if s.suspect.label in same]
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
+
+
+TOGETHER = 6
+"""Suspects that are fitted at a time where none leaves noise alone."""
+
+
+def others(
+    forward: Forward, seen: tuple[Fit, Screening, Weights], fits: Sequence[Fit], weights: Weights, tell: Report
+) -> list[Fit]:
+    """Where the best explanation leaves structure: the suspects that were not fitted alone, until one leaves none.
+
+    A screening knows small changes only, and is not the place to refuse a suspect where what is missing is large.
+
+    Args:
+        seen: the model without an effect, the screening about it, and their weights. weights: those of the fits.
+    """
+    base, screening, old = seen
+    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
+    best = leader(fits, scores)
+    done = {f.hypothesis.label for f in fits}
+    rest = [s for s in distinct(screening.signatures) if abs(s.score) >= 2.0 and s.suspect.label not in done]
+    out: list[Fit] = []
+    while best is not None and len(out) < len(rest) and words.lacking(fits[0], best):
+        tell("other suspects", len(out) / len(rest))
+        tried = contest(forward, base, rest[len(out) : len(out) + TOGETHER], screening, old)[1:]
+        out += [f if f.failed else f.reweighted(old, weights) for f in tried]
+        best = min((best, *out), key=lambda f: f.cost)
+    return out
 
 
 def widened(forward: Forward, screening: Screening, f: Fit, weights: Weights) -> np.ndarray:

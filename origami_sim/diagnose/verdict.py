@@ -200,7 +200,7 @@ class _Weighed:
     @property
     def share(self) -> float:
         """Part of the slow structure that the best leaves."""
-        return max(self.after.excess, 0.0) / max(self.before.excess, self.after.excess, 1e-300)
+        return _share(self.before, self.after)
 
     @property
     def leaves(self) -> bool:
@@ -208,8 +208,8 @@ class _Weighed:
 
         Several effects bend to anything: of 25 pairs that were right, none left more than a sixtieth.
         """
-        allowed = INEXACT / max(len(self.best.hypothesis.suspects), 1)
-        return self.after.repeated > STRUCTURED and self.share > (MOST if self.small else allowed)
+        allowed = MOST if self.small else INEXACT / max(len(self.best.hypothesis.suspects), 1)
+        return _leaves(self.before, self.after, allowed)
 
     @property
     def fall(self) -> str:
@@ -232,6 +232,19 @@ class _Said:
     chosen: list[str]
     fit: Fit
     tied: list[Fit] = field(default_factory=list)
+
+
+def _share(before: Structure, after: Structure) -> float:
+    return max(after.excess, 0.0) / max(before.excess, after.excess, 1e-300)
+
+
+def _leaves(before: Structure, after: Structure, allowed: float) -> bool:
+    return after.repeated > STRUCTURED and _share(before, after) > allowed
+
+
+def lacking(base: Fit, f: Fit) -> bool:
+    """Whether a fit leaves more of the structure of the model without an effect than inexact laws do."""
+    return _leaves(structure(base, f), structure(f, f), INEXACT)
 
 
 def judge(forward, given: Fit, base: Fit, sigma: np.ndarray, fits, scores, screening: Screening, chance, weights, o):

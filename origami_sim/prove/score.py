@@ -62,6 +62,13 @@ def calibration_error(probability: Sequence[float], correct: Sequence[bool], bin
     return float(sum(gaps) / len(p))
 
 
+def calibration_by_chance(probability: Sequence[float], draws: int = 2000, seed: int = 0) -> float:
+    """The calibration error that is expected of so few probabilities even if all of them are right."""
+    rng = np.random.default_rng(seed)
+    right = rng.random((draws, len(probability))) < np.asarray(probability, float)
+    return float(np.mean([calibration_error(probability, r) for r in right]))
+
+
 def f1(rows: Sequence[dict], draws: int = 2000, seed: int = 0) -> dict:
     """F1 of the named elements (creases, panels), pooled over cases, with a 95 % interval (cases drawn again).
 
@@ -287,9 +294,11 @@ def scores(rows: Sequence[dict]) -> dict:
         met = None if target is None else _met(counted, *target)
         out["proportions"][key] = {"title": title, **counted, "target": target, "met": met}
     stated = [r for r in rows if r["correct"] is not None]
-    out["ece"] = calibration_error([r["probability"] for r in stated], [r["correct"] for r in stated])
+    probability = [r["probability"] for r in stated]
+    out["ece"] = calibration_error(probability, [r["correct"] for r in stated])
+    out["ece_by_chance"] = calibration_by_chance(probability)
     median = lambda key, part: float(np.median(v)) if (v := [r[key] for r in part if r.get(key) is not None]) else None  # noqa: E731
-    out["elements"] = f1(rows)
+    out["elements"], out["clear_elements"] = f1(rows), f1([r for r in rows if r["d"] >= CLEAR])
     out["removed"] = median("removed", clear)
     out["floor"] = median("floor", clear)
     out["refitted_floor"] = median("refitted", clear)
@@ -372,13 +381,14 @@ def text_of(board: dict) -> str:
     lines += [
         "",
         f"F1 of named creases and panels, any d': {say(e['f1'])} ({say(e['low'])} to {say(e['high'])}) over "
-        f"{e['cases']} cases (target >= 0.80)",
+        f"{e['cases']} cases (target >= 0.80); at d' >= {CLEAR:g}: {say(board['clear_elements']['f1'])}",
         f"removable error removed, held out (median, d' >= 5): {say(board['removed'])} (target >= 0.95)",
         f"error over noise, held out (median, d' >= 5): {say(board['floor'])} (target <= 1.2); "
         f"refitted without the effect {say(board['refitted_floor'])}",
         *(f"    beside it, {n}: {v:.3g}" for n, v in board["baselines"].items()),
         f"error of the strength (median): {say(board['recovery'], '{:.1%}')} (target <= 5 %)",
-        f"calibration error of the stated probabilities: {say(board['ece'])} (target <= 0.05)",
+        f"calibration error of the stated probabilities: {say(board['ece'])} (target <= 0.05); "
+        f"{say(board['ece_by_chance'])} is expected of so few even if all are right",
         f"ties: {board['ties']['count']}, with the truth among them {board['ties']['with_truth']}",
         f"seconds per diagnosis (median): {say(board['seconds'])}",
         "",

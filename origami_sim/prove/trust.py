@@ -1,11 +1,12 @@
 """Fits the curve of `diagnose.trust` to runs: `python -m origami_sim.prove.trust RUN [RUN ...]`.
 
 Development runs, and sealed runs that were scored: once opened, they are spent, and tell how often the diagnosis was
-right on cases that nobody had seen.
+right on cases that nobody had seen. Outcomes are stored with the curve, and those of other seeds count on.
 """
 
 import json
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -26,8 +27,12 @@ EXPECTED, WORTH = 0.75, 8.0
 development battery is looked at while the method is made."""
 
 
-def outcomes(run: Path) -> list[tuple[np.ndarray, bool]]:
-    """(features, whether the truth is among what was named) of all cases of a run in which something was named."""
+Outcome = tuple[float, int, bool]
+"""Of a case in which something was named: held-out gain, how many effects, and whether the truth is among them."""
+
+
+def outcomes(run: Path) -> list[Outcome]:
+    """Of all cases of a run in which something was named."""
     out = []
     for file in sorted((run / "cases").glob("*/diagnosis.json")):
         found = json.loads(file.read_text())
@@ -36,13 +41,13 @@ def outcomes(run: Path) -> list[tuple[np.ndarray, bool]]:
         if row["correct"] is None or nominal:
             continue
         best = max(found["candidates"], key=lambda c: c["probability"])
-        out.append((features(best["gain"], len(best["effects"])), row["correct"]))
+        out.append((round(best["gain"], 2), len(best["effects"]), row["correct"]))
     return out
 
 
-def fitted(cases: list[tuple[np.ndarray, bool]]) -> np.ndarray:
+def fitted(cases: Sequence[Outcome]) -> np.ndarray:
     """(3,) coefficients of the logistic curve of highest posterior; trust does not fall with the gain."""
-    x, y = np.stack([c[0] for c in cases]), np.array([c[1] for c in cases], float)
+    x, y = np.stack([features(*c[:2]) for c in cases]), np.array([c[2] for c in cases], float)
     x, y = np.vstack([x, x.mean(axis=0)]), np.append(y, EXPECTED)
     worth = np.append(np.ones(len(cases)), WORTH)
 
@@ -61,18 +66,22 @@ def main() -> None:
         s["seed"] >= DEVELOPMENT and not (r / BOARD).exists() for r, s in zip(runs, stored, strict=True)
     ):
         sys.exit("runs of development seeds, or sealed ones that were scored, are needed")
-    cases = [c for r in runs for c in outcomes(r)]
-    w = fitted(cases)
     keys = ("seed", "commit", "diagnosis", "truth")
+    before = json.loads(FILE.read_text())["batteries"]
+    known = {b["seed"]: b for b in before if "outcomes" in b}
+    known |= {s["seed"]: {k: s[k] for k in keys} | {"outcomes": outcomes(r)} for r, s in zip(runs, stored, strict=True)}
+    batteries = [known[seed] for seed in sorted(known)]
+    cases = [c for b in batteries for c in b["outcomes"]]
+    w = fitted(cases)
     FILE.write_text(
         json.dumps(
             {
                 "coefficients": [round(float(v), 3) for v in w],
                 "features": ["1", "log of the held-out gain", "several effects"],
                 "named": len(cases),
-                "right": int(sum(c[1] for c in cases)),
+                "right": sum(c[2] for c in cases),
                 "date": datetime.now(UTC).strftime("%Y-%m-%d"),
-                "batteries": [{k: s[k] for k in keys} for s in stored],
+                "batteries": batteries,
             },
             indent=1,
         )

@@ -1,5 +1,6 @@
 """Fits that use derivatives again, weights that are replaced, held-out densities: against plain ways to the same."""
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,13 +10,13 @@ from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
-from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, prepared, settled
+from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, others, prepared, settled
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Signature, rated, screen, widening
 from origami_sim.diagnose.trust import trust
-from origami_sim.diagnose.verdict import STRUCTURED, floor_of, noise_of, structure, white_of
+from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of, structure, white_of
 from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel
@@ -513,3 +514,18 @@ def test_small_effects_excuse_what_noise_does_not(stiff):
 def test_trust_does_not_fall_with_the_gain_and_is_never_certain():
     assert 0.0 < trust(0.0, 1) <= trust(10.0, 1) <= trust(1000.0, 1) < 1.0
     assert trust(100.0, 2) < trust(100.0, 1)
+
+
+def test_what_was_not_fitted_is_where_the_best_leaves_structure(stiff, monkeypatch):
+    forward, base, weights, one = stiff
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive))
+    few = [s for s in every if s.effect in ("crease_stiffening", "angle_offset", "crease_relaxation")]
+    screening = screen(forward, few, base, weights)
+    monkeypatch.setattr(sys.modules[others.__module__], "TOGETHER", 2)
+    steps: list[float] = []
+    found = others(forward, (base, screening, weights), [base], weights, lambda stage, part: steps.append(part))
+    best = min(found, key=lambda f: f.cost)
+    assert best.hypothesis.label == one.label and lacking(base, base) and not lacking(base, best)
+    assert len(found) < len({s.suspect.label for s in screening.signatures})  # and no more than it takes
+    named = fit(forward, Hypothesis((one,)), weights, local=base.local)
+    assert others(forward, (base, screening, weights), [base, named], weights, lambda stage, part: None) == []

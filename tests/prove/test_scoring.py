@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from origami_sim.errors import InputError
@@ -46,6 +47,12 @@ def test_calibration_error_weighs_bins_by_their_cases():
     stated, right = [0.85] * 4 + [0.55], [True, True, True, False, False]
     assert score.calibration_error(stated, right) == pytest.approx((4 * abs(0.85 - 0.75) + 0.55) / 5)
     assert score.calibration_error([1.0], [True]) == 0.0
+
+
+def test_few_probabilities_that_are_right_have_a_calibration_error_by_chance():
+    # of n at 0.85 the share that is right scatters by sqrt(p q / n), and |normal| is 0.798 of that in the mean
+    for n in (20, 500):
+        assert score.calibration_by_chance([0.85] * n) == pytest.approx(0.798 * np.sqrt(0.85 * 0.15 / n), rel=0.06)
 
 
 def test_a_right_answer():
