@@ -86,6 +86,7 @@ class Articulation:
                 for joint, members in enumerate(below):
                     if order[joint][2] == p:
                         members.add(child)
+        self._below = below
         self._carried = [np.isin(owner, list(members)) for members in below]
 
     @staticmethod
@@ -151,9 +152,30 @@ class Articulation:
                 out[3 + a] = np.cross(unit, x - pose.centre)
             first = 6
         for joint, (c, _, _, sign) in enumerate(self._joints):
-            _, j, k, _ = self.model.creases[c]
-            axis = x[k] - x[j]
-            axis = sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)
             carried = self._carried[joint]
-            out[first + joint, carried] = np.cross(axis, x[carried] - x[j])
+            out[first + joint, carried] = np.cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
         return out
+
+    def turning(self, x: np.ndarray) -> dict[int, np.ndarray]:
+        """Angular velocities of the panels that creases move for unit rates of the coordinates, each [m, W, 3]."""
+        out = {child: np.zeros((self.size, *x.shape[1:])) for _, _, child, _ in self._joints}
+        first = self.size - len(self.creases)
+        for p, turns in out.items():
+            if self.floating:
+                turns[3:6] = np.eye(3)[:, None]
+            for joint, (c, _, _, sign) in enumerate(self._joints):
+                if p in self._below[joint]:
+                    turns[first + joint] = self._axis(x, c, sign)
+        return out
+
+    @property
+    def outer(self) -> dict[int, tuple[np.ndarray, int]]:
+        """Of each panel that a crease moves, its nodes and that crease's coordinate."""
+        first = self.size - len(self.creases)
+        return {child: (self._nodes[child], first + n) for n, (_, _, child, _) in enumerate(self._joints)}
+
+    def _axis(self, x: np.ndarray, crease: int, sign: float) -> np.ndarray:
+        """(W, 3) about which the outer panel turns when the fold grows."""
+        _, j, k, _ = self.model.creases[crease]
+        axis = x[k] - x[j]
+        return sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)

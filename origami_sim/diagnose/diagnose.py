@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose import verdict as words
+from origami_sim.diagnose.acting import acting
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.compare import (
@@ -26,7 +27,7 @@ from origami_sim.diagnose.forward import Forward, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import LITTLE, Fit, Weights, carried_on, fit, promised
@@ -143,7 +144,9 @@ def diagnose(
     screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("locate", 0.0)
-    places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, base)
+    motions = [] if isinstance(forward, CurveForward) else motions_of(forward, base)
+    places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, motions)
+    actions = acting(forward.articulation, motions)
     lap("locate")
     finalists = chosen(screening, o.finalists)
     fits = contest(forward, base, finalists, screening, weights, lambda part: tell("refit", part))
@@ -220,6 +223,7 @@ def diagnose(
         subject=subject.name,
         recordings=[r.name for r in recordings],
         impulses=[] if isinstance(forward, CurveForward) else impulses(forward, base),
+        acting=actions,
     )
     tell("done", 1.0)
     return out

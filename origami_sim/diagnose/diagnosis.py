@@ -107,6 +107,25 @@ class Place:
 
 
 @dataclass
+class Acting:
+    """What one action alone, whatever its size in time, leaves of the forces that are missing.
+
+    Attributes:
+        what: "moment at" a crease; "force across" a panel in its middle, "moment on" it about its crease. site: which.
+        left: root mean square of what it leaves, in standard deviations: 1 if it explains all.
+        same: actions that are no different in these recordings.
+        like: of the others, the one that is most like it. overlap: |cos| of the two, 1 if they look the same.
+    """
+
+    what: str
+    site: str
+    left: float
+    same: list[str]
+    like: str
+    overlap: float
+
+
+@dataclass
 class Impulse:
     """What a contact does to the device in a blow.
 
@@ -185,7 +204,7 @@ class Diagnosis:
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
-        impulses: of contacts, if nothing holds the device.
+        impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
         structure: slow structure that the refitted nominal model leaves, and that the best explanation leaves in more
             than one segment, in standard deviations of what noise gives.
         p_value: of the best suspect's score among all that were tried, under the refitted nominal.
@@ -228,6 +247,7 @@ class Diagnosis:
     subject: str = ""
     recordings: list[str] = field(default_factory=list)
     impulses: list[Impulse] = field(default_factory=list)
+    acting: list[Acting] = field(default_factory=list)
     changed: list[str] = field(default_factory=list)
 
     @property

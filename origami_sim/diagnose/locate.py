@@ -36,7 +36,8 @@ class Motion:
 
     Attributes:
         times: (n,) [s]. q, rate, acceleration: [m, n]. missing: [m, n] needed less modelled. error: [m, n] its
-            deviation.
+            deviation. inertia: [m, m, n] by which accelerations need forces. noise: (m,) deviation of these.
+        modelled: [m, n] forces of the model. pose: of the frames. told: (m,) whether the channels tell a coordinate.
         drive: channel -> (n,) values of what varies. half: half window of the smoother [frames].
     """
 
@@ -46,8 +47,29 @@ class Motion:
     acceleration: np.ndarray
     missing: np.ndarray
     error: np.ndarray
+    inertia: np.ndarray
+    noise: np.ndarray
+    modelled: np.ndarray
+    pose: Pose
+    told: np.ndarray
     drive: dict[str, np.ndarray]
     half: int
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """Means of values [..., n] over windows."""
+        width, count = self.width, max(1, len(self.times) // self.width)
+        return values[..., : count * width].reshape(*values.shape[:-1], count, -1).mean(-1)
+
+    @property
+    def width(self) -> int:
+        """Frames of a window."""
+        return max(2 * self.half + 1, round(WINDOW / (self.times[1] - self.times[0])))
+
+    @property
+    def calmer(self) -> float:
+        """Noise of the mean acceleration over a window, which is that of the rates at its ends, by that of one."""
+        point = savgol_coeffs(2 * self.half + 1, 4, deriv=2)
+        return float(np.linalg.norm(np.convolve(point, np.ones(self.width) / self.width)) / np.linalg.norm(point))
 
 
 def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
@@ -90,8 +112,11 @@ def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
     error = np.sqrt(np.einsum("mkw,k->mw", inertia**2, deviation**2))
     missing[~told], error[~told] = 0.0, np.inf
     varying = {n: _at(s, grid)[keep] for n, s in drive.signals.items() if np.ptp(_at(s, grid)) > 0}
+    at, inertia, pose = grid[keep] + recording.times[0], inertia[:, :, keep], pose.select(keep)
     smooth, rate, acceleration, missing, error = (v[:, keep] for v in (smooth, rate, acceleration, missing, error))
-    return Motion(grid[keep] + recording.times[0], smooth, rate, acceleration, missing, error, varying, half)
+    return Motion(
+        at, smooth, rate, acceleration, missing, error, inertia, deviation, free[:, keep], pose, told, varying, half
+    )
 
 
 def loose(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
@@ -160,9 +185,13 @@ def _half_window(q: np.ndarray, noise: np.ndarray) -> int:
     return best
 
 
-def locate(forward: Forward, fit: Fit) -> list[Place]:
+def motions_of(forward: Forward, fit: Fit) -> list[Motion]:
+    """The motions of all recordings that determine one."""
+    return [m for m in (motion(forward, fit, r) for r in range(len(forward.recordings))) if m is not None]
+
+
+def locate(forward: Forward, motions: Sequence[Motion]) -> list[Place]:
     """Places, most suspicious first: all coordinates of the tree; empty if the recordings do not determine them."""
-    motions = [m for m in (motion(forward, fit, r) for r in range(len(forward.recordings))) if m is not None]
     if not motions:
         return []
     out = []
@@ -198,18 +227,8 @@ WINDOW = 0.1
 
 
 def _windows(m: Motion, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Means over windows: times, missing moment, and its deviation.
-
-    The noise of a mean acceleration is that of the rates at the two ends, much less than that of one acceleration.
-    """
-    step = m.times[1] - m.times[0]
-    width = max(2 * m.half + 1, round(WINDOW / step))
-    point = savgol_coeffs(2 * m.half + 1, 4, deriv=2)
-    calmer = np.linalg.norm(np.convolve(point, np.ones(width) / width)) / np.linalg.norm(point)
-    count = max(1, len(m.times) // width)
-    cut = slice(0, count * width)
-    times = m.times[cut].reshape(count, -1).mean(1)
-    return times, m.missing[k, cut].reshape(count, -1).mean(1), calmer * m.error[k, cut].reshape(count, -1).mean(1)
+    """Means over windows: times, missing moment, and its deviation."""
+    return m.mean(m.times), m.mean(m.missing[k]), m.calmer * m.mean(m.error[k])
 
 
 def _onset(times: np.ndarray, value: np.ndarray, error: np.ndarray) -> float:

@@ -63,6 +63,9 @@ PLACES, OPEN_PLACES, OPEN_RECORDINGS, OPEN_SUSPECTS = 6, 2, 3, 12
 BLOWS = 12
 """Blows that are listed."""
 
+ALONE = 6
+"""Actions that are listed, each of which could alone be the mismatch."""
+
 _DATA = re.compile(r'href="data:application/gzip;base64,([^"]+)"')
 _SECURITY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
@@ -406,7 +409,8 @@ def _where(d: Diagnosis, geometry: dict | None) -> list:
         "Found without fitting any suspect: the moment that the recorded motion needs minus the moment that the model "
         "has, at each coordinate. Negative power is lost, positive gained."
     )
-    listed = element("div", element("p", about, class_="quiet"), _table(head, body, "Places"))
+    alone = [_alone(d)] if d.acting else []
+    listed = element("div", element("p", about, class_="quiet"), _table(head, body, "Places"), *alone)
     out = [element("div", *out, listed, class_="map" if out else None)]
     for n, p in enumerate(ordered[:PLACES]):
         out.append(
@@ -424,6 +428,27 @@ def _where(d: Diagnosis, geometry: dict | None) -> list:
             element("p", f"{len(ordered) - PLACES} more places share {percent(rest)}; their curves are in the data.")
         )
     return [*out, *blows]
+
+
+def _alone(d: Diagnosis) -> Html:
+    """What one action alone leaves of the missing forces."""
+    body = [
+        element(
+            "tr",
+            element("th", ", ".join([f"{a.what} {a.site}", *a.same]), scope="row"),
+            element("td", number(a.left), class_="n"),
+            element("td", f"{a.like} ({a.overlap:.2f})" if a.like else ""),
+        )
+        for a in d.acting[:ALONE]
+    ]
+    about = (
+        "If one thing alone acted, as strongly as it takes from moment to moment: what would be left of the missing "
+        "forces, in standard deviations (1: nothing), and which other action looks most like it (1: the same)."
+    )
+    head = _header("Acting alone", "Leaves [sd]", "Most like it")
+    return element(
+        "div", element("h3", "One action"), element("p", about, class_="quiet"), _table(head, body, "Actions")
+    )
 
 
 def _impulses(d: Diagnosis) -> Html:

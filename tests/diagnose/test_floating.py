@@ -9,7 +9,7 @@ from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared, star
 from origami_sim.diagnose.forward import drive_of
 from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
-from origami_sim.diagnose.locate import locate, motion, touching
+from origami_sim.diagnose.locate import locate, motion, motions_of, touching
 from origami_sim.diagnose.track import track
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0
@@ -66,7 +66,7 @@ def test_a_tumbling_cube_is_followed_turn_by_turn():
 def test_a_force_in_flight_is_located_with_its_direction_and_size():
     _, recording = toss(0.18, push=0.8)
     forward, base = fitted(recording)
-    places = {p.site: p for p in locate(forward, base)}
+    places = {p.site: p for p in locate(forward, motions_of(forward, base))}
     push = places["shift y"]
     assert push.score == max(p.score for p in places.values()) and push.score > 15.0
     assert np.mean(push.moment) == pytest.approx(0.8, rel=0.06)

@@ -13,6 +13,7 @@ import pytest
 from origami_sim.build import Sheet
 from origami_sim.diagnose.diagnosis import (
     VERDICTS,
+    Acting,
     Baseline,
     Candidate,
     Correlation,
@@ -265,6 +266,14 @@ def test_blows_are_listed_the_most_different_first():
         text = " ".join(Read(page(d, GEOMETRY)).words)
         assert "11, -2.1, 350" in text and "10, -2, 210" in text and "2 blows are seen" in text
         assert text.index("corner4, toss <1>") < text.index("corner2, toss <1>")
+
+
+def test_actions_say_what_they_leave_and_what_looks_like_them():
+    d = example()
+    assert "One action" not in Read(page(d, GEOMETRY)).words
+    d.acting = [Acting("force across", "panel <2>", 1.31, ["moment on panel <2>"], "moment at fold1", 0.871)]
+    text = " ".join(Read(page(d, GEOMETRY)).words)
+    assert "force across panel <2>, moment on panel <2>" in text and "moment at fold1 (0.87)" in text and "1.31" in text
 
 
 def test_chosen_rows_stand_out():

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Options, diagnose, experiment, verdict
+from origami_sim.diagnose.acting import acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit, unbent
 from origami_sim.diagnose.hypothesis import Hypothesis, suspects
-from origami_sim.diagnose.locate import locate
+from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.screen import _affordable, _least, screen
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
@@ -46,6 +47,11 @@ def test_articulation_moves_panels_rigidly_and_knows_its_jacobian(which):
         by[k] = 1e-6
         slope = (arm.positions(arm.moved(pose, by)) - arm.positions(arm.moved(pose, -by))) / 2e-6
         assert slope == pytest.approx(tangent, abs=1e-9)
+    for panel, (nodes, hinge) in arm.outer.items():  # a panel moves as it turns
+        turning, apart = arm.turning(x)[panel], x[nodes] - x[nodes[0]]
+        moved = arm.jacobian(pose)[:, nodes]
+        assert moved - moved[:, :1] == pytest.approx(np.cross(turning[:, None], apart), abs=1e-12)
+        assert np.linalg.norm(turning[hinge], axis=-1) == pytest.approx(1.0)
 
 
 @pytest.fixture(scope="module")
@@ -94,12 +100,37 @@ def test_starts_that_were_bent_are_put_back_to_look_again(rubbing):
 
 def test_equation_error_finds_the_crease(rubbing):
     forward, _, base, _, _ = rubbing
-    places = locate(forward, base)
+    places = locate(forward, motions_of(forward, base))
     assert places[0].site == "crease 1" and places[0].share > 0.5
     assert places[0].power < 0, "friction takes energy"
     rate = next(c for c in places[0].curves if c.against == "rate")
     moment = np.array(rate.mean)
     assert moment[0] > 0 > moment[-1], "it opposes the motion"
+
+
+def acting_alone(recording):
+    forward = arranged(subject(), prepared([recording], 200.0), Options())
+    forward.soften()
+    base = nominal_fits(forward)[1]
+    return acting(forward.articulation, motions_of(forward, base))
+
+
+def test_a_moment_at_a_crease_is_told_from_forces_on_panels():
+    first, second, *_ = acting_alone(record(FRICTION))
+    assert (first.what, first.site) == ("moment at", "crease 1") and first.left < 1.2
+    assert second.left > 1.5 and first.overlap < 0.95
+    assert acting_alone(record()) == [], "of noise nothing is said"
+
+
+@pytest.mark.parametrize("panel", [2, 3])
+def test_a_force_on_a_panel_is_told_from_moments_at_creases(panel):
+    """A spring pulls at a panel: the folds from there to the held panel all miss a moment."""
+    model = hanging()[0]
+    nodes = np.unique(model.triangles[model.triangle_panel == panel])
+    found = acting_alone(record({"tether": {"stiffness": (0.02, nodes)}}))
+    assert found[0].site == f"panel {panel}" and found[0].what in ("force across", "moment on")
+    best = min(a.left for a in found if a.what == "moment at")
+    assert found[0].left < 0.8 * best
 
 
 def test_a_nested_model_never_fits_worse(rubbing):
