@@ -168,7 +168,7 @@ def diagnose(
         screening, fits, weights = settled(forward, screening, [*fits, *more], weights, refined)
     rest = others(forward, seen, fits, weights, tell)
     if rest:
-        noted.append(f"No explanation left noise alone, so that {len(rest)} more suspects were fitted than stood out.")
+        noted.append("No suspect that stood out left noise alone, so that all that show were fitted.")
         screening, fits, weights = settled(forward, screening, [*fits, *rest], weights, tuple(fits))
     fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
@@ -515,16 +515,17 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
-TOGETHER = 6
-"""Suspects that are fitted at a time where none leaves noise alone."""
+MANY = 6
+"""Suspects that are fitted to all recordings where none leaves noise alone."""
 
 
 def others(
     forward: Forward, seen: tuple[Fit, Screening, Weights], fits: Sequence[Fit], weights: Weights, tell: Report
 ) -> list[Fit]:
-    """Where the best explanation leaves structure: the suspects that were not fitted alone, until one leaves none.
+    """Where the best explanation leaves structure: the best of all suspects that were not fitted alone, fitted as well.
 
-    A screening knows small changes only, and is not the place to refuse a suspect where what is missing is large.
+    A screening knows small changes only, and is no reason to refuse a suspect where what is missing is large. All are
+    fitted to the segment that the model without an effect misses most, and those that explain most of it to all.
 
     Args:
         seen: the model without an effect, the screening about it, and their weights. weights: those of the fits.
@@ -532,15 +533,25 @@ def others(
     base, screening, old = seen
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     best = leader(fits, scores)
+    if best is None or not words.lacking(fits[0], best):
+        return []
     done = {f.hypothesis.label for f in fits}
     rest = [s for s in distinct(screening.signatures) if abs(s.score) >= 2.0 and s.suspect.label not in done]
-    out: list[Fit] = []
-    while best is not None and len(out) < len(rest) and words.lacking(fits[0], best):
-        tell("other suspects", len(out) / len(rest))
-        tried = contest(forward, base, rest[len(out) : len(out) + TOGETHER], screening, old)[1:]
-        out += [f if f.failed else f.reweighted(old, weights) for f in tried]
-        best = min((best, *out), key=lambda f: f.cost)
-    return out
+    assert base.linear is not None
+    missed = [r @ r for r in base.linear.residual]
+    worst = max(range(len(screening.blocks)), key=lambda n: missed[base.blocks.index(screening.blocks[n])])
+    block, tried = [screening.blocks[worst]], []
+    part, seen_there = base.only(block), replace(screening, blocks=block)
+    for n, s in enumerate(rest):
+        tell("other suspects", 0.8 * n / len(rest))
+        tried.append(roughly(forward, part, s.only(worst), old, seen_there))
+    good = sorted((f for f in tried if not f.failed), key=lambda f: min(f.cost, f.promise))[:MANY]
+    out = []
+    for n, f in enumerate(good):
+        tell("other suspects", 0.8 + 0.2 * n / len(good))
+        given = {"theta": f.theta, "local": base.local, "known": base.linear, "kept": len(base.free)}
+        out.append(finished(forward, fit(forward, f.hypothesis, old, rough=True, **given), old))
+    return [f.reweighted(old, weights) for f in out if not f.failed]
 
 
 def widened(forward: Forward, screening: Screening, f: Fit, weights: Weights) -> np.ndarray:
@@ -663,6 +674,7 @@ def roughly(
             weights,
             theta=np.concatenate([base.theta, values]),
             local=base.local,
+            blocks=base.blocks,
             most=most,
             known=base.linear,
             kept=len(base.free),

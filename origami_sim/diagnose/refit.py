@@ -88,6 +88,15 @@ class Fit:
         """(P,) standard deviations of theta."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)
 
+    def only(self, blocks: Sequence[int]) -> "Fit":
+        """The same numbers, where only these blocks were to be fitted."""
+        assert self.linear is not None
+        index = [self.blocks.index(b) for b in blocks]
+        line = self.linear.only(index)
+        misfit = float(sum(r @ r for r in line.residual))
+        left = [self.residuals[n] for n in index]
+        return replace(self, blocks=tuple(blocks), linear=line, residuals=left, misfit=misfit)
+
     def reweighted(self, old: Weights, new: Weights) -> "Fit":
         """The same numbers, judged with other weights."""
         assert self.linear is not None

@@ -51,6 +51,10 @@ class Signature:
     error: float
     status: str = ""
 
+    def only(self, n: int) -> "Signature":
+        """The same of the n-th screened block alone."""
+        return replace(self, parts=[self.parts[n]])
+
 
 @dataclass(frozen=True, eq=False)
 class Screening:

@@ -1,6 +1,5 @@
 """Fits that use derivatives again, weights that are replaced, held-out densities: against plain ways to the same."""
 
-import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -516,16 +515,23 @@ def test_trust_does_not_fall_with_the_gain_and_is_never_certain():
     assert trust(100.0, 2) < trust(100.0, 1)
 
 
-def test_what_was_not_fitted_is_where_the_best_leaves_structure(stiff, monkeypatch):
+def test_what_was_not_fitted_is_where_the_best_leaves_structure(stiff):
     forward, base, weights, one = stiff
     every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive))
     few = [s for s in every if s.effect in ("crease_stiffening", "angle_offset", "crease_relaxation")]
-    screening = screen(forward, few, base, weights)
-    monkeypatch.setattr(sys.modules[others.__module__], "TOGETHER", 2)
-    steps: list[float] = []
-    found = others(forward, (base, screening, weights), [base], weights, lambda stage, part: steps.append(part))
+    seen = base, screen(forward, few, base, weights), weights
+    stages: list[str] = []
+    found = others(forward, seen, [base], weights, lambda stage, part: stages.append(stage))
     best = min(found, key=lambda f: f.cost)
     assert best.hypothesis.label == one.label and lacking(base, base) and not lacking(base, best)
-    assert len(found) < len({s.suspect.label for s in screening.signatures})  # and no more than it takes
-    named = fit(forward, Hypothesis((one,)), weights, local=base.local)
-    assert others(forward, (base, screening, weights), [base, named], weights, lambda stage, part: None) == []
+    assert best.blocks == base.blocks and set(stages) == {"other suspects"}
+    done = [base, best]
+    assert others(forward, seen, done, weights, lambda stage, part: None) == [], "enough is explained"
+
+
+def test_a_part_of_a_fit_is_that_of_its_blocks(stiff):
+    _, base, _, _ = stiff
+    parts = [base.only([b]) for b in base.blocks]
+    assert sum(p.misfit for p in parts) == pytest.approx(base.misfit)
+    assert [p.blocks for p in parts] == [(b,) for b in base.blocks]
+    assert all(p.residuals[0] is r for p, r in zip(parts, base.residuals, strict=True))
