@@ -17,7 +17,11 @@ SAME = 0.999
 """|cos| from which on two actions are one."""
 
 INEXACT = 0.01
-"""Part of the model's own forces by which they may be wrong, as numbers are not known exactly and no panel is rigid."""
+"""Part of the model's own forces by which they may be wrong, as numbers are not known exactly and no panel is rigid.
+
+On strips with known forces on panels, the uncertainty of the refitted numbers and of the angles is too little (nothing
+missing then looks like a moment), and with half as much the wrong panel can come first.
+"""
 
 SEEN = 5.0
 """Standard deviations by which what is missing must exceed the noise for anything to be said of it."""
