@@ -21,6 +21,7 @@ from origami_sim.diagnose.compare import (
     supported,
     weights_from,
 )
+from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Candidate, Correlation, Diagnosis, Number, Suspected, Trace
 from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.forward import Forward, stacked
@@ -182,6 +183,8 @@ def diagnose(
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
+    if judged.verdict == "UNKNOWN":
+        judged = replace(judged, sentence=f"{judged.sentence} {unnamed(forward, base, best)}".strip())
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
     experiments = propose(forward, judged, weights, progress=lambda part: tell("next experiment", part))
@@ -878,6 +881,19 @@ def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
     ends = np.cumsum([len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
     own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends[:-1], ends[1:], strict=True)}
     return np.concatenate([f.theta[: ends[0]], *(own[s.label] for s in rest)])
+
+
+def unnamed(forward: Forward, base: Fit, best: Fit) -> str:
+    """What the best explanation does not name, in words; or, where frames do not tell that, what it was to explain.
+
+    They know no memory, and are read as recorded, without what a hypothesis says of the measurement.
+    """
+    lost = any(get(e).memory or get(e).family == "measurement" for e in best.hypothesis.effects)
+    f, what = (base, "What is missing") if lost else (best, "What is left")
+    if isinstance(forward, CurveForward):
+        return described(forward.locate(f), [], what)
+    motions = motions_of(forward, f)
+    return described(locate(forward, motions), acting(forward.articulation, motions), what)
 
 
 def leader(fits: Sequence[Fit], scores: dict[int, Score]) -> Fit | None:

@@ -1,9 +1,12 @@
-"""Sentences of the verdict, on explanations made by hand."""
+"""Sentences of the verdict, on explanations and places made by hand."""
 
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from origami_sim.diagnose.describe import described
+from origami_sim.diagnose.diagnosis import Acting, Curve, Place
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.diagnose.verdict import _named
 
@@ -32,3 +35,45 @@ def test_the_sentence_says_where_else_the_same_effect_may_act():
     assert ") (these recordings do not tell that from less at fold2), p = " in sentence(0.6, 0.4)
     for sure in (sentence(1.0), sentence(0.95, 0.05)):
         assert "these recordings" not in sure and "), p = " in sure
+
+
+def place(law, *, memory=0.0, share=0.9) -> Place:
+    """A crease that misses a moment law(angle, rate), and one that goes with neither, in a swing that dies."""
+    rng, t = np.random.default_rng(0), np.linspace(0.0, 40.0 * np.pi, 4000)
+    angle, rate = np.array([np.sin(t), np.cos(t)]) * np.linspace(1.0, 0.2, len(t))
+    moment = law(angle, rate) + memory * np.sign(np.sin(t / 20.0)) + 0.1 * rng.normal(size=len(t))
+    curves = []
+    for name, x in (("angle", angle), ("rate", rate)):
+        parts = np.array_split(np.argsort(x), 13)
+        mean, error = (np.array([f(moment[p]) for p in parts]) for f in (np.mean, np.std))
+        counts = [len(p) for p in parts]
+        curves.append(
+            Curve(name, "rad", [x[p].mean() for p in parts], list(mean), list(error / np.sqrt(counts)), counts)
+        )
+    power = float(np.mean(moment * rate))
+    return Place("fold1", 9.0, share, power, 0.0, list(t), list(moment), [0.1] * len(t), curves)
+
+
+@pytest.mark.parametrize(
+    "law, words",
+    [
+        (lambda a, w: -np.sign(w), ("goes with the rate at fold1 (", "odd in the rate", "takes energy")),
+        (lambda a, w: 0.5 * w**3, ("odd in the rate", "gives energy")),
+        (lambda a, w: a**3, ("goes with the angle at fold1 (", "odd in the angle", "keeps the energy")),
+        (lambda a, w: a**2, ("goes with the angle at fold1 (", "even in the angle", "keeps the energy")),
+    ],
+)
+def test_what_is_left_is_described_by_what_it_goes_with(law, words):
+    said = described([place(law), place(lambda a, w: 0.0 * a, share=0.1)], [])
+    assert said.startswith("What is left acts at fold1, ") and all(w in said for w in words)
+    assert "memory" not in said
+    assert "; the rest has a memory, or comes from outside" in described([place(law, memory=2.0)], [])
+
+
+def test_what_is_left_is_placed_by_the_actions_that_leave_least():
+    actions = [Acting("moment on", "panel2", 1.0, [], "", 0.0), Acting("moment at", "fold1", 1.1, [], "", 0.0)]
+    far = Acting("moment at", "fold3", 4.0, [], "", 0.0)
+    said = described([place(lambda a, w: a)], [*actions, far], "What is missing")
+    assert said.startswith("What is missing acts like a moment on panel2 or a moment at fold1, goes")
+    assert described([], [far]) == ""
+    assert "acts at several places" in described([place(lambda a, w: a, share=0.4)], [])
