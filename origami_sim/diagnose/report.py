@@ -201,7 +201,8 @@ def _claims(d: Diagnosis) -> list[tuple[str, str, str]]:
     out = [(label, " · ".join(d.chosen) or "nothing added", "candidates")]
     if d.places:
         best = max(d.places, key=lambda p: p.share if np.isfinite(p.share) else -1.0)
-        out.append(("Where", f"{best.site}, share {percent(best.share)}", "where"))
+        alone = f"; like a {d.acting[0].what} {d.acting[0].site}" if d.acting else ""
+        out.append(("Where", f"{best.site}, share {percent(best.share)}{alone}", "where"))
     if np.isfinite(d.onset):
         out.append(("Since when", f"{amount(d.onset, 's', 3)} after the start", "overlays"))
     elif d.traces:

@@ -273,6 +273,7 @@ def test_actions_say_what_they_leave_and_what_looks_like_them():
     assert "One action" not in Read(page(d, GEOMETRY)).words
     d.acting = [Acting("force across", "panel <2>", 1.31, ["moment on panel <2>"], "moment at fold1", 0.871)]
     text = " ".join(Read(page(d, GEOMETRY)).words)
+    assert "; like a force across panel <2>" in text
     assert "force across panel <2>, moment on panel <2>" in text and "moment at fold1 (0.87)" in text and "1.31" in text
 
 
