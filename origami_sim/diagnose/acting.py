@@ -3,8 +3,10 @@
 The forces that a recorded motion needs beyond the model's (`locate.py`) are those of the tree's coordinates. A moment
 at a crease acts on the fold there and on no other; a force on a panel acts on all folds between it and what holds the
 device. For each such action, whatever its size from window to window, it is counted how much of what is missing it
+leaves, in the covariance that the noise of accelerations and inexact forces of the model give.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -82,18 +84,18 @@ def _whitener(m: Motion) -> np.ndarray:
 
 
 def _actions(arm: Articulation, m: Motion) -> dict[Site, np.ndarray]:
-    """What actions of unit size do to the coordinates, each [m, n]."""
+    """What actions of unit size do to the coordinates, each [m, n]; creases or panels of one name act together."""
     model, pose = arm.model, m.pose
     x = arm.positions(pose)
     jacobian, turning = arm.jacobian(pose, x), arm.turning(x)
-    out: dict[Site, np.ndarray] = {}
+    out: dict[Site, np.ndarray] = defaultdict(lambda: np.zeros((arm.size, pose.worlds)))
     for k, c in enumerate(arm.creases, arm.size - len(arm.creases)):
-        out["moment at", model.name("crease", int(c))] = np.repeat(np.eye(arm.size)[k][:, None], pose.worlds, axis=1)
+        out["moment at", model.name("crease", int(c))][k] += 1.0
     for p, (nodes, hinge) in arm.outer.items():
         a, b, c = model.triangles[np.flatnonzero(model.triangle_panel == p)[0]]
         normal = np.cross(x[b] - x[a], x[c] - x[a])
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         name = model.name("panel", p)
-        out["force across", name] = np.einsum("mnwa,wa->mw", jacobian[:, nodes], normal) / len(nodes)
-        out["moment on", name] = np.einsum("mwa,wa->mw", turning[p], turning[p][hinge])
+        out["force across", name] += np.einsum("mnwa,wa->mw", jacobian[:, nodes], normal) / len(nodes)
+        out["moment on", name] += np.einsum("mwa,wa->mw", turning[p], turning[p][hinge])
     return out

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Options, diagnose, experiment, verdict
-from origami_sim.diagnose.acting import acting
+from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit, unbent
@@ -120,6 +120,15 @@ def test_a_moment_at_a_crease_is_told_from_forces_on_panels():
     assert (first.what, first.site) == ("moment at", "crease 1") and first.left < 1.2
     assert second.left > 1.5 and first.overlap < 0.95
     assert acting_alone(record()) == [], "of noise nothing is said"
+
+
+def test_creases_of_one_name_act_together(rubbing):
+    forward, _, base, _, _ = rubbing
+    (m,) = motions_of(forward, base)
+    named = Articulation(replace(forward.model, names={**forward.model.names, "crease": ("hem", "hem")}))
+    alone, both = _actions(forward.articulation, m), _actions(named, m)
+    assert np.all(alone["moment at", "crease 0"] == [[1.0], [0.0]])
+    assert np.all(both["moment at", "hem"] == 1.0) and len(both) == len(alone) - 1
 
 
 @pytest.mark.parametrize("panel", [2, 3])
