@@ -191,7 +191,5 @@ def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weig
     )
     other.subject = Subject(corrected, nominals)
     other._built = {}
-    assert base.linear is not None
-    known = base.linear.only([base.blocks.index(b) for b in held])
-    given = {"theta": base.theta[:count], "local": base.local, "blocks": held, "known": known}
+    given = {"theta": base.theta[:count], "local": base.local, "blocks": held, "known": base.only(held).linear}
     return fit(other, Hypothesis(), weights, fixed=True, **given)
