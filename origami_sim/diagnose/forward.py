@@ -231,12 +231,12 @@ class Forward:
             x = np.concatenate([self.articulation.positions(self.blocks[b].pose) for b in mine], axis=1)
             deep = depths(self.model, recording, x[None])
             grid = np.arange(STEADY + 2) * float(np.median(np.diff(recording.times)))
-            all_alike = Parameters.join([parameters], repeat=len(mine))
+            all_alike, now = Parameters.join([parameters], repeat=len(mine)), np.zeros(1)
             rate = lines[1].copy()
             for _ in range(UNDONE):
                 motion = lines[0] + GENTLE * rate * (grid[:, None, None] - grid[STEADY // 2])
                 motion = np.concatenate([motion, np.repeat(deep, len(grid), axis=0)], axis=1)
-                seen = self._measured(model, all_alike, recording, distort, [hypothesis], grid, motion, grid)
+                seen = self._measured(model, all_alike, recording, distort, [hypothesis], grid, motion, grid, now)
                 half = STEADY // 2
                 rate += lines[1] - (seen[half + 1] - seen[half - 1]) / (grid[half + 1] - grid[half - 1]) / GENTLE
             for n, b in enumerate(mine):
@@ -371,9 +371,10 @@ class Forward:
         parameters = Parameters.join([p for _, p in worlds], repeat=count)
         times = blocks[0].times
         step = float(np.median(np.diff(recording.times)))
-        frames = int(np.ceil(times[-1] / step - 1e-6)) + 1 + SPARE
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
-        late = self._late(model, parameters, each, begins).reshape(k, count)
+        late, shown = self._late(model, parameters, each, begins)
+        last = max(self._ends(model, parameters, each, c, times[-1], shown) for c in range(len(recording.channels)))
+        frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, group]
         moves, of = distinct_motions(worlds, late, starts)
         raw = self._film(
@@ -392,7 +393,7 @@ class Forward:
         grid = np.arange(frames) * step
         distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
-            values = self._measured(model, parameters, recording, distort, each, grid, channels, times)
+            values = self._measured(model, parameters, recording, distort, each, grid, channels, times, shown)
         elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
             values = plain[: len(times)]
         else:
@@ -440,25 +441,43 @@ class Forward:
         out[:, :, batch.status() >= 0] = np.nan
         return out
 
-    def _late(self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], begins: np.ndarray) -> np.ndarray:
-        """By how much later than its clock says a recording's frames at `begins` were taken [s], for all worlds (W,).
+    def _late(self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], begins: np.ndarray):
+        """How late recordings are.
 
-        A clock that runs fast or slow is off by more in each segment, and so is the drive that acts there. Within a
-        segment the reading of the motion takes care of it.
+        A start that is fitted is that of the first frame, however late it was taken: the drive is late there, and the
+        motion is read from there on. A clock that runs fast or slow is off by more in each segment, and so is the drive
+        that acts there. Within a segment the reading of the motion takes care of it.
+
+        Returns:
+            by how much later than its clock says a recording's frames at `begins` were taken [K, B], and the time since
+            its start at which the motion of a segment is read first (K,) [s].
         """
-        worlds = len(each) * len(begins)
-        out = np.zeros(worlds)
-        rows = np.stack([np.full(worlds, -1e3), np.zeros(worlds), np.tile(begins, len(each))])
+        clock = self._clock(model, parameters, each, None, [-1e3, 0.0, *begins])
+        late = (clock[2:] - clock[1] - begins[:, None]).T
+        shown = np.zeros(len(each))
+        if self.start == "fit":
+            shown = self._clock(model, parameters, each, None, [0.0])[0]
+            late += shown[:, None]
+        return np.where(np.abs(late) > ROUNDING, late, 0.0), shown
+
+    def _ends(self, model, parameters, each, channel: int, last: float, shown: np.ndarray) -> float:
+        """Time since its start until which the motion of a segment is read [s]."""
+        return max(last, float(np.max(self._clock(model, parameters, each, channel, [0.0, last])[1] - shown)))
+
+    def _clock(
+        self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], channel: int | None, times
+    ) -> np.ndarray:
+        """[n, K] what a clock in the picture would show at frames at `times` [n], by a channel or (None) by all."""
+        rows = np.repeat(np.array(times)[:, None], len(each), axis=1)
+        out = rows.copy()
         for name in model.effects:
             effect = get(name)
             if effect.family != "measurement" or effect.channels or effect.apply is None:
                 continue  # what reads angles or places has no time of its own
-            whole = [name in self.model.effects or _acts(h, name, None) for h in each]
-            here = np.repeat(whole, len(begins))
-            given = {n: np.where(here, v[0], effect.parameter(n).default) for n, v in parameters.of(name).items()}
-            taken = effect.apply(lambda t: t[:, None], rows, **given)[:, 0]  # what a clock in the picture would show
-            out += taken[2] - taken[1] - rows[2]
-        return np.where(np.abs(out) > ROUNDING, out, 0.0)
+            given = self._at_channel(name, channel, each, parameters, parameters.worlds // len(each))
+            given = {n: v[:: parameters.worlds // len(each)] for n, v in given.items()}
+            out += effect.apply(lambda t: t[:, None], rows, **given)[:, 0] - rows
+        return out
 
     def _state(self, model: Model, worlds, blocks: list[Block], local) -> State:
         """The starts of all worlds [theta, block]."""
@@ -543,10 +562,11 @@ class Forward:
                 self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
         return self._paths[r]
 
-    def _measured(self, model, parameters, recording, distort, each, grid, channels, times) -> np.ndarray:
-        """Channels [n, D, W] as distorted measurements show them."""
+    def _measured(self, model, parameters, recording, distort, each, grid, channels, times, shown) -> np.ndarray:
+        """Channels [n, D, W] as distorted measurements show them; what is `shown` first (K,) is the grid's start."""
         worlds = channels.shape[2]
         repeat = worlds // len(each)
+        shown = np.repeat(shown, repeat)
         at = np.repeat(times[:, None], worlds, axis=1)
         parts, row, deep = [], 0, len(angle_mask(recording))
         for index, channel in enumerate(recording.channels.values()):
@@ -554,7 +574,7 @@ class Forward:
             rows = [*range(row, row + width)]
             if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
                 rows, deep = [*rows, deep], deep + 1
-            reader = _reader(grid, channels[:, rows])
+            reader = _reader(grid, channels[:, rows], shown, rested=self.start != "fit")
             for name in distort:
                 effect = get(name)
                 if effect.channels and channel.kind not in effect.channels:
@@ -565,9 +585,9 @@ class Forward:
         return np.concatenate(parts, axis=1)
 
     def _at_channel(
-        self, name: str, channel: int, each: Sequence[Hypothesis], parameters: Parameters, repeat: int = 1
+        self, name: str, channel: int | None, each: Sequence[Hypothesis], parameters: Parameters, repeat: int = 1
     ) -> dict[str, np.ndarray]:
-        """Parameters (W,) of a measurement effect at one channel: the defaults in worlds that suspect it elsewhere."""
+        """Parameters (W,) of a measurement effect at one channel, or at all (None): else defaults."""
         own = name in self.model.effects  # a measurement that the model itself describes holds for all
         here = np.repeat([own or _acts(h, name, channel) for h in each], repeat)
         return {n: np.where(here, v[0], get(name).parameter(n).default) for n, v in parameters.of(name).items()}
@@ -680,17 +700,25 @@ def _wrapped(effect, inner, given):
     return lambda t: effect.apply(inner, t, **given)
 
 
-def _reader(grid: np.ndarray, values: np.ndarray):
-    """values [F, d, W] as a function of times [n, W] (many worlds may share a column)."""
+def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: bool):
+    """values [F, d, W] as a function of times [n, W], of which `shown` (W,) is the grid's start.
+
+    Before it the motion rested, or went on as it began; many worlds may share a column.
+    """
     curve = spline(grid, values)
 
     def at(times: np.ndarray) -> np.ndarray:
-        columns, inverse = np.unique(times, axis=1, return_inverse=True)
+        columns, inverse = np.unique(times - shown, axis=1, return_inverse=True)
         out = np.empty((len(times), values.shape[1], values.shape[2]))
         for c in range(columns.shape[1]):
             mine = np.flatnonzero(inverse.ravel() == c)
             part = curve if columns.shape[1] == 1 else spline(grid, values[:, :, mine])
-            out[:, :, mine] = part(columns[:, c])
+            inside = np.clip(columns[:, c], grid[0], grid[-1])
+            out[:, :, mine] = part(inside)
+            outside = columns[:, c] - inside
+            for n in np.flatnonzero(outside if not rested else outside > 0):
+                rate = part(inside[n : n + 1], 1)[0]
+                out[n][:, mine] += outside[n] * rate
         return out
 
     return at
@@ -700,7 +728,7 @@ def spline(grid: np.ndarray, values: np.ndarray):
     """Cubic spline through [F, ...]; where a value is not finite, the whole curve is nan."""
     bad = ~np.all(np.isfinite(values), axis=0)
     curve = CubicSpline(grid, np.where(bad, 0.0, values), axis=0)
-    return lambda t: np.where(bad, np.nan, curve(t))
+    return lambda t, order=0: np.where(bad, np.nan, curve(t, order))
 
 
 def seen_first(values: np.ndarray) -> np.ndarray:
