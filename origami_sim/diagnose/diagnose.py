@@ -32,7 +32,7 @@ from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import LITTLE, Fit, Weights, carried_on, fit, promised
-from origami_sim.diagnose.screen import Screening, Signature, again, reweighted, screen, widening
+from origami_sim.diagnose.screen import Projector, Screening, Signature, again, reweighted, screen, widening
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.effects import get
@@ -157,7 +157,8 @@ def diagnose(
     screening, fits, weights = settled(forward, rough, fits, weights)
     refined = tuple(fits)
     alike_ones = twins(forward, rough, screening, fits, weights)
-    fits += alike_ones
+    alike_ones += lookalikes(forward, every, screening, [*fits, *alike_ones], weights)
+    fits = [*{f.hypothesis.label: f for f in [*fits, *alike_ones]}.values()]  # what was fitted anew instead of before
     # with weights that do not count the effect itself as noise
     p_value = look_elsewhere(screening, o.draws, o.seed, fits)
     p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
@@ -518,6 +519,65 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
+LOOKALIKE = 0.9
+"""Isolability from which a suspect is fitted as a lookalike."""
+
+LINEAR = 0.5
+"""Part of a fit's gain that its signature promised, from which on signatures tell what looks the same."""
+
+
+def lookalikes(
+    forward: Forward, every: Sequence[Suspect], screening: Screening, fits: Sequence[Fit], weights: Weights
+) -> list[Fit]:
+    """The suspects that look the same as the best single explanation where that was fitted, fitted from there.
+
+    Those, too, that were fitted from elsewhere and ended far from it, if they end nearer now. Where its effect is
+    large, what starts and numbers make up for without it is, too: seen from there, two suspects that are the same (a
+    clock and a drive that are late) can look different. They are compared in one segment.
+    """
+    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
+    base, best = fits[0], leader(fits, scores)
+    if best is None or len(best.hypothesis.suspects) != 1 or isinstance(forward, CurveForward):
+        return []
+    label, own = best.hypothesis.label, len(base.free)
+    seen = max((g.score**2 for g in screening.signatures if g.suspect.label == label), default=0.0)
+    if seen > LINEAR * (base.cost - best.cost):
+        return []
+    assert best.linear is not None
+    effect = [best.linear.clear(n, t[:, own]) for n, t in enumerate(best.linear.tangent)]
+    n = max(range(len(effect)), key=lambda n: effect[n] @ effect[n])
+    part = best.only([best.blocks[n]])
+    done = {f.hypothesis.label for f in fits if f is best or min(f.cost, f.promise) < best.cost + words.CLOSE}
+    at_fit = screen(forward, [s for s in every if s.label not in done], part, weights)
+    assert part.linear is not None
+    line = part.linear.beside([np.zeros((len(t), 0)) for t in part.linear.tangent], own)
+    project = Projector(replace(part, free=base.free, linear=line), part.blocks)
+    mine = project([part.linear.tangent[0][part.linear.data(0), own]])
+    strength = (best.theta[own] - best.free[own].start) / best.free[own].scale
+    found = []
+    for g in (*at_fit.signatures, *at_fit.untestable):
+        theirs = project(g.parts) if g.parts else np.zeros(len(mine))
+        same = float(mine @ theirs / max(np.linalg.norm(mine) * np.linalg.norm(theirs), 1e-300))
+        if abs(same) < LOOKALIKE:
+            continue
+        first = g.suspect.free[0]
+        value = first.start + strength * float(mine @ theirs) / float(theirs @ theirs) * g.size
+        if first.lower <= value <= first.upper:
+            found.append((abs(same), g.suspect, value))
+    most: dict[str, tuple[Suspect, float]] = {}
+    for _, s, value in sorted(found, key=lambda f: -f[0]):
+        most.setdefault(s.label, (s, value))
+    out = []
+    for s, value in list(most.values())[:TWINS]:
+        begin = np.concatenate([best.theta[:own], [value], [f.start for f in s.free[1:]]])
+        near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
+        f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)
+        f = finished(forward, f, weights) if min(f.cost, f.promise) < best.cost + NEAR else f
+        if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label):
+            out.append(f)
+    return out
+
+
 MANY = 6
 """Suspects that are fitted to all recordings where none leaves noise alone."""
 
@@ -749,46 +809,56 @@ def _counterpart(screening: Screening, found: Signature) -> Signature:
 
 
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
-    """Adds effects to the best explanation while held-out data ask for it, then drops those that are not missed."""
+    """Adds effects to the best explanation while held-out data ask for it, and exchanges each of several."""
     more: list[Fit] = []
-    base, best, seen = fits[0], leader(fits, scores), set()
+    base, best, asked, exchanged, extended = fits[0], leader(fits, scores), True, set(), set()
     while best is not None and best is not base:
-        tell("combine", len(best.hypothesis.suspects) / (o.most + 1))
-        if len(best.hypothesis.suspects) > 1:  # what stands in for another place may ask for a further effect
+        several = len(best.hypothesis.suspects)
+        tell("combine", several / (o.most + 1))
+        if several > 1 and id(best) not in exchanged:  # what stands in for another may ask for a further effect
+            exchanged.add(id(best))
             more += swaps(forward, base, best, [*fits, *more], scores, screening, weights)
             more += spared(forward, [*fits, *more], scores, weights)
             best = leader([*fits, *more], scores)
-        if best is None or best is base or len(best.hypothesis.suspects) >= o.most or id(best) in seen:
-            break
-        seen.add(id(best))
-        left = again(screening, best, without=best.hypothesis.effects)
-        if not left.signatures:
-            break
-        top, found = left.signatures[0], distinct(left.signatures)
-        structured = words.structure(best, best).repeated >= words.STRUCTURED
-        inexact = top.score**2 < words.INEXACT * (base.cost - best.cost)
-        told = look_elsewhere(left, o.draws, o.seed, small=words.SMALL) <= o.level and not inexact
-        if told:  # at other sites, too
-            found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
-        elif not structured:
-            break
-        known = [*fits, *more]
-        wanted = [(g, (*best.hypothesis.suspects, g.suspect)) for g in found[:RIVALS]]
-        tried = contest(forward, best, [g for g, w in wanted if not _made(known, w)], screening, weights)[1:]
-        tried = [f for f in (*tried, *(_made(known, w) for _, w in wanted)) if f is not None and not f.failed]
-        if not tried:
-            break
-        scores |= {id(f): score(forward, f, weights) for f in tried if id(f) not in scores}
-        more += [f for f in tried if not any(f is g for g in known)]
-        f = max(tried, key=lambda f: scores[id(f)].evidence)
-        if told:
-            told = better(scores[id(f)], scores[id(best)])
+        elif asked and several < o.most and id(best) not in extended:
+            extended.add(id(best))
+            tried, told = further(forward, best, [*fits, *more], scores, screening, weights, o)
+            more += tried
+            asked, best = told is not None, told or leader([*fits, *more], scores)
         else:
-            told = stands_out(forward, base, best, f, screening, weights, o)
-        if not told:
             break
-        best = f
     return more
+
+
+def further(
+    forward, best: Fit, fits, scores, screening: Screening, weights, o: Options
+) -> tuple[list[Fit], Fit | None]:
+    """New fits of the best explanation and one effect more; of all such, the one that held-out data ask for."""
+    base = fits[0]
+    left = again(screening, best, without=best.hypothesis.effects)
+    if not left.signatures:
+        return [], None
+    top, found = left.signatures[0], distinct(left.signatures)
+    structured = words.structure(best, best).repeated >= words.STRUCTURED
+    inexact = top.score**2 < words.INEXACT * (base.cost - best.cost)
+    told = look_elsewhere(left, o.draws, o.seed, small=words.SMALL) <= o.level and not inexact
+    if told:  # at other sites, too
+        found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
+    elif not structured:
+        return [], None
+    made = {g.suspect.label: _made(fits, (*best.hypothesis.suspects, g.suspect)) for g in found[:RIVALS]}
+    new = contest(forward, best, [g for g in found[:RIVALS] if not made[g.suspect.label]], screening, weights)[1:]
+    new = [f for f in new if not f.failed]
+    tried = [*new, *(f for f in made.values() if f is not None and not f.failed)]
+    if not tried:
+        return [], None
+    scores |= {id(f): score(forward, f, weights) for f in new}
+    f = max(tried, key=lambda f: scores[id(f)].evidence)
+    if told:
+        told = better(scores[id(f)], scores[id(best)])
+    else:
+        told = stands_out(forward, base, best, f, screening, weights, o)
+    return new, f if told else None
 
 
 RIVALS = 3
@@ -825,7 +895,7 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
             scores[id(inner)] = score(forward, inner, weights)
             out.append(inner)
         left = again(screening, inner, without=inner.hypothesis.effects)
-        for g in left.signatures[:3]:
+        for g in distinct(left.signatures)[:RIVALS]:
             wanted = (*inner.hypothesis.suspects, g.suspect)
             if any(_same(f.hypothesis, wanted) for f in (*fits, *out)):
                 continue

@@ -9,16 +9,26 @@ from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
-from origami_sim.diagnose.diagnose import alike, arranged, look_elsewhere, nominal_fits, others, prepared, settled
+from origami_sim.diagnose.diagnose import (
+    alike,
+    arranged,
+    look_elsewhere,
+    lookalikes,
+    nominal_fits,
+    others,
+    prepared,
+    settled,
+)
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
-from origami_sim.diagnose.screen import Signature, rated, screen, widening
+from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of, structure, white_of
+from origami_sim.drive import Drive, sine
 from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
-from origami_sim.recording.recording import Channel
+from origami_sim.recording.recording import Channel, DriveChannel
 from origami_sim.solve.batch import Batch
 from tests.diagnose.strips import hanging, record, subject
 
@@ -207,13 +217,78 @@ def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_n
         theta = [np.ones(3), np.array([1.0, 1.0, 1.0, value])]
         worlds = [forward._world(h, t, (effect,)) for h, t in zip(each, theta, strict=True)]
         joined = Parameters.join([p for _, p in worlds], repeat=3)
-        return forward._late(worlds[0][0], joined, each, begins).reshape(2, 3)
+        return forward._late(worlds[0][0], joined, each, begins)[0]
 
     assert np.array_equal(late("clock_rate", 0.01)[0], [0.0] * 3)
     assert late("clock_rate", 0.01)[1] == pytest.approx(0.01 * begins, abs=1e-12)
-    for effect in ("clock_delay", "tracker_lag", "exposure", "angle_scale"):
+    assert late("clock_delay", 0.02)[1] == pytest.approx(-0.02)
+    for effect in ("tracker_lag", "exposure", "angle_scale"):
         if any(s.effect == effect for s in suspects(forward.model, forward.recordings, forward.drive)):
             assert not np.any(late(effect, 0.02)), effect
+
+
+def driven(start: str, phase: float = 0.0, duration: float = 3.0) -> Forward:
+    """The strip with magnets in a field of 1 Hz."""
+    model, parameters = hanging(3)
+    model = model.with_effects("magnetic_torque")
+    parameters = parameters.for_model(model)
+    parameters.set("magnetic_torque", "remanence", 0.05)
+    parameters.set("magnetic_torque", "volume", parameters["inertia", "mass"].sum() / 3000.0 / len(model.triangles))
+    parameters.set("magnetic_torque", "poling_n", 1.0)
+    drive = Drive(field=(0.0, 0.0, sine(0.02, 1.0, phase=phase)))
+    recordings = prepared([record(**SMALL | {"duration": duration})], 200.0)
+    return Forward(Subject.from_model(model, parameters, drive), recordings, start=start)
+
+
+def delayed(forward: Forward, delay: float) -> np.ndarray:
+    """[n, D] what a camera whose clock is late sees of the first segment."""
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    (one,) = (s for s in every if s.effect == "clock_delay" and s.site == "the measurement")
+    starts = np.zeros((1, len(forward.blocks), forward.local))
+    return forward.predict(Hypothesis((one,)), np.array([[delay]]), starts, [0])[0][0]
+
+
+def test_a_late_camera_sees_rest_before_the_motion_and_an_early_one_more_of_it():
+    seen, longer = delayed(driven("rest"), 0.0), delayed(driven("rest", duration=3.5), 0.0)
+    assert np.ptp(seen) > 0.02
+    late = delayed(driven("rest"), 0.2)
+    np.testing.assert_allclose(late[:20], seen[:1].repeat(20, axis=0), atol=1e-9)
+    np.testing.assert_allclose(late[20:], seen[:-20], atol=1e-9)
+    np.testing.assert_allclose(delayed(driven("rest"), -0.2), longer[20:][: len(seen)], atol=1e-9)
+
+
+def test_a_late_camera_and_a_drive_that_is_as_late_are_one_where_starts_are_fitted():
+    for delay in (0.2, -0.2):
+        late = delayed(driven("fit"), delay)
+        same = delayed(driven("fit", phase=-2 * np.pi * delay), 0.0)
+        assert np.ptp(late - delayed(driven("fit"), 0.0)) > 0.01
+        np.testing.assert_allclose(late, same, atol=1e-5)  # the shifted drive is one of samples
+
+
+def test_what_looks_the_same_as_a_large_effect_is_compared_where_that_is():
+    """A late clock, whose twin is a late drive; a fit of it that ended elsewhere is replaced, a good one is not."""
+    forward, rng = driven("rest"), np.random.default_rng(0)
+    seen = delayed(forward, 0.2)
+    (swing,) = forward.recordings
+    channels = {
+        n: replace(c, values=seen[:, k] + 1e-3 * rng.normal(size=len(seen)), noise=1e-3)
+        for k, (n, c) in enumerate(swing.channels.items())
+    }
+    field = DriveChannel("field", np.stack([forward.drive["field_z"](swing.times)] * 3, axis=1) * [0, 0, 1], "T", False)
+    forward = Forward(forward.subject, [replace(swing, channels=channels, drive={"field": field})], start="rest")
+    _, base, weights = nominal_fits(forward)
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    clock, drive = (next(s for s in every if s.label.startswith(n)) for n in ("clock_delay at the m", "drive_delay"))
+    best = fit(forward, Hypothesis((clock,)), weights, theta=np.array([0.2]), most=5)
+    stuck = fit(forward, Hypothesis((drive,)), weights, theta=np.array([0.0]), most=0)
+    nothing = Screening([], [], list(base.blocks), np.zeros(1), 0.0)
+    every = [s for s in every if s.effect in ("clock_delay", "drive_delay", "crease_friction")]
+    found = lookalikes(forward, every, nothing, [base, stuck, best], weights)
+    (same,) = (f for f in found if f.hypothesis.suspects == (drive,))
+    assert abs(same.cost - best.cost) < 0.1 * (base.cost - best.cost)
+    assert same.theta[-1] == pytest.approx(0.2, abs=0.01)
+    again = lookalikes(forward, every, nothing, [base, same, best], weights)
+    assert all(f.cost < same.cost for f in again if f.hypothesis.suspects == (drive,))
 
 
 def test_a_recording_without_segments_tells_no_start():
