@@ -14,9 +14,9 @@ import numpy as np
 
 from origami_sim.cli import _sidecar
 from origami_sim.diagnose import Options, Subject
-from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared
 from origami_sim.diagnose.forward import local_line
 from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared
 from origami_sim.diagnose.refit import fit
 from origami_sim.recording import read_recording
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P

@@ -6,10 +6,11 @@ The package itself can be called: `origami_sim.diagnose(model, recordings)` is `
 import sys
 from types import ModuleType
 
-from origami_sim.diagnose.diagnose import Options, diagnose
+from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import EXIT, VERDICTS, Diagnosis
 from origami_sim.diagnose.hypothesis import Free, Subject, factor
 from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.subject import subject_of
 
 __all__ = ["EXIT", "VERDICTS", "Diagnosis", "Free", "Keep", "Options", "Subject", "diagnose", "factor", "subject_of"]

@@ -95,3 +95,8 @@ def _camera(channel: Channel) -> Camera:
     if channel.camera is None:
         raise InputError("a marker in a picture needs a camera", field=f"channels.{channel.name}.camera")
     return channel.camera
+
+
+def units_of(recording: Recording) -> list[str]:
+    """The unit of every component of a recording, channel after channel."""
+    return [c.unit for c in recording.channels.values() for _ in range(1 if c.values.ndim == 1 else c.values.shape[1])]

@@ -14,11 +14,12 @@ from types import ModuleType
 
 import numpy as np
 
-from origami_sim.diagnose.diagnose import Options, diagnose
+from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.hypothesis import Subject
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.observed import assumed, check_recording
+from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.diagnose.report import geometry_of, write_report

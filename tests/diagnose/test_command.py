@@ -311,8 +311,8 @@ def test_missing_values_that_are_allowed_do_not_change_the_answer(recorded, tmp_
 
 def test_a_drive_on_its_own_clock_reaches_the_model():
     """Samples between the frames are kept, also where the recording is thinned and starts later than the drive."""
-    from origami_sim.diagnose.diagnose import thinned
     from origami_sim.diagnose.forward import drive_of
+    from origami_sim.diagnose.prepare import thinned
     from origami_sim.recording import Channel, DriveChannel, Recording
 
     times = 2.0 + np.arange(40) / 20.0

@@ -9,20 +9,12 @@ from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
-from origami_sim.diagnose.diagnose import (
-    alike,
-    arranged,
-    look_elsewhere,
-    lookalikes,
-    nominal_fits,
-    others,
-    prepared,
-    settled,
-)
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
+from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
+from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of, structure, white_of
 from origami_sim.drive import Drive, sine

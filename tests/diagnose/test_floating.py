@@ -5,11 +5,11 @@ import pytest
 
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
-from origami_sim.diagnose.diagnose import arranged, nominal_fits, prepared, starting
 from origami_sim.diagnose.forward import drive_of
 from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.locate import locate, motion, motions_of, touching
+from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
 from origami_sim.diagnose.track import track
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0

@@ -1,28 +1,27 @@
 """The diagnosis on constructed cases with known answers, stage by stage."""
 
 from dataclasses import replace
-from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, diagnose, experiment, verdict
+from origami_sim.diagnose import Options, diagnose, experiment, prepare, search, verdict
 from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
-from origami_sim.diagnose.diagnose import arranged, chosen, look_elsewhere, nominal_fits, prepared, refit, unbent
 from origami_sim.diagnose.hypothesis import Hypothesis, suspects
 from origami_sim.diagnose.locate import locate, motions_of
+from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, screen
+from origami_sim.diagnose.search import chosen, look_elsewhere, refit, unbent
+from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import dihedral_angles
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from tests.diagnose.strips import hanging, record, subject
-
-diagnosis = import_module("origami_sim.diagnose.diagnose")
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
 LOOPS = ("crease_friction", "crease_hysteresis", "air_drag", "crease_stiffening", "crease_offset", "mass_damping")
@@ -154,12 +153,12 @@ def test_a_nested_model_never_fits_worse(rubbing):
 def test_fits_that_are_left_far_behind_stay_rough(rubbing, monkeypatch):
     """A rough fit is no better than the finished one; only those that come near the best one are carried on."""
     forward, _, base, weights, screening = rubbing
-    carried, plain = [], diagnosis.finished
-    monkeypatch.setattr(diagnosis, "finished", lambda f, r, *a: (carried.append(r), plain(f, r, *a))[1])
+    carried, plain = [], search.finished
+    monkeypatch.setattr(search, "finished", lambda f, r, *a: (carried.append(r), plain(f, r, *a))[1])
     finalists = [*chosen(screening, 4), screening.signatures[-1]]
-    fits = diagnosis.contest(forward, base, finalists, screening, weights, lambda part: None)
+    fits = search.contest(forward, base, finalists, screening, weights, lambda part: None)
     assert fits[0] is base and [f.hypothesis.suspects for f in fits[1:]] == [(s.suspect,) for s in finalists]
-    rough = [diagnosis.roughly(forward, base, s, weights, screening) for s in finalists]
+    rough = [search.roughly(forward, base, s, weights, screening) for s in finalists]
     assert all(f.cost <= r.cost <= base.cost * (1 + 1e-9) for f, r in zip(fits[1:], rough, strict=True))
     gain = base.cost - min(r.cost for r in rough)
     near = [r for r in rough if base.cost - min(r.cost, r.promise) >= min(0.5 * gain, gain - 50.0)]
@@ -283,7 +282,7 @@ def test_frames_are_thinned_but_not_below_what_a_comparison_needs():
 
 
 def test_a_segment_that_is_asked_for_has_a_start_of_its_own(monkeypatch):
-    monkeypatch.setattr(diagnosis, "starting", lambda *_: "rest")
+    monkeypatch.setattr(prepare, "starting", lambda *_: "rest")
     at_rest = record(**SMALL)
     assert arranged(subject(3), [at_rest], Options()).start == "rest"
     cut = arranged(subject(3), [at_rest], Options(segment=0.5))
@@ -315,19 +314,19 @@ def test_one_recording_from_rest_is_held_out_stretch_by_stretch(rubbing):
 def test_effects_that_cannot_act_are_not_left_out_without_a_word(rubbing):
     forward = rubbing[0]
     every = suspects(forward.model, forward.recordings, forward.drive)
-    assert {s.effect for s in diagnosis.among(every, ["crease_friction", "adhesion"])} == {"crease_friction"}
+    assert {s.effect for s in among(every, ["crease_friction", "adhesion"])} == {"crease_friction"}
     with pytest.raises(InputError, match=r"none of these can act.*adhesion.*air_drag.*crease_friction"):
-        diagnosis.among(every, ["adhesion"])
+        among(every, ["adhesion"])
     with pytest.raises(InputError, match="no such effect"):
-        diagnosis.among(every, ["crease_frictn"])
+        among(every, ["crease_frictn"])
 
 
 def test_residuals_are_held_against_the_drive_that_varies(rubbing):
     forward = rubbing[0]
-    assert diagnosis._varying_drive(forward) == (None, "rate")
+    assert varying_drive(forward) == (None, "rate")
     driven = Drive(field=(0, 0, sine(0.01, 1.0)))
     turned = SimpleNamespace(_drives=[driven], recordings=forward.recordings)
-    assert diagnosis._varying_drive(turned) == ("field_z", "drive field_z")
+    assert varying_drive(turned) == ("field_z", "drive field_z")
 
 
 def test_bad_data_are_named():

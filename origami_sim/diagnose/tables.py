@@ -1,0 +1,176 @@
+"""What a diagnosis shows of its fits: candidates, numbers, traces, correlations, the patch."""
+
+import numpy as np
+
+from origami_sim.diagnose import verdict as words
+from origami_sim.diagnose.channels import units_of
+from origami_sim.diagnose.compare import difference, probabilities, supported
+from origami_sim.diagnose.diagnosis import Candidate, Correlation, Number, Suspected, Trace
+from origami_sim.diagnose.forward import Forward
+from origami_sim.diagnose.refit import Fit, Weights
+from origami_sim.diagnose.screen import Screening, Signature
+
+
+def table(forward, given: Fit, fits: list[Fit], scores, judged, screening: Screening) -> list[Candidate]:
+    """All explanations that were fitted, best first, with the reason why each lost."""
+    base = fits[0]
+    rows = [f for f in fits if id(f) in scores]
+    p = probabilities(supported(rows, scores))
+    out = []
+    for f, probability in zip(rows, p, strict=True):
+        gain, error = difference(scores[id(f)], scores[id(base)]) if f is not base else (0.0, 0.0)
+        kind = words.kind(f)
+        label = f.hypothesis.label if f.hypothesis.suspects else "nominal refitted"
+        out.append(
+            Candidate(
+                label,
+                kind,
+                [s.effect for s in f.hypothesis.suspects],
+                [s.site for s in f.hypothesis.suspects],
+                numbers(f),
+                float(probability),
+                gain,
+                error,
+                scores[id(f)].rms.tolist(),
+                fit_percent(forward, f).tolist(),
+                why=words.why(f, base, judged, scores),
+                distrust=words.distrust(f, forward),
+            )
+        )
+    for f in fits:
+        if f.failed:
+            empty = [float("nan")] * len(forward.components)
+            h = f.hypothesis
+            out.append(
+                Candidate(
+                    h.label,
+                    "mechanism",
+                    [s.effect for s in h.suspects],
+                    [s.site for s in h.suspects],
+                    [],
+                    0.0,
+                    float("nan"),
+                    float("nan"),
+                    empty,
+                    empty,
+                    failed=f.failed,
+                )
+            )
+    return sorted(out, key=lambda c: -c.probability)
+
+
+def numbers(f: Fit) -> list[Number]:
+    """Fitted numbers with 95 % intervals."""
+    deviation = f.deviations()
+    return [
+        Number(n.label, n.unit, float(t), float(t - 1.96 * d), float(t + 1.96 * d), n.start, n.spread, bool(b))
+        for n, t, d, b in zip(f.free, f.theta, deviation, f.at_bound, strict=True)
+    ]
+
+
+def suspected(s: Signature, screening: Screening) -> Suspected:
+    u = s.suspect
+    explained = s.score**2 / screening.total if screening.total > 0 else 0.0
+    return Suspected(
+        u.label, u.effect, u.site, u.kind, s.score, s.strength, s.error, u.free[0].unit, explained, s.status
+    )
+
+
+def fit_percent(forward: Forward, f: Fit) -> np.ndarray:
+    """(D,) 100 (1 - NRMSE) [%] over all fitted blocks."""
+    values = np.concatenate([forward.blocks[b].values for b in f.blocks])
+    spread = np.nanstd(values, axis=0)
+    return 100.0 * (1.0 - rms_of(f) / np.where(spread > 0, spread, np.nan))
+
+
+def rms_of(f: Fit) -> np.ndarray:
+    return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
+
+
+def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights, noise: np.ndarray) -> list[Trace]:
+    """Recorded and predicted components of each recording, segment after segment."""
+    out = []
+    units = units_of(forward.recordings[0])
+    for r, recording in enumerate(forward.recordings):
+        mine = [n for n, b in enumerate(base.blocks) if forward.blocks[b].recording == r]
+        blocks = [forward.blocks[base.blocks[n]] for n in mine]
+        times = np.concatenate([recording.times[b.first] + b.times for b in blocks])
+        breaks = np.cumsum([0, *(len(b.times) for b in blocks)])[:-1]
+        recorded = np.concatenate([b.values for b in blocks])
+        predictions = [
+            np.concatenate([b.values - f.residuals[n] for n, b in zip(mine, blocks, strict=True)])
+            for f in (given, base, best)
+        ]
+        for d, name in enumerate(forward.components):
+            out.append(
+                Trace(
+                    recording.name,
+                    name,
+                    units[d],
+                    float(noise[d]),
+                    times.tolist(),
+                    recorded[:, d].tolist(),
+                    *(p[:, d].tolist() for p in predictions),
+                    band=float(2 * weights.deviation[d]),
+                    breaks=breaks.tolist(),
+                )
+            )
+    return out
+
+
+def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
+    """Auto- and cross-correlations of the residuals, averaged over segments."""
+    out = []
+    step = float(np.median(np.diff(forward.recordings[0].times)))
+    lags = min(min(len(b.times) for b in forward.blocks) // 2, 200)
+    drive, name = varying_drive(forward)
+    for d, component in enumerate(forward.components):
+        row = Correlation(component, (np.arange(lags) * step).tolist(), [], [], name)
+        for f, auto, cross in ((base, row.before, row.cross_before), (best, row.after, row.cross_after)):
+            auto += _correlation(f, d, None, lags).tolist()
+            cross += _correlation(f, d, _against(forward, f, d, drive), lags).tolist()
+        out.append(row)
+    return out
+
+
+def varying_drive(forward: Forward):
+    """Name of the drive channel that varies most; None: nothing varies."""
+    spans = {}
+    for name, signal in forward._drives[0].signals.items():
+        values = [np.squeeze(signal(r.times - r.times[0])) for r in forward.recordings]
+        spans[name] = max(float(np.ptp(v)) if v.ndim else 0.0 for v in values)
+    name = max(spans, key=lambda n: spans[n], default="")
+    return (name, f"drive {name}") if spans.get(name) else (None, "rate")
+
+
+def _against(forward: Forward, f: Fit, d: int, drive: str | None) -> list[np.ndarray]:
+    out = []
+    for b in f.blocks:
+        block = forward.blocks[b]
+        if drive is None:
+            out.append(np.gradient(np.nan_to_num(block.values[:, d]), block.times))
+        else:
+            start = (
+                forward.recordings[block.recording].times[block.first] - forward.recordings[block.recording].times[0]
+            )
+            out.append(np.squeeze(forward._drives[block.recording][drive](start + block.times)))
+    return out
+
+
+def _correlation(f: Fit, d: int, other: list[np.ndarray] | None, lags: int) -> np.ndarray:
+    total, norm = np.zeros(lags), 0.0
+    for n, r in enumerate(f.residuals):
+        a = np.nan_to_num(r[:, d] - np.nanmean(r[:, d]))
+        b = a if other is None else other[n] - other[n].mean()
+        total += [float(a[k:] @ b[: len(b) - k]) for k in range(lags)]
+        norm += float(np.sqrt((a @ a) * (b @ b)))
+    return total / norm if norm > 0 else total
+
+
+def patch(best: Fit) -> dict[str, float]:
+    """Numbers of the best explanation, by "effect.parameter@entities" or the setting's name."""
+    out = {}
+    for n, t in zip(best.free, best.theta, strict=True):
+        where = "" if n.entities is None else "@" + ",".join(map(str, n.entities))
+        out[n.label + where] = float(t)
+    return out
