@@ -117,6 +117,11 @@ def alone(explanation: list[tuple[str, str]], names: set[str]) -> bool:
     return len(explanation) == 1 and explanation[0][0] in names
 
 
+def _named(explanations: list, names: set[str]) -> bool:
+    """Whether one of the explanations is one effect, of these names."""
+    return any(alone(e, names) for e in explanations)
+
+
 _CONCEALED = ("case", "kind", "null", "structure", "mechanism", "site", "d_wanted", "d")
 _OUTCOMES = ("top1", "inside", "wrong", "alarm", "found_site", "covered", "unknown", "correct", "double", "said")
 _NUMBERS = (
@@ -143,7 +148,8 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
 
     Returns: a row with `verdict`, `top` (named mechanism or verdict), and True, False or None (does not apply) for
         `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently), `alarm`, `found_site`, `covered`,
-        `unknown`, `double`, `said` (a tie of a confounded pair), `separated` and `resolved` (named alone after the
+        `unknown`, `double`, `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
+        is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
         wrongly, missed); concealed `strength`, recovered `value` with `low` and `high`, `recovery` (relative error);
         `onset` (frames late); `removed`, `floor`, `refitted`, `probability`, `correct`. `apart` (d' from the nearest
@@ -151,14 +157,16 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
     """
     row: dict = {k: answer[k] for k in _CONCEALED}
     row |= {"failed": found.get("failed", ""), "verdict": "FAILED", "top": "FAILED", "probability": 0.0}
-    row |= dict.fromkeys((*_OUTCOMES, *_NUMBERS, "separated", "resolved"))
+    row |= dict.fromkeys((*_OUTCOMES, *_NUMBERS, "decided", "separated", "resolved"))
     names, kind = set(answer["names"]), answer["kind"]
     explanations = explained(found)
-    contains = any(alone(e, names) for e in explanations)
+    contains = _named(explanations, names)
     for key, where in (("separated", SEPARATING), ("resolved", SUGGESTED)):
         if where in (others or {}) and (key == "separated" or contains):
             then = explained((others or {})[where])
             row[key] = len(then) == 1 and alone(then[0], names)
+            if key == "separated":  # a third effect may be told from the truth by neither recording
+                row["decided"] = _named(then, names) and not _named(then, set(answer["rival"]["names"]))
     _place(row, answer, explanations)
     if row["failed"]:
         row |= {"top1": False, "inside": False} if kind == "single" else {}
@@ -182,7 +190,7 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         right = row["double"] = any(_both(e, names, second) for e in explanations)
     elif kind == "confounded":
         rival = set(answer["rival"]["names"])
-        row["said"] = contains and any(alone(e, rival) for e in explanations)
+        row["said"] = contains and _named(explanations, rival)
         right = contains
     else:
         row["top1"], row["inside"] = bool(explanations) and alone(explanations[0], names), contains
@@ -259,6 +267,7 @@ TARGETS: dict[str, tuple[str, tuple[float, float] | None]] = {
     "unlike": ("UNKNOWN recall, no law within d' 5", None),
     "false_unknown": ("false UNKNOWN inside", (0.0, 0.05)),
     "said": ("confounded pair said so", (0.90, 1.0)),
+    "decided": ("pair decided by what separates it", (0.80, 1.0)),
     "separated": ("named alone with what separates it", (0.80, 1.0)),
     "resolved": ("suggested experiment resolves a tie", (0.80, 1.0)),
     "double": ("both of two effects named", None),
@@ -284,6 +293,7 @@ def scores(rows: Sequence[dict]) -> dict:
         "unlike": [bool(r["unknown"]) for r in rows if r["kind"] == "outside" and (r["apart"] or 0.0) >= TOLD],
         "false_unknown": [bool(r["unknown"]) for r in single],
         "said": told("said", rows),
+        "decided": told("decided", rows),
         "separated": told("separated", rows),
         "resolved": told("resolved", rows),
         "double": [bool(r["double"]) for r in rows if r["kind"] == "double"],

@@ -143,6 +143,11 @@ def test_an_experiment_separates_if_the_truth_is_then_named_alone():
     row = judge(CONFOUNDED, tie, {"separating": diagnosis("MECHANISM", BOTH[:1], 0.97)})
     assert row["separated"] is False and row["resolved"] is None
     assert judge(CONFOUNDED, tie, {"separating": {"failed": "out of memory"}})["separated"] is False
+    decided = [
+        judge(CONFOUNDED, tie, {"separating": d})["decided"] for d in (named, diagnosis("TIE", BOTH[1:], 0.9), tie)
+    ]
+    assert decided == [True, True, False], "a third effect may stay, the rival not"
+    assert judge(CONFOUNDED, tie, {"separating": diagnosis("MECHANISM", BOTH[2:], 0.9)})["decided"] is False
     lost = diagnosis("TIE", [BOTH[0], BOTH[2]], 0.97)  # without the truth there is nothing to resolve
     assert judge(CONFOUNDED, lost, {"suggested": named})["resolved"] is None
     board = score.scores([row])
