@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Hypothesis
@@ -103,8 +104,7 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     """Held-out score by one Gauss-Newton step of every leave-one-fold-out fit from the full fit.
 
     The linearisation of the full fit is exact for small changes of the numbers; leaving out a fold changes them by
-    about a standard deviation. A single block without a start to fit is cut into stretches; with one it has no folds:
-    the score is then that of the fit with the penalty of its numbers.
+    about a standard deviation. A single block is cut into stretches, of which the others tell its start.
 
     Args:
         weights: those of the fit.
@@ -112,14 +112,18 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     line = fit.linear
     assert line is not None
     dims = len(weights.deviation)
-    cut = len(fit.blocks) == 1 and not forward.local
-    if cut:
-        line = line.cut(FOLDS, dims)
     scale = np.array([f.scale for f in fit.free])
-    prior = np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in fit.free])
-    away = np.array([f.start for f in fit.free]) - fit.theta
+    known = np.diag([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in fit.free])
+    away = known @ ((np.array([f.start for f in fit.free]) - fit.theta) / scale)
     low = (np.array([f.lower for f in fit.free]) - fit.theta) / scale
     high = (np.array([f.upper for f in fit.free]) - fit.theta) / scale
+    cut = len(fit.blocks) == 1
+    if cut:
+        own = slice(line.data(0).stop, None)  # what is known of its start
+        known = block_diag(line.slopes[0][own], known)
+        away = np.concatenate([line.residual[0][own], away])
+        low, high = (np.concatenate([np.full(forward.local, v), b]) for v, b in ((-np.inf, low), (np.inf, high)))
+        line = line.cut(FOLDS, dims)
     tangent = [line.clear(n, t) for n, t in enumerate(line.tangent)]
     cleared = [line.clear(n, r) for n, r in enumerate(line.residual)]
 
@@ -127,9 +131,9 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
         """A change of theta / scale that leaves out a fold, and the root of the numbers' precision."""
         rows = [tangent[n] for n in range(len(tangent)) if n not in part]
         right = [cleared[n] for n in range(len(tangent)) if n not in part]
-        a = np.concatenate([*rows, np.diag(prior)])
+        a = np.concatenate([*rows, known])
         a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
-        y = np.concatenate([*right, prior * away / scale, np.zeros(len(scale))])
+        y = np.concatenate([*right, away, np.zeros(len(low))])
         q, r = np.linalg.qr(a)
         return lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, r
 
@@ -137,12 +141,12 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     left, near = [c.copy() for c in cleared], [c.copy() for c in cleared]
     several = len({forward.blocks[b].recording for b in fit.blocks}) > 1
     apart = [[n] for n in range(len(left))] if cut else folds(forward, fit.blocks)
-    for part in apart if len(fit.free) else []:
+    for part in apart if len(low) else []:
         step, root = without(part)
         for n in part:
             left[n] = cleared[n] - tangent[n] @ step
             held_out[n] = _predictive(left[n], tangent[n], root)
-    for part in stretches(forward, fit.blocks) if several and len(fit.free) else []:
+    for part in stretches(forward, fit.blocks) if several and len(low) else []:
         step, _ = without(part)
         for n in part:
             near[n] = cleared[n] - tangent[n] @ step
@@ -150,8 +154,8 @@ def score(forward, fit: Fit, weights: Weights) -> Score:
     seen = np.concatenate([np.isfinite(r) for r in fit.residuals])
     rms = np.sqrt(squares.sum(0) / np.maximum(seen.sum(0), 1)) * weights.deviation
     n = max(effective_samples(forward, fit, weights), 2.0)
-    known = np.diag(np.linalg.qr(np.concatenate([*tangent, np.diag(prior)]), mode="r"))
-    price = penalty_of(fit.hypothesis, known[len(known) - len(fit.hypothesis.free) :], n)
+    told = np.diag(np.linalg.qr(np.concatenate([*tangent, known]), mode="r"))
+    price = penalty_of(fit.hypothesis, told[len(told) - len(fit.hypothesis.free) :], n)
     whole = np.array([float(v[line.data(n)] @ v[line.data(n)]) for n, v in enumerate(near if several else left)])
     return Score(held_out, rms, -0.5 * fit.cost - price, whole)
 

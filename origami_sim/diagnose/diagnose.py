@@ -14,7 +14,6 @@ from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.describe import unnamed
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.experiment import propose
-from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.hypothesis import suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
@@ -31,6 +30,7 @@ from origami_sim.diagnose.search import (
     look_elsewhere,
     lookalikes,
     others,
+    renewed,
     settled,
     twins,
     unbent,
@@ -95,7 +95,7 @@ def diagnose(
     first = weights
     lap("nominal")
     tell("screen", 0.0)
-    every = forward.admitted(suspects(forward.model, recordings, _union(forward), forward.parameters))
+    every = forward.admitted(suspects(forward.model, recordings, forward.drive, forward.parameters))
     if catalogue is not None:
         every = among(every, catalogue)
         idle = sorted({get(n).name for n in catalogue} - {s.effect for s in every})
@@ -119,7 +119,7 @@ def diagnose(
     refined = tuple(fits)
     alike_ones = twins(forward, rough, screening, fits, weights)
     alike_ones += lookalikes(forward, every, screening, [*fits, *alike_ones], weights)
-    fits = [*{f.hypothesis.label: f for f in [*fits, *alike_ones]}.values()]  # what was fitted anew instead of before
+    fits = renewed(fits, alike_ones)
     # with weights that do not count the effect itself as noise
     p_value = look_elsewhere(screening, o.draws, o.seed, fits)
     p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
@@ -133,6 +133,11 @@ def diagnose(
     if rest:
         noted.append("No suspect that stood out left noise alone, so that all that show were fitted.")
         screening, fits, weights = settled(forward, screening, [*fits, *rest], weights, tuple(fits))
+        alike_ones = lookalikes(forward, every, screening, fits, weights)
+        if alike_ones:
+            screening, fits, weights = settled(forward, screening, renewed(fits, alike_ones), weights, tuple(fits))
+        p_value = look_elsewhere(screening, o.draws, o.seed, fits)
+        p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
     fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
     scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
     base = fits[0]
@@ -154,7 +159,7 @@ def diagnose(
     tell("baselines", 0.0)
     beside = baselines(forward, base, weights, scores[id(base)])
     lap("baselines")
-    candidates = table(forward, given, fits, scores, judged, screening)
+    candidates = table(forward, fits, scores, judged)
     after = scores[id(best)]
     out = Diagnosis(
         verdict=judged.verdict,
@@ -183,7 +188,7 @@ def diagnose(
         notes=[*judged.notes, *noted],
         settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
         seconds=seconds,
-        patch=patch(best),
+        patch={} if judged.verdict == "UNTESTABLE" else patch(best),
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
@@ -192,8 +197,3 @@ def diagnose(
     )
     tell("done", 1.0)
     return out
-
-
-def _union(forward: Forward):
-    """A drive in which everything is switched on that is in any recording's."""
-    return forward._drives[0]

@@ -96,7 +96,7 @@ def _menu(forward: Forward) -> list[tuple[str, Forward]]:
         for size in (0.1, 0.3, 2.0):
             out.append((f"start from {size:g} times the displacement and rate", _variant(forward, size=size)))
         out.append(("let it run three times as long", _variant(forward, stretch=3.0)))
-    varying = [n for n, s in forward._drives[0].signals.items() if not s.is_zero]
+    varying = [n for d in forward._drives for n, s in d.signals.items() if not s.is_zero]
     if varying:
         names = ", ".join(sorted({n.split("_")[0] for n in varying}))
         for gain in (0.3, 0.6, 1.5):
@@ -104,7 +104,8 @@ def _menu(forward: Forward) -> list[tuple[str, Forward]]:
         out.append((f"{names} reversed", _variant(forward, gain=-1.0)))
         for speed in (0.3, 3.0):
             out.append((f"{names} at {speed:g} times the frequency", _variant(forward, speed=speed)))
-    out.append(("the set-up tilted by 10 degrees about y", _variant(forward, tilt=np.deg2rad(10.0))))
+    if ("gravity", "gravity_z") in set(forward.parameters):
+        out.append(("the set-up tilted by 10 degrees about y", _variant(forward, tilt=np.deg2rad(10.0))))
     out.append(("a tenth more mass on every panel", _variant(forward, load=1.1)))
     return out
 
@@ -138,7 +139,7 @@ def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, ti
             parameters = parameters.copy()
             if load != 1.0:
                 parameters.set("inertia", "mass", parameters["inertia", "mass"] * load)
-            if tilt and ("gravity", "gravity_z") in set(parameters):
+            if tilt:
                 gx, gz = parameters["gravity", "gravity_x"], parameters["gravity", "gravity_z"]
                 parameters.set("gravity", "gravity_x", np.cos(tilt) * gx - np.sin(tilt) * gz)
                 parameters.set("gravity", "gravity_z", np.sin(tilt) * gx + np.cos(tilt) * gz)

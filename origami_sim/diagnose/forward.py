@@ -280,13 +280,7 @@ class Forward:
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
         effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
         softness = self._softness(soft, effects)
-        worlds, impossible = [], []
-        for k, (h, t) in enumerate(zip(each, theta, strict=True)):
-            try:
-                worlds.append(self._world(h, t, effects))
-            except InputError:  # numbers of which no model can be built, such as an inertia that no masses give
-                impossible.append(k)
-                worlds.append(self._world(Hypothesis(), self._given, effects))
+        worlds, impossible = self._worlds(each, theta, effects)
         out: dict[int, np.ndarray] = {}
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
@@ -335,15 +329,29 @@ class Forward:
         return True
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
-        """The solver's step for one world, a frame at most [s]; see `predict`."""
+        """The solver's step for one world, a frame at most [s]; 0 if no model can be built. See `predict`."""
         frame = float(np.median(np.diff(self.recordings[0].times)))
-        model, parameters = self._world(hypothesis, theta, hypothesis.effects)
+        try:
+            model, parameters = self._world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return 0.0
         eased = softened(model, parameters, self._softness(soft, hypothesis.effects))
         return min(frame, stable_step(model, eased).dt)
 
     def _softness(self, soft: bool, effects: Sequence[str]) -> float:
         """By how much softer panels are in a program with these effects."""
         return self.softness if soft and not any(map(stiff, effects)) else 1.0
+
+    def _worlds(self, each: Sequence[Hypothesis], theta, effects: Sequence[str]):
+        """The worlds of `predict`, and which of them stand for numbers of which no model can be built."""
+        worlds, impossible = [], []
+        for k, (h, t) in enumerate(zip(each, theta, strict=True)):
+            try:
+                worlds.append(self._world(h, t, effects))
+            except InputError:  # such as an inertia that no masses give
+                impossible.append(k)
+                worlds.append(self._world(Hypothesis(), self._given, effects))
+        return worlds, impossible
 
     def _world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> tuple[Model, Parameters]:
         """The model with these effects, and the parameters of one world."""

@@ -65,6 +65,18 @@ class Suspect:
         return f"{self.effect} at {self.site}"
 
 
+def distinct_sites(a: Suspect, b: Suspect) -> bool:
+    """Whether both can act at once, each with numbers of its own: an effect has one value per crease, panel or node.
+
+    One of the measurement has one for all of its channels.
+    """
+    if a.effect != b.effect:
+        return True
+    if a.kind == "measurement" or a.entities is None or b.entities is None:
+        return False
+    return not set(a.entities) & set(b.entities)
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """The nominal model with these effects added (none: the nominal model, refitted)."""

@@ -162,14 +162,17 @@ class Linearisation:
         return Linearisation(self.residual, joined, self.slopes, self.basis, self.starts)
 
     def cut(self, count: int, width: int) -> "Linearisation":
-        """One block without a start, of frames of so many components, as so many stretches of it."""
-        frames = len(self.residual[0]) // width
+        """One block, of frames of so many components, as so many stretches of it.
+
+        Its start is shared by them: the first columns of the tangent are those by the start, without its own rows.
+        """
+        frames = self.data(0).stop // width
         rows = np.array_split(np.arange(frames * width), np.arange(1, count) * frames // count * width)
-
-        def split(columns: list[np.ndarray]) -> list[np.ndarray]:
-            return [columns[0][r] for r in rows]
-
-        return Linearisation.of(split(self.residual), split(self.tangent), split(self.slopes))
+        slopes = self.slopes[0] if np.all(np.isfinite(self.slopes[0])) else np.zeros_like(self.slopes[0])
+        both = np.concatenate([slopes, self.tangent[0]], axis=1)
+        return Linearisation.of(
+            [self.residual[0][r] for r in rows], [both[r] for r in rows], [np.zeros((len(r), 0)) for r in rows]
+        )
 
     def reweighted(self, old: Weights, new: Weights) -> "Linearisation":
         """The same for other weights."""
@@ -385,6 +388,7 @@ def fit(
         for part in trying:
             trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
+            # (or be of no model at all)
             if width and hypothesis.suspects and part > trying[-1] and forward.step(hypothesis, trial) < slowest:
                 continue
             predicted = forward.predict(hypothesis, trial[None], start[None], blocks)

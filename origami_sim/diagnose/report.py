@@ -582,7 +582,7 @@ def _drawing(g: dict, shares: dict[str, float], panels: dict[str, float]) -> Htm
         element("span", "100 %"),
         class_="ramp",
     )
-    note = "Creases: posterior share of the mismatch. Panels: probability of the candidates that act on them."
+    note = "Creases: share of the mismatch. Panels: probability of the candidates that act on them."
     if g.get("held"):
         note += " Squares: held nodes."
     return element(

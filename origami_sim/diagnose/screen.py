@@ -15,7 +15,6 @@ from origami_sim.diagnose.forward import stiff
 from origami_sim.diagnose.hypothesis import Suspect, scaled
 from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
-from origami_sim.errors import InputError
 
 CHUNK = 6
 """Effects that share a program while screening: more compile longer, fewer compile more often."""
@@ -292,12 +291,9 @@ def _affordable(forward, base: Fit, s: Suspect, change: float, least: float) -> 
     rest = [f.start for f in s.free[1:]]
     hypothesis = base.hypothesis.plus(s)
     for _ in range(12):
-        try:
-            theta = np.concatenate([base.theta, [s.free[0].start + change], rest])
-            if forward.step(hypothesis, theta, soft=True) >= least:
-                break
-        except InputError:
-            pass
+        theta = np.concatenate([base.theta, [s.free[0].start + change], rest])
+        if forward.step(hypothesis, theta, soft=True) >= least:
+            break
         change /= 4.0
     return change
 
@@ -325,7 +321,7 @@ def _changes(forward, group, size, base: Fit, blocks) -> list[np.ndarray]:
     hypotheses = [base.hypothesis.plus(s) for s in group]
     among = tuple(dict.fromkeys(e for h in hypotheses for e in h.effects))
     steps = np.array([forward.step(h, t, soft=True) for h, t in zip(hypotheses, thetas, strict=True)])
-    pace = np.round(np.log2(steps / steps.max()))
+    pace = np.round(np.log2(np.maximum(steps, 1e-12) / max(steps.max(), 1e-12)))
     out = [np.full((len(group), *forward.blocks[b].values.shape), np.nan) for b in blocks]
     for p in np.unique(pace):
         mine = np.flatnonzero(pace == p)

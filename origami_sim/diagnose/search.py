@@ -8,7 +8,7 @@ import numpy as np
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.compare import Score, score, supported, weights_from
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Suspect
+from origami_sim.diagnose.hypothesis import Suspect, distinct_sites
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.refit import LITTLE, Fit, Weights, carried_on, fit, promised
 from origami_sim.diagnose.screen import Projector, Screening, Signature, reweighted, screen, widening
@@ -241,20 +241,22 @@ def lookalikes(
     n = max(range(len(effect)), key=lambda n: effect[n] @ effect[n])
     part = best.only([best.blocks[n]])
     done = {f.hypothesis.label for f in fits if f is best or min(f.cost, f.promise) < best.cost + words.CLOSE}
-    at_fit = screen(forward, [s for s in every if s.label not in done], part, weights)
+    (mine,) = best.hypothesis.suspects
+    rest = [s for s in every if s.label not in done and distinct_sites(s, mine)]
+    at_fit = screen(forward, rest, part, weights)
     assert part.linear is not None
     line = part.linear.beside([np.zeros((len(t), 0)) for t in part.linear.tangent], own)
     project = Projector(replace(part, free=base.free, linear=line), part.blocks)
-    mine = project([part.linear.tangent[0][part.linear.data(0), own]])
+    shape = project([part.linear.tangent[0][part.linear.data(0), own]])
     strength = (best.theta[own] - best.free[own].start) / best.free[own].scale
     found = []
     for g in (*at_fit.signatures, *at_fit.untestable):
-        theirs = project(g.parts) if g.parts else np.zeros(len(mine))
-        same = float(mine @ theirs / max(np.linalg.norm(mine) * np.linalg.norm(theirs), 1e-300))
+        theirs = project(g.parts) if g.parts else np.zeros(len(shape))
+        same = float(shape @ theirs / max(np.linalg.norm(shape) * np.linalg.norm(theirs), 1e-300))
         if abs(same) < LOOKALIKE:
             continue
         first = g.suspect.free[0]
-        value = first.start + strength * float(mine @ theirs) / float(theirs @ theirs) * g.size
+        value = first.start + strength * float(shape @ theirs) / float(theirs @ theirs) * g.size
         if first.lower <= value <= first.upper:
             found.append((abs(same), g.suspect, value))
     most: dict[str, tuple[Suspect, float]] = {}
@@ -269,6 +271,11 @@ def lookalikes(
         if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label):
             out.append(f)
     return out
+
+
+def renewed(fits: Sequence[Fit], new: Sequence[Fit]) -> list[Fit]:
+    """All fits, new ones in the place of those of the same hypothesis."""
+    return [*{f.hypothesis.label: f for f in [*fits, *new]}.values()]
 
 
 MANY = 6

@@ -8,7 +8,7 @@ import numpy as np
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.compare import Score, better, score, weights_from
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Hypothesis, Suspect
+from origami_sim.diagnose.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted
@@ -41,6 +41,8 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
     best, most = None, 0.0
     for a, b in combinations(top, 2):
         both = np.stack([a.shape, b.shape], axis=1)
+        if not distinct_sites(a.suspect, b.suspect):
+            continue
         if abs(a.shape @ b.shape) > 0.95 or min(abs(a.score), abs(b.score)) < 2.0:
             continue
         x, *_ = np.linalg.lstsq(both, r, rcond=None)

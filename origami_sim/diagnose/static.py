@@ -72,6 +72,7 @@ class CurveForward(Forward, ABC):
     ):
         self.subject, self.recordings, self.start, self.threads = subject, list(recordings), "rest", threads
         self.values = {f.name: f.start for f in subject.nominals}
+        self._given = np.array([f.start for f in subject.nominals])
         self.model, self.parameters, self.drive = subject.build(self.values)
         self.articulation = Articulation(self.model)
         silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
@@ -110,7 +111,7 @@ class CurveForward(Forward, ABC):
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
         effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
-        worlds = [self._world(h, t, effects) for h, t in zip(each, theta, strict=True)]
+        worlds, impossible = self._worlds(each, theta, effects)
         moves, of = distinct_motions(worlds)
         curves = {}
         for r in sorted({self.blocks[b].recording for b in wanted}):
@@ -123,16 +124,16 @@ class CurveForward(Forward, ABC):
         for b in wanted:
             block = self.blocks[b]
             rows = slice(block.first, block.first + len(block.times))
-            out.append(np.moveaxis(curves[block.recording][rows], 2, 0))
+            out.append(np.moveaxis(curves[block.recording][rows], 2, 0).copy())
+            out[-1][impossible] = np.nan
         return out
 
     def soften(self) -> None:
         """Statics takes no steps."""
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
-        """Curves have no time step; raises InputError where a number is out of bounds, as building the world does."""
-        self._world(hypothesis, theta, hypothesis.effects)
-        return 1.0
+        """Curves have no time step: 1, or 0 if no model can be built."""
+        return 0.0 if self._worlds([hypothesis], [theta], hypothesis.effects)[1] else 1.0
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
         """The suspects that curves can be asked about.

@@ -11,7 +11,7 @@ from origami_sim.diagnose.refit import Fit, Weights
 from origami_sim.diagnose.screen import Screening, Signature
 
 
-def table(forward, given: Fit, fits: list[Fit], scores, judged, screening: Screening) -> list[Candidate]:
+def table(forward, fits: list[Fit], scores, judged) -> list[Candidate]:
     """All explanations that were fitted, best first, with the reason why each lost."""
     base = fits[0]
     rows = [f for f in fits if id(f) in scores]
@@ -44,7 +44,7 @@ def table(forward, given: Fit, fits: list[Fit], scores, judged, screening: Scree
             out.append(
                 Candidate(
                     h.label,
-                    "mechanism",
+                    words.kind(f),
                     [s.effect for s in h.suspects],
                     [s.site for s in h.suspects],
                     [],
@@ -135,10 +135,11 @@ def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
 
 def varying_drive(forward: Forward):
     """Name of the drive channel that varies most; None: nothing varies."""
-    spans = {}
-    for name, signal in forward._drives[0].signals.items():
-        values = [np.squeeze(signal(r.times - r.times[0])) for r in forward.recordings]
-        spans[name] = max(float(np.ptp(v)) if v.ndim else 0.0 for v in values)
+    spans: dict[str, float] = {}
+    for drive, r in zip(forward._drives, forward.recordings, strict=True):
+        for name, signal in drive.signals.items():
+            values = np.squeeze(signal(r.times - r.times[0]))
+            spans[name] = max(spans.get(name, 0.0), float(np.ptp(values)) if values.ndim else 0.0)
     name = max(spans, key=lambda n: spans[n], default="")
     return (name, f"drive {name}") if spans.get(name) else (None, "rate")
 

@@ -383,7 +383,7 @@ def _named(w: _Weighed) -> _Said:
         s = w.best.hypothesis.suspects[0]
         lacks = "there is" if s.more else "the model lacks"
         word = "MECHANISM"
-        text = f"At {s.site} {lacks} {_say(w.best)}{'' if sure else f' ({where})'}, p = {probability:.2f}"
+        text = f"At {s.site} {lacks} {_say(w.best, sites=False)}{'' if sure else f' ({where})'}, p = {probability:.2f}"
     return _Said(word, f"{text}; {w.fall}.", probability, [s.label for s in suspects], w.best)
 
 
@@ -613,9 +613,7 @@ def distrust(f: Fit, forward) -> str:
 
 def _notes(forward, screening: Screening) -> list[str]:
     notes = []
-    if len(forward.blocks) == 1 and forward.local:
-        notes.append("One segment only: nothing is held out, and all errors are those of the fit.")
-    elif len({b.recording for b in forward.blocks}) == 1:
+    if len({b.recording for b in forward.blocks}) == 1:
         notes.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
     lost = [s.suspect.label for s in screening.untestable]
     if lost:
@@ -642,8 +640,8 @@ def _distinct(fits: Sequence[Fit]) -> list[str]:
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 
 
-def _say(f: Fit) -> str:
-    """The effects of a fit with their strengths and intervals."""
+def _say(f: Fit, *, sites: bool = True) -> str:
+    """The effects of a fit with their sites, if asked, strengths and intervals."""
     out = []
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
@@ -656,7 +654,8 @@ def _say(f: Fit) -> str:
         if s.more:
             what = f"{'more' if t > 0 else 'less'} {what} than stated"
         strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
-        out.append(f"{what} at {s.site} ({strength}, 95 %: {low} to {high})")
+        where = f" at {s.site}" if sites else ""
+        out.append(f"{what}{where} ({strength}, 95 %: {low} to {high})")
     return _join(out)
 
 

@@ -1,6 +1,7 @@
 """The diagnosis on constructed cases with known answers, stage by stage."""
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from origami_sim.diagnose import Options, diagnose, experiment, prepare, search,
 from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
-from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, screen
@@ -311,6 +312,27 @@ def test_one_recording_from_rest_is_held_out_stretch_by_stretch(rubbing):
     )
 
 
+def test_stretches_of_one_segment_are_predicted_with_the_start_that_the_others_tell():
+    forward = arranged(subject(3), [record(**SMALL)], Options(start="fit", segment=5.0))
+    _, base, weights = nominal_fits(forward)
+    assert len(base.blocks) == 1 and forward.local and base.linear is not None
+    found = score(forward, base, weights)
+    line, own = base.linear, len(forward.blocks[0].values) * len(weights.deviation)
+    both = np.concatenate([line.slopes[0], line.tangent[0]], axis=1)
+    prior = np.array([f.scale / f.spread for f in base.free])
+    away = prior * [(f.start - t) / f.scale for f, t in zip(base.free, base.theta, strict=True)]
+    pieces = line.cut(FOLDS, len(weights.deviation))
+    edges = np.cumsum([0, *map(len, pieces.residual)])
+    for n, (a, b) in enumerate(pairwise(edges)):
+        kept = np.r_[0:a, b : len(both)]  # with the rows of the start
+        assert edges[-1] == own < len(both)
+        rows = np.concatenate([both[kept], np.diag(np.r_[np.zeros(forward.local), prior])[forward.local :]])
+        step, *_ = np.linalg.lstsq(rows, np.concatenate([line.residual[0][kept], away]), rcond=None)
+        left = line.residual[0][a:b] - both[a:b] @ step
+        assert found.squares[n] == pytest.approx(left @ left, rel=1e-2)
+    assert found.held_out.sum() < -0.5 * sum(float(r @ r) for r in pieces.residual)
+
+
 def test_effects_that_cannot_act_are_not_left_out_without_a_word(rubbing):
     forward = rubbing[0]
     every = suspects(forward.model, forward.recordings, forward.drive)
@@ -325,8 +347,45 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
     forward = rubbing[0]
     assert varying_drive(forward) == (None, "rate")
     driven = Drive(field=(0, 0, sine(0.01, 1.0)))
-    turned = SimpleNamespace(_drives=[driven], recordings=forward.recordings)
-    assert varying_drive(turned) == ("field_z", "drive field_z")
+    for drives in ([driven, Drive()], [Drive(), driven]):  # whichever recording has it
+        turned = SimpleNamespace(_drives=drives, recordings=2 * forward.recordings)
+        assert varying_drive(turned) == ("field_z", "drive field_z")
+
+
+def test_one_number_cannot_have_two_values():
+    """Two channels share an effect of the measurement, all creases that of each; two creases do not."""
+    forward = arranged(subject(3), [record(**SMALL)], Options())
+    every = {s.label: s for s in suspects(forward.model, forward.recordings, forward.drive)}
+    one, two, each = (every[f"crease_friction at {s}"] for s in ("crease 0", "crease 1", "all creases"))
+    assert distinct_sites(one, two) and distinct_sites(two, one) and not distinct_sites(one, one)
+    assert not distinct_sites(one, each) and not distinct_sites(each, two)
+    left, right = (every[f"angle_offset at channel fold{n}"] for n in (1, 2))
+    assert not distinct_sites(left, right) and not distinct_sites(left, every["angle_offset at the measurement"])
+    assert distinct_sites(left, every["angle_scale at channel fold1"])
+
+
+def test_numbers_of_which_no_model_can_be_built_are_not_tried_and_end_nothing():
+    """A build that refuses stiff creases, where a hypothesis asks for them."""
+    plain = subject(3)
+
+    def build(values):
+        if values.get("crease.stiffness", 1.0) > 1.02:
+            raise InputError("too stiff", field="crease.stiffness", value=values["crease.stiffness"], allowed="<= 1.02")
+        return plain.build(values)
+
+    refusing = replace(plain, build=build)
+    forward = arranged(refusing, [record(factors={("crease", "stiffness"): 1.1}, **SMALL)], Options())
+    _, base, weights = nominal_fits(forward)
+    assert not base.failed and base.theta[0] <= 1.02
+    (one,) = (
+        s
+        for s in suspects(forward.model, forward.recordings, forward.drive)
+        if s.effect == "crease_friction" and s.entities == (1,)
+    )
+    assert forward.step(Hypothesis((one,)), np.array([1.1, 1.0, 1.0, 1e-6])) == 0.0
+    screening = screen(forward, [one], base, weights)
+    found = refit(forward, base, screening.signatures[0], weights, screening)
+    assert found.failed or found.theta[0] <= 1.02
 
 
 def test_bad_data_are_named():
