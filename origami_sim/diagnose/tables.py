@@ -34,7 +34,7 @@ def table(forward, fits: list[Fit], scores, judged) -> list[Candidate]:
                 scores[id(f)].rms.tolist(),
                 fit_percent(forward, f).tolist(),
                 why=words.why(f, base, judged, scores),
-                distrust=words.distrust(f, forward),
+                distrust=words.distrust(f, base, forward),
             )
         )
     for f in fits:

@@ -20,7 +20,7 @@ from origami_sim.diagnose.compare import (
     together,
 )
 from origami_sim.diagnose.onset import onset
-from origami_sim.diagnose.refit import Fit, whitened
+from origami_sim.diagnose.refit import LITTLE, Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.diagnose.trust import trust
 from origami_sim.effects import get
@@ -595,9 +595,13 @@ def why(f: Fit, base: Fit, judged: Judgement, scores: dict[int, Score]) -> str:
     return f"predicts held-out data worse by {-d:.1f} +- {error:.1f}; evidence {evidence:+.1f}"
 
 
-def distrust(f: Fit, forward) -> str:
+def distrust(f: Fit, base: Fit, forward) -> str:
     """When not to trust a row."""
     out = []
+    if f.promise < np.inf:
+        out.append("far behind the best, and not fitted to the end")
+    if f.cost > base.cost + LITTLE:
+        out.append("fits worse than the model without it, which it holds")
     for n, t, b in zip(f.free, f.theta, f.at_bound, strict=True):
         if b:
             out.append(f"{n.label} lies on its bound ({t:.3g} {n.unit})")

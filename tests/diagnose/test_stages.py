@@ -7,14 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, diagnose, experiment, prepare, search, verdict
+from origami_sim.diagnose import Options, diagnose, experiment, prepare, search, several, verdict
 from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
-from origami_sim.diagnose.screen import _affordable, _least, screen
+from origami_sim.diagnose.screen import _affordable, _least, again, screen
 from origami_sim.diagnose.search import chosen, look_elsewhere, refit, unbent
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
@@ -149,6 +149,35 @@ def test_a_nested_model_never_fits_worse(rubbing):
         f = refit(forward, base, found, weights, screening, most=2)
         assert f.failed or f.cost <= base.cost * (1 + 1e-6), found.suspect.label
     assert chosen(screening, 2)[0] is screening.signatures[0]
+
+
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in range(2, 30))])
+def test_whatever_is_added_to_whatever_was_recorded_never_fits_worse(seed):
+    """Strips, concealed effects, numbers and suspects at random: one effect more, and another beside it."""
+    rng = np.random.default_rng([seed, 11])
+    panels = int(rng.integers(2, 4))
+    hidden = [
+        {"crease_friction": {"friction_moment": (10 ** rng.uniform(-6, -4.3), None)}},
+        {"crease_stiffening": {"cubic_stiffness": (10 ** rng.uniform(-5, -3), None)}},
+        {"air_drag": {"drag_coefficient": (10 ** rng.uniform(-1, 0.7), None)}},
+        {"crease_offset": {"offset_moment": (1e-5 * rng.normal(), [0])}},
+        {},
+    ][int(rng.integers(5))]
+    known = {("crease", "stiffness"): 1 + 0.05 * rng.normal(), ("inertia", "mass"): 1 + 0.03 * rng.normal()}
+    swing = {"panels": panels, "duration": 2.0, "rate": 100, "size": rng.uniform(0.2, 1.2)}
+    forward = arranged(subject(panels), prepared([record(hidden, factors=known, seed=seed, **swing)], 200.0), Options())
+    _, base, weights = nominal_fits(forward)
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive))
+    few = [every[k] for k in rng.choice(len(every), 5, replace=False)]
+    screening = screen(forward, few, base, weights)
+    for found in screening.signatures[:3]:
+        f = refit(forward, base, found, weights, screening, most=2)
+        assert f.failed or f.cost <= base.cost * (1 + 1e-9), found.suspect.label
+        if f.failed:
+            continue
+        for g in again(screening, f, without=f.hypothesis.effects).signatures[:1]:
+            both = refit(forward, f, g, weights, screening, most=2)
+            assert both.failed or both.cost <= f.cost * (1 + 1e-9), both.hypothesis.label
 
 
 def test_fits_that_are_left_far_behind_stay_rough(rubbing, monkeypatch):
@@ -386,6 +415,57 @@ def test_numbers_of_which_no_model_can_be_built_are_not_tried_and_end_nothing():
     screening = screen(forward, [one], base, weights)
     found = refit(forward, base, screening.signatures[0], weights, screening)
     assert found.failed or found.theta[0] <= 1.02
+
+
+def test_two_that_do_the_same_are_a_tie_with_an_experiment():
+    """A crease whose rest angle is off and a panel whose weight is, in a small swing of one crease."""
+    off = {"crease_offset": {"offset_moment": (3e-6, [0])}}
+    swing = record(off, **SMALL | {"panels": 2}, size=0.3)
+    found = diagnose(subject(2), [swing], catalogue=("crease_offset", "eccentric_weight", "crease_friction"))
+    assert found.verdict == "TIE"
+    both = {"crease_offset at crease 0", "eccentric_weight at panel 1"}
+    assert set(found.chosen) == both and all(c in found.sentence for c in both)
+    assert found.experiments and set(found.experiments[0].separates) == both
+    best = max(found.experiments, key=lambda e: e.expected)
+    assert best.expected > 0.0 and (best.repeats > 1) == (best.expected < 5.0)
+
+
+def test_what_the_catalogue_lacks_is_unknown_and_described():
+    found = diagnose(subject(3), [record(FRICTION, **SMALL)], catalogue=("crease_stiffening", "crease_offset"))
+    assert found.verdict == "UNKNOWN"
+    assert "moment at crease 1" in found.sentence or "acts at crease 1" in found.sentence
+    assert "takes energy" in found.sentence
+
+
+def test_recordings_that_excite_no_suspect_test_none():
+    found = diagnose(subject(3), [record(FRICTION, **SMALL)], catalogue=("crease_stop", "crease_contact"))
+    assert found.verdict == "UNTESTABLE" and not found.chosen and not found.patch
+    assert any("Not tested" in n and "crease_stop" in n for n in found.notes)
+
+
+def test_what_leads_is_exchanged_even_if_no_further_effect_was_asked_for(monkeypatch):
+    """Three explanations, each better than the one before; the pair was refused, and leads all the same."""
+    base, one, pair, other = (
+        SimpleNamespace(hypothesis=Hypothesis(tuple(SimpleNamespace(label=n) for n in names)))  # type: ignore[arg-type]
+        for names in ("", "a", "ab", "cb")
+    )
+    order, calls = [base, one, pair, other], []
+    monkeypatch.setattr(several, "leader", lambda fits, scores: max(fits, key=order.index))
+    monkeypatch.setattr(several, "further", lambda f, best, *_: calls.append(("more", best)) or ([pair], None))
+    monkeypatch.setattr(several, "spared", lambda *_: [])
+
+    def swaps(forward, base, best, *_):
+        calls.append(("exchanged", best))
+        return [other] if best is pair else []
+
+    monkeypatch.setattr(several, "swaps", swaps)
+    found = several.combine(None, [base, one], {}, None, None, Options(), lambda *_: None)
+    assert found == [pair, other]
+    assert calls == [("more", one), ("exchanged", pair), ("exchanged", other)], "once each, and no third effect"
+    calls.clear()
+    monkeypatch.setattr(several, "further", lambda f, best, *_: calls.append(("more", best)) or ([], None))
+    assert several.combine(None, [base, one], {}, None, None, Options(), lambda *_: None) == []
+    assert calls == [("more", one)]
 
 
 def test_bad_data_are_named():
