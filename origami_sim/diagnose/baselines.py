@@ -18,6 +18,9 @@ from origami_sim.diagnose.refit import Fit, Weights, fit
 
 KNOTS = 9
 
+FEWEST = 30
+"""Frames that a correction is learnt from at least."""
+
 THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the data."""
 
@@ -38,12 +41,17 @@ LIBRARY: dict[str, Callable] = {
 def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -> list[Baseline]:
     """Held-out rms of each baseline [SI], on two halves of the segments learnt on the other half."""
     out = [Baseline("best parameter-only refit", reference.rms.tolist())]
-    motions = [motion(forward, base, r) for r in range(len(forward.recordings))] if forward.start == "fit" else [None]
-    if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
-        why = "needs recorded coordinates of every crease, and segments with starts of their own"
+
+    def without(why: str) -> list[Baseline]:
         nan = [float("nan")] * len(forward.components)
         return [*out, Baseline("sparse regression (STLSQ)", nan, why), Baseline("Gaussian process", nan, why)]
+
+    motions = [motion(forward, base, r) for r in range(len(forward.recordings))] if forward.start == "fit" else [None]
+    if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
+        return without("needs recorded coordinates of every crease, and segments with starts of their own")
     halves = _halves(forward)
+    if any(not h or len(next(_samples(forward, motions, 0, h))) < FEWEST for h in halves):
+        return without("needs segments in two halves, and frames outside of each")
     for name, learn in (("sparse regression (STLSQ)", _sparse), ("Gaussian process", _process)):
         squares, count, terms = 0.0, 0.0, []
         for held in halves:

@@ -380,8 +380,9 @@ class Forward:
         times = blocks[0].times
         step = float(np.median(np.diff(recording.times)))
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
-        late, shown = self._late(model, parameters, each, begins)
-        last = max(self._ends(model, parameters, each, c, times[-1], shown) for c in range(len(recording.channels)))
+        once = Parameters.join([p for _, p in worlds])
+        late, shown = self._late(model, once, each, begins)
+        last = max(self._ends(model, once, each, c, times[-1], shown) for c in range(len(recording.channels)))
         frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, group]
         moves, of = distinct_motions(worlds, late, starts)
@@ -482,8 +483,7 @@ class Forward:
             effect = get(name)
             if effect.family != "measurement" or effect.channels or effect.apply is None:
                 continue  # what reads angles or places has no time of its own
-            given = self._at_channel(name, channel, each, parameters, parameters.worlds // len(each))
-            given = {n: v[:: parameters.worlds // len(each)] for n, v in given.items()}
+            given = self._at_channel(name, channel, each, parameters)
             out += effect.apply(lambda t: t[:, None], rows, **given)[:, 0] - rows
         return out
 

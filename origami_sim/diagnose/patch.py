@@ -160,7 +160,20 @@ def patched(diagnosis: Diagnosis) -> Candidate | None:
 
 
 def additions(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addition, ...]:
-    """The effects that the diagnosis found missing, one for each site."""
+    """The effects that the diagnosis found missing, one for each site; see also `of_channels`."""
+    return tuple(a for a in _found(diagnosis, settings) if not _of_channel(a))
+
+
+def of_channels(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> list[str]:
+    """Errors of single channels that the diagnosis found: the recording's, so that no model can have them."""
+    return [f"{a.effect} at {a.site}" for a in _found(diagnosis, settings) if _of_channel(a)]
+
+
+def _of_channel(a: Addition) -> bool:
+    return get(a.effect).family == "measurement" and a.entities is not None
+
+
+def _found(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addition, ...]:
     found: dict[tuple[str, str], dict[str, float]] = {}
     for label, value in diagnosis.patch.items():
         name, _, entities = label.partition("@")
@@ -195,6 +208,7 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
         f"# {scene}, patched by a diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}.",
         *textwrap.wrap(diagnosis.sentence, 118, initial_indent="# ", subsequent_indent="# "),
         f"# Use: origami-sim run {scene} --calibration {Path(path).name}",
+        *(f"# Left out, as it is an error of the recording: {e}" for e in of_channels(diagnosis, settings)),
         "",
     ]
     for s in settings.values():

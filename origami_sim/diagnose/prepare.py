@@ -8,7 +8,7 @@ import numpy as np
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.channels import units_of
 from origami_sim.diagnose.compare import weights_from
-from origami_sim.diagnose.forward import Forward, stacked
+from origami_sim.diagnose.forward import Forward, local_line, stacked
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.prescribed import curves
@@ -135,9 +135,19 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
             drift = np.nanstd(values[head], axis=0)
         scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
         moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max()), 3 * noise) if standing else 0.2 * scale
-        if np.any(np.abs(away) > np.maximum(0.05 * scale, 5 * noise)) or np.any(drift > moves):
+        near = np.maximum(0.05 * scale, 5 * noise)
+        still = np.all(np.abs(away) <= near) and np.all(drift <= moves)
+        if not still and not _just_begun(recording.times, values, noise, now, near):
             return "fit" if probe.articulation.size else "rest"
     return "rest"
+
+
+def _just_begun(times: np.ndarray, values: np.ndarray, noise: np.ndarray, reference: np.ndarray, near) -> bool:
+    """Whether a motion that is under way within a few frames was at rest in its first, near the reference."""
+    level, rate, error = local_line(times, values, noise, 0)
+    fast = np.nanstd(np.gradient(values, times, axis=0), axis=0)
+    calm = (np.abs(level - reference) <= near) & (np.abs(rate) <= np.maximum(0.05 * fast, 4 * error))
+    return bool(np.all(calm & (error < 0.5 * fast)))
 
 
 def predictable(forward: Forward) -> float:

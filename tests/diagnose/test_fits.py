@@ -11,7 +11,7 @@ from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
-from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared
+from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
 from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
@@ -20,7 +20,7 @@ from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of
 from origami_sim.drive import Drive, sine
 from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
-from origami_sim.recording.recording import Channel, DriveChannel
+from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.solve.batch import Batch
 from tests.diagnose.strips import hanging, record, subject
 
@@ -208,7 +208,7 @@ def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_n
         each = [Hypothesis(), Hypothesis((one,))]
         theta = [np.ones(3), np.array([1.0, 1.0, 1.0, value])]
         worlds = [forward._world(h, t, (effect,)) for h, t in zip(each, theta, strict=True)]
-        joined = Parameters.join([p for _, p in worlds], repeat=3)
+        joined = Parameters.join([p for _, p in worlds])
         return forward._late(worlds[0][0], joined, each, begins)[0]
 
     assert np.array_equal(late("clock_rate", 0.01)[0], [0.0] * 3)
@@ -219,7 +219,7 @@ def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_n
             assert not np.any(late(effect, 0.02)), effect
 
 
-def driven(start: str, phase: float = 0.0, duration: float = 3.0) -> Forward:
+def driven(start: str, phase: float = 0.0, duration: float = 3.0, rate: int = 100) -> Forward:
     """The strip with magnets in a field of 1 Hz."""
     model, parameters = hanging(3)
     model = model.with_effects("magnetic_torque")
@@ -228,7 +228,7 @@ def driven(start: str, phase: float = 0.0, duration: float = 3.0) -> Forward:
     parameters.set("magnetic_torque", "volume", parameters["inertia", "mass"].sum() / 3000.0 / len(model.triangles))
     parameters.set("magnetic_torque", "poling_n", 1.0)
     drive = Drive(field=(0.0, 0.0, sine(0.02, 1.0, phase=phase)))
-    recordings = prepared([record(**SMALL | {"duration": duration})], 200.0)
+    recordings = prepared([record(**SMALL | {"duration": duration, "rate": rate})], 400.0)
     return Forward(Subject.from_model(model, parameters, drive), recordings, start=start)
 
 
@@ -257,17 +257,47 @@ def test_a_late_camera_and_a_drive_that_is_as_late_are_one_where_starts_are_fitt
         np.testing.assert_allclose(late, same, atol=1e-5)  # the shifted drive is one of samples
 
 
-def test_what_looks_the_same_as_a_large_effect_is_compared_where_that_is():
-    """A late clock, whose twin is a late drive; a fit of it that ended elsewhere is replaced, a good one is not."""
-    forward, rng = driven("rest"), np.random.default_rng(0)
-    seen = delayed(forward, 0.2)
-    (swing,) = forward.recordings
+@pytest.mark.parametrize("start", ["fit", "rest"])
+def test_many_worlds_may_share_a_clock(start):
+    """All worlds have one delay where only starts are to be fitted, and as many as worlds where it is."""
+    forward = driven(start)
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    (one,) = (s for s in every if s.effect == "clock_delay" and s.site == "the measurement")
+    starts = np.zeros((3, len(forward.blocks), forward.local))
+    shared, apart = (
+        forward.predict(Hypothesis((one,)), np.array(t)[:, None], starts)[0] for t in ([0.1, 0.1, 0.1], [0.1, 0.0, 0.1])
+    )
+    np.testing.assert_array_equal(shared[0], shared[1])
+    np.testing.assert_allclose(apart[[0, 2]], shared[[0, 2]], atol=1e-12)
+    assert np.ptp(apart[1] - apart[0]) > 1e-3
+
+
+def seen_by(forward: Forward, values: np.ndarray) -> Recording:
+    """A recording of the strip with these readings [n, D], 1 mrad of noise and the field."""
+    (swing,), rng = forward.recordings, np.random.default_rng(0)
     channels = {
-        n: replace(c, values=seen[:, k] + 1e-3 * rng.normal(size=len(seen)), noise=1e-3)
+        n: replace(c, values=values[:, k] + 1e-3 * rng.normal(size=len(values)), noise=1e-3)
         for k, (n, c) in enumerate(swing.channels.items())
     }
     field = DriveChannel("field", np.stack([forward.drive["field_z"](swing.times)] * 3, axis=1) * [0, 0, 1], "T", False)
-    forward = Forward(forward.subject, [replace(swing, channels=channels, drive={"field": field})], start="rest")
+    return replace(swing, channels=channels, drive={"field": field})
+
+
+def test_a_motion_that_is_under_way_within_a_few_frames_began_at_rest():
+    """A field that is on at once; the same a while later, and from another angle, did not."""
+    forward = driven("rest", phase=np.pi / 2, rate=400)
+    values = delayed(forward, 0.0)
+    assert np.abs(values[4] - values[0]).max() > 5e-3, "five deviations within four frames"
+    swing = seen_by(forward, values)
+    assert starting(forward.subject, [swing]) == "rest"
+    assert starting(forward.subject, [swing.window(0.5, 2.5)]) == "fit"
+    assert starting(forward.subject, [seen_by(forward, values + 0.2)]) == "fit"
+
+
+def test_what_looks_the_same_as_a_large_effect_is_compared_where_that_is():
+    """A late clock, whose twin is a late drive; a fit of it that ended elsewhere is replaced, a good one is not."""
+    forward = driven("rest")
+    forward = Forward(forward.subject, [seen_by(forward, delayed(forward, 0.2))], start="rest")
     _, base, weights = nominal_fits(forward)
     every = suspects(forward.model, forward.recordings, forward.drive)
     clock, drive = (next(s for s in every if s.label.startswith(n)) for n in ("clock_delay at the m", "drive_delay"))

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
-from origami_sim.diagnose.patch import additions, read_additions, switched_on
+from origami_sim.diagnose.patch import additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.verdict import _say
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.scene import read_calibration, scene_module, scene_settings
 from tests.diagnose.strips import hanging, record
 
 VISCOSITY = ("crease_viscosity", "viscosity")
@@ -83,3 +84,21 @@ def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
     lacking = replace(lower, more=False)
     other = SimpleNamespace(**{**vars(f), "hypothesis": Hypothesis((lacking,))})
     assert "stated" not in _say(other)  # type: ignore[arg-type]
+
+
+def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_model(tmp_path):
+    """No model has channels, so that it could not be read back; it is named in the file."""
+    numbers = {"crease_friction.friction_moment@1": 1e-4, "angle_offset.angle_offset@1": 0.02}
+    sites = ["crease 1", "channel fold2"]
+    best = SimpleNamespace(numbers=[SimpleNamespace(value=v, label=n) for n, v in numbers.items()], sites=sites)
+    found = SimpleNamespace(
+        patch=numbers, changed=[], candidates=[best], recordings=["swing"], verdict="SEVERAL", sentence="Two."
+    )
+    assert [a.effect for a in additions(found, {})] == ["crease_friction"]  # type: ignore[arg-type]
+    settings = read_calibration("pendulum_chain")
+    path = write_patch(tmp_path / "patched.toml", settings, found, scene="pendulum_chain")  # type: ignore[arg-type]
+    assert "Left out, as it is an error of the recording: angle_offset at channel fold2" in path.read_text()
+    again = scene_settings(scene_module("pendulum_chain"), path)
+    assert [a.effect for a in again.effects] == ["crease_friction"]
+    numbers["angle_offset.angle_offset"] = numbers.pop("angle_offset.angle_offset@1")  # of all channels
+    assert [a.effect for a in additions(found, {})] == ["crease_friction", "angle_offset"]  # type: ignore[arg-type]

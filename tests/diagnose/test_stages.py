@@ -10,6 +10,7 @@ import pytest
 from origami_sim.diagnose import Options, diagnose, experiment, prepare, search, several, verdict
 from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
+from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of
@@ -360,6 +361,15 @@ def test_stretches_of_one_segment_are_predicted_with_the_start_that_the_others_t
         left = line.residual[0][a:b] - both[a:b] @ step
         assert found.squares[n] == pytest.approx(left @ left, rel=1e-2)
     assert found.held_out.sum() < -0.5 * sum(float(r @ r) for r in pieces.residual)
+
+
+@pytest.mark.parametrize("segment", [99.0, 2.5])
+def test_baselines_are_left_out_where_nothing_is_left_to_learn_from(segment):
+    forward = arranged(subject(3), [record(**SMALL)], Options(start="fit", segment=segment))
+    _, base, weights = nominal_fits(forward)
+    refitted, *others = baselines(forward, base, weights, score(forward, base, weights))
+    assert np.all(np.isfinite(refitted.rms))
+    assert all(np.all(np.isnan(b.rms)) and "two halves" in b.note for b in others)
 
 
 def test_effects_that_cannot_act_are_not_left_out_without_a_word(rubbing):
