@@ -84,10 +84,13 @@ def balls(source: Path, folder: Path) -> None:
 
 
 def flights(source: Path, folder: Path) -> None:
-    """Flights of the centre: every tenth fitted, others tested."""
+    """Flights of the centre: every tenth fitted, others tested.
+
+    The board is put out of the way: how the cube is turned is not recorded, and no corner may touch it.
+    """
     files = cube_toss.convert(source, folder, "flight")
     train, test = ([read_recording(f) for f in files[n::10][:21]] for n in (0, 5))
-    subject = Subject.from_scene(cube_toss, read_calibration("cube_toss"))
+    subject = Subject.from_scene(cube_toss, read_calibration("cube_toss").replace(board_height=-0.1))
     fixed = replace(subject, nominals=tuple(n for n in subject.nominals if n.name == "gravity"))
     weights = Weights(np.full(3, 1e-4), 0.25)
     least = np.zeros(len(test))

@@ -39,11 +39,12 @@ def described(places: Sequence[Place], actions: Sequence[Acting], what: str = "W
         return ""
     p = max(places, key=lambda p: p.share)
     said = [_where(p, actions)]
-    count = np.array(p.curves[0].count, float) if p.curves else np.zeros(0)
-    size = {c.against: _explained(c) for c in p.curves}
-    if count.sum() and max(size.values()) > 0.0:
-        best = max(p.curves, key=lambda c: size[c.against])
-        goes = [c.against.replace("_", " ") for c in p.curves if size[c.against] > ALSO * size[best.against]]
+    # in a periodic motion everything goes with the phase, and with the time since a reversal
+    curves = [c for c in p.curves if not c.against.startswith(("phase of", "time since"))]
+    size = {c.against: _explained(c) for c in curves}
+    if curves and sum(curves[0].count) and max(size.values()) > 0.0:
+        best = max(curves, key=lambda c: size[c.against])
+        goes = [c.against.replace("_", " ") for c in curves if size[c.against] > ALSO * size[best.against]]
         text = f"goes with the {' and the '.join(goes)} at {p.site}"
         noise, all_ = (float(np.mean(np.square(v))) for v in (p.error, np.subtract(p.moment, np.mean(p.moment))))
         if all_ - noise > CLEAR * noise:
@@ -53,7 +54,7 @@ def described(places: Sequence[Place], actions: Sequence[Acting], what: str = "W
         symmetry = _symmetry(best)
         if symmetry:
             said.append(f"is {symmetry} in the {best.against}")
-        rate = next((c for c in p.curves if c.against == "rate"), None)
+        rate = next((c for c in curves if c.against == "rate"), None)
         if rate is not None:
             x, n = np.array(rate.x), np.array(rate.count, float)
             speed = np.sqrt(np.average(x**2, weights=n))

@@ -93,6 +93,9 @@ class Place:
             being the site. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
             [s], nan: never.
         times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
+        curves: the residual moment against angle, rate, what drives, its phase if it is periodic, and time since the
+            last reversal and the last step of a drive.
+        balance: unexplained power [W], blocks of 0.1 s or more of the first recording against time; None: not known.
     """
 
     site: str
@@ -104,6 +107,7 @@ class Place:
     moment: list[float]
     error: list[float]
     curves: list[Curve] = field(default_factory=list)
+    balance: Curve | None = None
 
 
 @dataclass

@@ -214,6 +214,7 @@ def locate(forward: Forward, motions: Sequence[Motion]) -> list[Place]:
                 first.missing[k, ::thin].tolist(),
                 first.error[k, ::thin].tolist(),
                 _curves(motions, k),
+                _balance(first, k),
             )
         )
     excess = np.array([max(p.score**2 - 1.0, 0.0) for p in out])
@@ -238,19 +239,92 @@ def _onset(times: np.ndarray, value: np.ndarray, error: np.ndarray) -> float:
     return float(times[np.argmax(run)]) if np.any(run) else float("nan")
 
 
+def _balance(m: Motion, k: int) -> Curve:
+    """Power that the model does not explain, by windows: means over them need rates at their ends only."""
+    power = m.mean(m.missing[k] * m.rate[k])
+    error = m.calmer * m.mean(m.error[k] * np.abs(m.rate[k]))
+    return Curve(
+        "time", "s", m.mean(m.times).tolist(), power.tolist(), error.tolist(), [len(m.times) // len(power)] * len(power)
+    )
+
+
+PERIODIC, LEAST = 0.8, 2.0
+"""Part of a drive's variance that a harmonic and overtones explain if it is periodic, and periods of it at least."""
+
+STEP = 0.25
+"""Part of a drive's range that it changes by between two frames where it steps."""
+
+TURNED = 0.1
+"""Rate, in root mean squares, beyond which a motion goes one way; a reversal lies between two ways."""
+
+
+def phase(times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+    """Phase [rad] in [0, 2 pi) of a periodic signal, from its rising zero; None: it is not periodic."""
+    span = times[-1] - times[0]
+    even = np.linspace(times[0], times[-1], 2048)
+    y = np.interp(even, times, values)
+    y = y - y.mean()
+    if not np.any(y):
+        return None
+    first = np.argmax(np.abs(np.fft.rfft(y * np.hanning(len(y))))) / (len(y) * (even[1] - even[0]))
+    best, told = 0.0, None
+    for f in first + np.linspace(-1.0, 1.0, 41) / span:
+        if f * span < LEAST:
+            continue
+        angle = 2 * np.pi * f * np.outer(even - times[0], [1, 2, 3])
+        waves = np.concatenate([np.sin(angle), np.cos(angle)], axis=1)
+        x, *_ = np.linalg.lstsq(waves, y, rcond=None)
+        explained = 1.0 - float(np.sum((y - waves @ x) ** 2) / (y @ y))
+        if explained > best:
+            best, told = explained, (f, np.arctan2(x[3], x[0]))
+    if told is None or best < PERIODIC:
+        return None
+    return (2 * np.pi * told[0] * (times - times[0]) + told[1]) % (2 * np.pi)
+
+
+def since(times: np.ndarray, events: np.ndarray) -> np.ndarray:
+    """Time [s] since the last of some events (a mask of frames); nan before the first."""
+    last = np.maximum.accumulate(np.where(events, times, -np.inf))
+    return np.where(np.isfinite(last), times - last, np.nan)
+
+
+def reversals(rate: np.ndarray) -> np.ndarray:
+    """Mask of the frames in which a motion has begun to go the other way."""
+    way = np.sign(rate) * (np.abs(rate) > TURNED * np.sqrt(np.mean(rate**2)))
+    held = way[np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))]
+    return np.concatenate([[False], held[1:] * held[:-1] < 0])
+
+
+def _against(motions: Sequence[Motion], k: int) -> dict[tuple[str, str], list[np.ndarray]]:
+    """What a missing moment may go with, by name and unit: for each motion (n,); nan where it is not defined."""
+    out = {("angle", "rad"): [m.q[k] for m in motions], ("rate", "rad/s"): [m.rate[k] for m in motions]}
+    for n in sorted(set.intersection(*(set(m.drive) for m in motions))):
+        unit = "T" if n.startswith("field") else "V" if n.startswith("voltage") else ""
+        values = [m.drive[n] for m in motions]
+        out[n, unit] = values
+        phases = [phase(m.times, v) for m, v in zip(motions, values, strict=True)]
+        told = [p for p in phases if p is not None]
+        if len(told) == len(phases):
+            out[f"phase of {n}", "rad"] = told
+        jumps = [np.abs(np.diff(v, prepend=v[0])) > STEP * np.ptp(v) for v in values]
+        if any(np.any(j) for j in jumps):
+            out[f"time since a step of {n}", "s"] = [since(m.times, j) for m, j in zip(motions, jumps, strict=True)]
+    turns = [since(m.times, reversals(m.rate[k])) for m in motions]
+    if np.isfinite(np.concatenate(turns)).sum() > BINS:
+        out["time since a reversal", "s"] = turns
+    return out
+
+
 def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     def joined(f):
         return np.concatenate([f(m) for m in motions])
 
     y = joined(lambda m: m.missing[k])
     width = 2 * max(m.half for m in motions) + 1
-    against = {("angle", "rad"): joined(lambda m: m.q[k]), ("rate", "rad/s"): joined(lambda m: m.rate[k])}
-    for n in sorted(set.intersection(*(set(m.drive) for m in motions))):
-        unit = "T" if n.startswith("field") else "V" if n.startswith("voltage") else ""
-        against[n, unit] = joined(lambda m, n=n: m.drive[n])
     out = []
-    for (name, unit), x in against.items():
-        order = np.argsort(x, kind="stable")
+    for (name, unit), each in _against(motions, k).items():
+        x = np.concatenate(each)
+        order = np.argsort(x, kind="stable")[: np.isfinite(x).sum()]  # what is not a number comes last
         parts = [p for p in np.array_split(order, BINS) if len(p)]
         out.append(
             Curve(

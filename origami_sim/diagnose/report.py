@@ -498,8 +498,28 @@ def _place(p: Place) -> Html:
             plot.mark(p.onset, "onset", f"departs at {amount(p.onset, 's', 3)}")
         caption = element("figcaption", element("b", "in time"), " shaded: ± 2 sd")
         figures.append(element("figure", caption, plot.html()))
+    if p.balance is not None:
+        figures.append(_balance(p.site, p.balance))
     figures += [_curve(p.site, c, name, unit) for c in p.curves]
     return element("div", figures or _nothing("No curves."), class_="figures three")
+
+
+def _balance(site: str, c: Curve) -> Html:
+    """Power balance: what is left of the change of energy less the work, block by block."""
+    x, y, e = _array(c.x), _array(c.mean), _array(c.error)
+    plot = Plot(
+        f"unexplained power at {site}",
+        span_of(x, margin=0.0),
+        span_of(y, zero=True, margin=0.15),
+        x_name="time",
+        x_unit="s",
+        y_name="unexplained power",
+        y_unit="W",
+    )
+    plot.band(x, y - 2 * e, y + 2 * e, "noise").level(0.0, "zero").line(x, y, "place")
+    width = amount(float(np.median(np.diff(x))), "s", 2) if len(x) > 1 else "one block"
+    caption = element("figcaption", element("b", "unexplained power"), f" means over {width}, shaded: ± 2 sd")
+    return element("figure", caption, plot.html())
 
 
 def _curve(site: str, c: Curve, name: str, unit: str) -> Html:

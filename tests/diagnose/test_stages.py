@@ -13,7 +13,7 @@ from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
-from origami_sim.diagnose.locate import locate, motions_of
+from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, again, screen
 from origami_sim.diagnose.search import chosen, look_elsewhere, refit, unbent
@@ -141,6 +141,40 @@ def test_a_force_on_a_panel_is_told_from_moments_at_creases(panel):
     assert found[0].site == f"panel {panel}" and found[0].what in ("force across", "moment on")
     best = min(a.left for a in found if a.what == "moment at")
     assert found[0].left < 0.8 * best
+
+
+def test_the_missing_power_is_that_of_the_friction_block_by_block(rubbing):
+    """Dry friction takes M |rate|; crease 0 misses next to nothing."""
+    forward, _, base, *_ = rubbing
+    (motion,) = motions_of(forward, base)
+    places = {p.site: p for p in locate(forward, [motion])}
+    taken = motion.mean(-2e-5 * np.abs(motion.rate[1]))
+    found = places["crease 1"].balance
+    assert found is not None and np.min(np.diff(found.x)) >= 0.099
+    known = np.array(found.error) < 0.2 * np.abs(taken).max()
+    assert known.sum() > 10
+    # the refitted viscosity has taken a part of it
+    assert np.corrcoef(np.array(found.mean)[known], taken[known])[0, 1] > 0.8
+    assert {c.against for c in places["crease 1"].curves} >= {"angle", "rate", "time since a reversal"}
+
+
+def test_phases_reversals_and_steps_are_those_of_the_signal():
+    t = np.linspace(0.0, 3.0, 901)
+    square = np.sign(np.sin(2 * np.pi * 1.5 * t + 0.3))
+    for wave in (np.sin(2 * np.pi * 1.5 * t + 0.3), square + 0.2):
+        found = phase(t, wave)
+        assert found is not None
+        assert np.abs(np.angle(np.exp(1j * (found - 2 * np.pi * 1.5 * t - 0.3)))).max() < 0.1
+    assert phase(t, t) is None and phase(t, 0 * t) is None
+    assert phase(t, np.random.default_rng(0).normal(size=901)) is None
+    turned = reversals(np.cos(2 * np.pi * t))  # at 1/4, 3/4, ... s, and told a little later
+    assert t[turned] == pytest.approx(np.arange(0.25, 3.0, 0.5), abs=0.03)
+    ago = since(t, turned)
+    assert (
+        np.all(np.isnan(ago[:75]))
+        and np.nanmax(ago) == pytest.approx(0.5, abs=0.03)
+        and ago[turned] == pytest.approx(0)
+    )
 
 
 def test_a_nested_model_never_fits_worse(rubbing):
