@@ -1,6 +1,7 @@
 """What every effect of the catalogue has to satisfy; a new effect file is tested without being named here."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -366,3 +367,13 @@ def test_unknown_effects_and_parameters_are_named():
         strip(1).with_effects("gravitation")
     with pytest.raises(InputError, match=r"crease\.stiffnes.*rest_angle, stiffness"):
         Parameters(strip(1)).set("crease", "stiffnes", 1.0)
+
+
+def test_what_the_seed_paper_names_as_causes_are_suspects():
+    """The table of docs/diagnosis.md; effects that are written there exist and have numbers to fit."""
+    page = (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    table = page.split("What the seed paper itself names")[1].split("\n## ")[0]
+    named = [n for row in table.splitlines() if row.startswith("|") for n in re.findall(r"`(\w+)`", row)]
+    assert len(set(named)) >= 10
+    assert not [n for n in named if n not in CATALOGUE or not CATALOGUE[n].fitted]
+    assert len([e for e in CATALOGUE.values() if e.fitted]) >= 25
