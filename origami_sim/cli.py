@@ -479,7 +479,7 @@ def _shipped_sidecar(name: str) -> Path:
 
 def _sidecar(recording: Path) -> Path | None:
     """The shipped sidecar of a known recording, unless one lies beside the file."""
-    shipped = _shipped_sidecar(f"{recording.parent.name}_{recording.stem}")
+    shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
     return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
 
 

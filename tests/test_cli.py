@@ -141,6 +141,14 @@ def test_compare_with_a_stand_in_recording(call, tmp_path):
     assert set(json.loads(out)["channels"]) == {"theta1", "theta2"}
 
 
+def test_compare_finds_the_shipped_sidecar_from_within_the_folder(call, tmp_path, monkeypatch):
+    (tmp_path / "pendulum_chain").mkdir()
+    stand_in_double_pendulum(tmp_path / "pendulum_chain" / "double.csv", duration=0.5)
+    monkeypatch.chdir(tmp_path / "pendulum_chain")
+    code, _, err = call("compare", "double.csv", "--scene", "pendulum_chain", "--duration", 0.2)
+    assert (code, err) == (0, "")
+
+
 def test_screenshot_of_a_run(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     code, _, err = call("replay", "here", "--screenshot", "picture.png", "--json")
