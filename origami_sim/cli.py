@@ -92,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
     p.add_argument("run", help="run folder or .rrd file")
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
-    p.add_argument("--time", type=float, help="simulated time of the picture [s]")
+    p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
     p = command(
         "compare",
@@ -250,6 +250,8 @@ def _replay(args) -> int:
         if args.json:
             _print_json({"picture": str(args.screenshot) if taken else None})
         return OK if taken else NO
+    if args.time is not None:
+        raise InputError("is the time of a picture", field="--time", value=args.time, allowed="with --screenshot PNG")
     viewer = open_replay(path)
     if args.json:
         _print_json({"replay": str(path), "viewer_process": viewer.pid})

@@ -152,6 +152,7 @@ def test_compare_finds_the_shipped_sidecar_from_within_the_folder(call, tmp_path
 def test_screenshot_of_a_run(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     code, _, err = call("replay", "here", "--screenshot", "picture.png", "--json")
+    refused(call, tmp_path, ["replay", "here", "--time", "0.01"], r"'--time', value 0\.01.*with --screenshot")
     if code == 1:
         pytest.skip(err.strip() or "no renderer here")
     assert code == 0
