@@ -21,7 +21,7 @@ from origami_sim.scene import read_calibration, scene_module
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 
-COMMANDS = ("run", "replay", "compare", "effects", "stride", "demo")
+COMMANDS = ("run", "replay", "compare", "diagnose", "study", "calibrate", "prove", "effects", "stride", "demo")
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
 
@@ -147,6 +147,14 @@ def test_compare_finds_the_shipped_sidecar_from_within_the_folder(call, tmp_path
     monkeypatch.chdir(tmp_path / "pendulum_chain")
     code, _, err = call("compare", "double.csv", "--scene", "pendulum_chain", "--duration", 0.2)
     assert (code, err) == (0, "")
+
+
+@pytest.mark.parametrize("words", [("--json", "paper"), ("paper", "--json")])
+def test_calibrate_takes_json_on_either_side(call, tmp_path, words):
+    (tmp_path / "article.txt").write_text("The tape is 19 mm wide.")
+    code, out, _ = call("calibrate", *words, "article.txt", "--take", "width=tape is # mm wide")
+    assert code == 0
+    assert json.loads(out)["values"]["width"]["value"] == pytest.approx(0.019)
 
 
 def test_screenshot_of_a_run(call, tmp_path):
@@ -277,6 +285,11 @@ def refused(call, tmp_path, arguments, words):
         (["replay", "nowhere"], r"nowhere: there is no such replay"),
         (["stride", "box"], r"does not walk.*box.*crawler"),
         (["stride", "--cycles", "0"], r"whole cycles.*--cycles.*0"),
+        (["study", "nope"], r"invalid choice: 'nope'.*crawler.*bifold"),
+        (["study", "crawler", "--samples", "-3"], r"too small.*--samples.*-3.*>= 0"),
+        (["study", "--json", "crawler", "--cycles", "3"], r"too small.*--cycles.*>= 4"),
+        (["study", "crawler", "--json", "--calibration", "box"], r"box\.toml: .*lacks a setting"),
+        (["study", "bifold", "--json", "--set", "voltage=1kV"], r"varied by the study.*voltage"),
         (["compare", "none.csv", "--scene", "pendulum_chain"], r"none\.csv.*cannot be read"),
         (["compare", "none.csv", "--scene", "box"], r"cannot replicate.*box.*pendulum_chain"),
         (["compare", "none.csv", "--scene", "pendulum_chain", "--duration", "0"], r"must be positive.*--duration"),

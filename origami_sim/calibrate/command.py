@@ -46,11 +46,12 @@ class _Parser(argparse.ArgumentParser):
 
 def register(parser: argparse.ArgumentParser) -> None:
     """Adds the subcommands and their options to the parser of `origami-sim calibrate`."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of text")
     commands = parser.add_subparsers(dest="calibration", required=True, metavar="HOW", parser_class=type(parser))
 
     def command(name: str, summary: str) -> argparse.ArgumentParser:
         p = commands.add_parser(name, help=summary, description=summary + ".")
-        p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
+        p.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print one JSON object")
         if name != "again":
             p.add_argument("--out", metavar="TOML", help="calibration file to write")
             p.add_argument("--plot", metavar="PNG", help="picture of fit and residual to write")
