@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.solve.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
-STAND_IN_SECONDS = 20.0
+STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
 
 
 class _Parser(argparse.ArgumentParser):
@@ -98,17 +98,17 @@ def _parser() -> argparse.ArgumentParser:
     p = command(
         "compare",
         _compare,
-        "Compare a recording with a scene",
+        "Compare a recording with the scene pendulum_chain (no other can replicate one; diagnose takes any)",
         "origami-sim compare double.csv --scene pendulum_chain --duration 5",
     )
     p.add_argument("recording", help="CSV or Parquet file")
-    p.add_argument("--scene", required=True, help="scene that models what was recorded")
+    p.add_argument("--scene", required=True, help="scene that models what was recorded: pendulum_chain")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
-    p.add_argument("--duration", type=float, default=5.0, help="seconds compared (default 5)")
+    p.add_argument("--duration", type=float, help="seconds compared (default 5, or what is left of the recording)")
     p.add_argument(
         "--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)"
     )
@@ -292,7 +292,7 @@ def _compare(args) -> int:
     from origami_sim.compare import plot_overlay
     from origami_sim.recording import read_recording
     from origami_sim.results import check_writable
-    from origami_sim.scene import scene_module, scene_settings
+    from origami_sim.scene import check_recorded_scene, scene_module, scene_settings
 
     module = scene_module(args.scene)
     if not hasattr(module, "replicate"):
@@ -300,13 +300,16 @@ def _compare(args) -> int:
             "this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain"
         )
     for name in ("duration", "threshold"):
-        if not getattr(args, name) > 0:
-            raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed="> 0")
+        value = getattr(args, name)
+        if value is not None and not value > 0:
+            raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
     settings = scene_settings(module).override(args.set)
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+    check_recorded_scene(recording, args.scene, "origami-sim diagnose --model")
+    duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")
     check_writable(folder)
-    comparison, motion, used, part = _replicate(module, settings, recording, args.start, args.duration, args.threshold)
+    comparison, motion, used, part = _replicate(module, settings, recording, args.start, duration, args.threshold)
     _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
     plot_overlay(comparison, folder / "overlay.png")
     if args.json:
@@ -314,6 +317,8 @@ def _compare(args) -> int:
     else:
         for note in recording.metadata.get("notes", ()):
             print(f"note: {note}")
+        first, last = (comparison.instant(float(part.times[k])) for k in (0, -1))
+        print(f"compared from {first} to {last}: {len(part.times)} of {len(recording.times)} frames")
         print(comparison.table())
         print(comparison.sentence())
         print(f"run folder: {folder}")
@@ -427,7 +432,7 @@ def _demo(args) -> int:
         source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
     say(f"{note}: {source.name}")
     recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, 5.0, 5.0)
+    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
     _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
     worst = max(worst, _soundness(motion))
     say(comparison.table())
@@ -515,6 +520,25 @@ def _sidecar(recording: Path) -> Path | None:
     """The shipped sidecar of a known recording, unless one lies beside the file."""
     shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
     return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
+
+
+def _duration(args, recording: "Recording") -> float:
+    """Seconds to compare; InputError where the recording has none from --start on, or fewer than asked for."""
+    length = float(recording.times[-1] - recording.times[0])
+    left = length - args.start
+    if not 0 <= args.start <= length:
+        raise InputError(
+            "is outside of the recording",
+            file=args.recording, field="--start", value=args.start, allowed=f"0 to {length:g} s",
+        )  # fmt: skip
+    if args.duration is None:
+        return min(COMPARED_SECONDS, left)
+    if args.duration > left + length / max(len(recording.times) - 1, 1):  # the last frame may be counted as lasting
+        raise InputError(
+            "is longer than the recording",
+            file=args.recording, field="--duration", value=args.duration, allowed=f"up to {left:g} s",
+        )  # fmt: skip
+    return args.duration
 
 
 def _replicate(module, settings, recording: "Recording", start: float, duration: float, threshold: float):

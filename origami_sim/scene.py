@@ -23,6 +23,7 @@ from origami_sim.solve.statics import equilibrium
 
 if TYPE_CHECKING:
     from origami_sim.diagnose.patch import Addition
+    from origami_sim.recording import Recording
 
 NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
@@ -302,6 +303,19 @@ def scene_module(name: str) -> ModuleType:
     if not hasattr(module.build, "__wrapped__"):
         setattr(module, "build", _extended(module.build))  # noqa: B010  a module has no declared attributes
     return module
+
+
+def check_recorded_scene(recording: "Recording", scene: str, option: str) -> None:
+    """Refuses a recording of which the sidecar says that it is of another scene; `option` would take that one."""
+    stated = (recording.metadata.get("scene") or {}).get("name")
+    if stated is not None and stated != scene:
+        raise InputError(
+            "the recording is of another scene",
+            file=recording.metadata.get("sidecar"),
+            field="scene.name",
+            value=stated,
+            allowed=f"{option} {stated}, or a sidecar for {scene}",
+        )
 
 
 def _extended(build: Callable) -> Callable:

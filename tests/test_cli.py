@@ -386,6 +386,18 @@ def test_a_window_outside_the_recording(call, tmp_path):
     arguments = ["compare", recording, "--scene", "pendulum_chain", "--sidecar", SIDECAR]
     refused(call, tmp_path, [*arguments, "--start", "9"], r"window|frames|recording")
     refused(call, tmp_path, [*arguments, "--start", "nan"], r"window|frames|recording")
+    refused(call, tmp_path, [*arguments, "--start", "-1"], r"stand_in\.csv: is outside.*--start.*0 to 0\.5 s")
+    refused(call, tmp_path, [*arguments, "--start", "0.2", "--duration", "1e9"], r"--duration.*up to 0\.3 s")
+    code, out, _ = call(*arguments, "--start", "0.4")
+    assert code == 0
+    assert "compared from t = 0.400 s to t = 0.500 s: 101 of 501 frames" in out
+
+
+def test_a_recording_of_another_scene(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
+    (tmp_path / "stand_in.toml").write_text(SIDECAR.read_text().replace('name = "pendulum_chain"', 'name = "box"'))
+    words = r"stand_in\.toml: .*another scene.*'box'.*diagnose --model box"
+    refused(call, tmp_path, ["compare", recording, "--scene", "pendulum_chain"], words)
 
 
 def test_no_pickle_is_opened(call, tmp_path):
