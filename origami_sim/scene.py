@@ -5,7 +5,7 @@ import importlib
 import os
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -29,6 +29,10 @@ NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
 
 _KEYS = {"value", "unit", "range", "choices", "source", "meaning", "uncertainty"}
+_BESIDE_STATICS = {
+    "mode", "frequency", "loss_time", "decay_rate", "membrane_damping", "cells", "hinges", "motion_cells",
+    "motion_hinges", "twist",
+}  # fmt: skip
 _FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
 
 
@@ -201,6 +205,18 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
     return given
+
+
+def is_reference(s: Settings, calibration: str, besides: Collection[str] = ()) -> bool:
+    """Whether a reference solution for a shipped calibration is one for these settings.
+
+    It is if no effect was added and all values are those of the calibration, `besides` some and those that decide only
+    the motion and the mesh.
+    """
+    own = read_calibration(calibration)
+    return not s.effects and all(
+        s[n].value == own[n].value for n in own if n not in _BESIDE_STATICS and n not in besides
+    )
 
 
 def _setting(name: str, table: object, path: Path) -> Setting:
