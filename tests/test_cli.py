@@ -353,6 +353,31 @@ def test_output_folders_that_cannot_be_written(call, tmp_path, monkeypatch):
     refused(call, tmp_path, ["demo", "--out", "file"], r"cannot be written")
 
 
+def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
+    (tmp_path / "stand_in.toml").write_text(SIDECAR.read_text())
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "diagnosis.json").write_text('{"patient": "me"}')
+    arguments = ["diagnose", recording, "--model", "pendulum_chain", "--suspects", "magic", "--out", "mine"]
+    refused(call, tmp_path, arguments, r"mine: is a folder with other things.*--out.*earlier diagnosis")
+    (tmp_path / "mine" / "diagnosis.json").write_text('{"verdict": "TIE", "recordings": ["monday", "tuesday"]}')
+    _, out, err = call(*arguments)
+    assert "no such effect" in err  # so that nothing is computed here
+    assert "note: replaces the report of monday, tuesday in mine." in out
+    (tmp_path / "mine" / "diagnosis.json").unlink()
+    (tmp_path / "mine" / ".resume").mkdir()
+    assert "no such effect" in call(*arguments)[2]
+
+
+def test_a_calibration_replaces_nothing_but_a_calibration(call, tmp_path):
+    (tmp_path / "article.txt").write_text("The tape is 19 mm wide.")
+    (tmp_path / "mine.toml").write_text('[project]\nname = "mine"\n')
+    arguments = ["calibrate", "paper", "article.txt", "--take", "width=tape is # mm wide", "--out"]
+    refused(call, tmp_path, [*arguments, "mine.toml"], r"mine\.toml: exists, and is not a calibration.*--out")
+    for _ in range(2):
+        assert call(*arguments, "ours.toml")[0] == 0
+
+
 def rows(count=3000, rate=1000.0) -> list[str]:
     t = np.arange(count) / rate
     noise = np.random.default_rng(0).normal(0, 1e-4, (2, count))
