@@ -249,7 +249,7 @@ def _run(args) -> int:
     from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module(args.scene)
-    settings = scene_settings(module, args.calibration).override(args.set)
+    settings = scene_settings(module, args.calibration).override(args.set, "--set")
     if args.settings:
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})
@@ -303,7 +303,7 @@ def _compare(args) -> int:
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
-    settings = scene_settings(module).override(args.set)
+    settings = scene_settings(module).override(args.set, "--set")
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
     check_recorded_scene(recording, args.scene, "origami-sim diagnose --model")
     duration = _duration(args, recording)

@@ -377,4 +377,4 @@ def run(args: argparse.Namespace, say: Callable[[str], None] = print) -> dict:
             raise InputError(
                 "is varied by the study", field="--set", value=name, allowed="settings other than " + ", ".join(VARIED)
             )
-    return study(base.override(args.set), args.out, say=say)
+    return study(base.override(args.set, "--set"), args.out, say=say)

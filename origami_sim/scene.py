@@ -1,5 +1,6 @@
 """Scenes: a device with its calibration, what it computes and the table that it prints."""
 
+import difflib
 import functools
 import importlib
 import os
@@ -88,14 +89,21 @@ class Settings(Mapping[str, Setting]):
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
         return Settings(out, self.file, self.effects)
 
-    def override(self, assignments: Sequence[str]) -> "Settings":
-        """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI."""
+    def override(self, assignments: Sequence[str], source: str | Path | None = None) -> "Settings":
+        """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI.
+
+        Errors name the `source` of the assignments (default: the file of the settings).
+        """
+        if source is not None:
+            changed = Settings(list(self.values()), Path(source), self.effects).override(assignments)
+            return Settings(list(changed.values()), self.file, self.effects)
         values = {}
         for text in assignments:
             name, equals, given = (part.strip() for part in text.partition("="))
             if not equals or name not in self._settings:
+                near = [] if name in self._settings else difflib.get_close_matches(name, self._settings, n=1)
                 raise InputError(
-                    "cannot apply this setting",
+                    "cannot apply this setting" + "".join(f"; '{n}' is near" for n in near),
                     file=self.file,
                     field=name,
                     value=text,
@@ -158,7 +166,7 @@ def read_calibration(source: str | Path) -> Settings:
             parameter that is not in the catalogue.
     """
     path = Path(source)
-    if path.suffix != ".toml":
+    if re.fullmatch(r"\w+", str(source)):
         path = Path(str(resources.files("origami_sim.calibrations") / f"{source}.toml"))
     try:
         data = tomllib.loads(path.read_text())

@@ -530,7 +530,7 @@ def run(args: argparse.Namespace, say: Callable[[str], None] = print) -> dict:
         value = getattr(args, name)
         if value is not None and value < limit:
             raise InputError("is too small", field=f"--{name}", value=value, allowed=f">= {limit}")
-    base = scene_settings(scene_module(args.scene), args.calibration).override(args.set)
+    base = scene_settings(scene_module(args.scene), args.calibration).override(args.set, "--set")
     options = {n: getattr(args, n) for n in (*least, "fine", "device")}
     return study(args.scene, base, args.out, **options, say=say)
 
