@@ -16,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from origami_sim import __version__
 from origami_sim.errors import InputError
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
@@ -67,6 +68,7 @@ how well settings are known, so that refitting them is no free lunch: --prior, e
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="origami-sim", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, action: Callable, summary: str, example: str) -> argparse.ArgumentParser:

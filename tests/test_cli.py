@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import cli, scene
+from origami_sim import __version__, cli, scene
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
 from origami_sim.recording import stand_in_double_pendulum
@@ -64,6 +64,12 @@ def test_help_lists_commands_and_exit_codes(call):
     assert code == 0
     assert all(c in out for c in COMMANDS)
     assert "Exit codes" in out
+
+
+def test_the_module_is_the_command_and_says_its_version(tmp_path):
+    command = [sys.executable, "-m", "origami_sim", "--version"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (said.returncode, said.stdout) == (0, f"origami-sim {__version__}\n")
 
 
 def test_run_box_prints_its_table_and_leaves_a_run(call, tmp_path):
