@@ -5,6 +5,7 @@ went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier res
 """
 
 import argparse
+import functools
 import json
 import math
 import os
@@ -15,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from origami_sim import __version__
 from origami_sim.errors import InputError
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
@@ -23,7 +25,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.solve.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
-STAND_IN_SECONDS = 20.0
+STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
 
 
 class _Parser(argparse.ArgumentParser):
@@ -66,6 +68,7 @@ how well settings are known, so that refitting them is no free lunch: --prior, e
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="origami-sim", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, action: Callable, summary: str, example: str) -> argparse.ArgumentParser:
@@ -92,22 +95,22 @@ def _parser() -> argparse.ArgumentParser:
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
     p.add_argument("run", help="run folder or .rrd file")
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
-    p.add_argument("--time", type=float, help="simulated time of the picture [s]")
+    p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
     p = command(
         "compare",
         _compare,
-        "Compare a recording with a scene",
+        "Compare a recording with the scene pendulum_chain (no other can replicate one; diagnose takes any)",
         "origami-sim compare double.csv --scene pendulum_chain --duration 5",
     )
     p.add_argument("recording", help="CSV or Parquet file")
-    p.add_argument("--scene", required=True, help="scene that models what was recorded")
+    p.add_argument("--scene", required=True, help="scene that models what was recorded: pendulum_chain")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
-    p.add_argument("--duration", type=float, default=5.0, help="seconds compared (default 5)")
+    p.add_argument("--duration", type=float, help="seconds compared (default 5, or what is left of the recording)")
     p.add_argument(
         "--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)"
     )
@@ -145,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
         "Batch studies: stride maps of the crawler, all combinations of the bi-fold",
         "origami-sim study crawler --samples 64; origami-sim study bifold",
     )
-    p.add_argument("rest", nargs=argparse.REMAINDER, help="see origami-sim study crawler --help, ... bifold --help")
+    _studies(p)
 
     from origami_sim.calibrate.command import register
 
@@ -191,6 +194,35 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _studies(parser: argparse.ArgumentParser) -> None:
+    """The studies and their options."""
+    commands = parser.add_subparsers(dest="scene", required=True, metavar="SCENE")
+
+    def command(name: str, summary: str, example: str) -> argparse.ArgumentParser:
+        p = commands.add_parser(name, help=summary, description=summary + ".", epilog=f"example: {example}")
+        p.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print one JSON object")
+        p.add_argument("--out", type=Path, default=Path(f"runs/study_{name}"), help=f"default runs/study_{name}")
+        p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
+        p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+        return p
+
+    summary = "Stride maps over the crawler's unknowns, and a set that is steady, converged and robust"
+    p = command("crawler", summary, "origami-sim study crawler --samples 64 --set cell=3.8mm")
+    p.add_argument("--cycles", type=int, default=6, help="cycles of the field (default 6); the second half counts")
+    p.add_argument("--fine", action="store_true", help="twice as many values on each axis")
+    p.add_argument(
+        "--samples", type=int, default=64, help="points over all unknowns at once (default 64; 0: only maps)"
+    )
+    p.add_argument("--seed", type=int, default=0, help="of the samples (default 0)")
+    p.add_argument("--screened", type=int, default=6, help="points to screen, of maps and samples each (default 6)")
+    p.add_argument("--tried", type=int, default=2, help="points to try in full (default 2)")
+    p.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+    p.add_argument("--threads", type=int, help="CPU threads (default: all cores)")
+
+    summary = "Mass, energy and fold angle of all combinations of the bi-fold (Tables 5 and 6 of the seed paper)"
+    command("bifold", summary, "origami-sim study bifold --set section=plate")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with its code."""
     args = _parser().parse_args(arguments)
@@ -219,7 +251,7 @@ def _run(args) -> int:
     from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module(args.scene)
-    settings = scene_settings(module, args.calibration).override(args.set)
+    settings = scene_settings(module, args.calibration).override(args.set, "--set")
     if args.settings:
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})
@@ -250,6 +282,8 @@ def _replay(args) -> int:
         if args.json:
             _print_json({"picture": str(args.screenshot) if taken else None})
         return OK if taken else NO
+    if args.time is not None:
+        raise InputError("is the time of a picture", field="--time", value=args.time, allowed="with --screenshot PNG")
     viewer = open_replay(path)
     if args.json:
         _print_json({"replay": str(path), "viewer_process": viewer.pid})
@@ -260,7 +294,7 @@ def _compare(args) -> int:
     from origami_sim.compare import plot_overlay
     from origami_sim.recording import read_recording
     from origami_sim.results import check_writable
-    from origami_sim.scene import scene_module, scene_settings
+    from origami_sim.scene import check_recorded_scene, scene_module, scene_settings
 
     module = scene_module(args.scene)
     if not hasattr(module, "replicate"):
@@ -268,13 +302,16 @@ def _compare(args) -> int:
             "this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain"
         )
     for name in ("duration", "threshold"):
-        if not getattr(args, name) > 0:
-            raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed="> 0")
-    settings = scene_settings(module).override(args.set)
+        value = getattr(args, name)
+        if value is not None and not value > 0:
+            raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
+    settings = scene_settings(module).override(args.set, "--set")
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+    check_recorded_scene(recording, args.scene, "origami-sim diagnose --model")
+    duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")
     check_writable(folder)
-    comparison, motion, used, part = _replicate(module, settings, recording, args.start, args.duration, args.threshold)
+    comparison, motion, used, part = _replicate(module, settings, recording, args.start, duration, args.threshold)
     _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
     plot_overlay(comparison, folder / "overlay.png")
     if args.json:
@@ -282,6 +319,8 @@ def _compare(args) -> int:
     else:
         for note in recording.metadata.get("notes", ()):
             print(f"note: {note}")
+        first, last = (comparison.instant(float(part.times[k])) for k in (0, -1))
+        print(f"compared from {first} to {last}: {len(part.times)} of {len(recording.times)} frames")
         print(comparison.table())
         print(comparison.sentence())
         print(f"run folder: {folder}")
@@ -301,9 +340,11 @@ def _calibrate(args) -> int:
 
 
 def _study(args) -> int:
-    from origami_sim import study
-
-    return study.main(args.rest)
+    module = import_module("origami_sim.study" if args.scene == "crawler" else "origami_sim.parameter_study")
+    report = module.run(args, functools.partial(print, file=sys.stderr if args.json else sys.stdout))
+    if args.json:
+        _print_json(report)
+    return NO if any(s["failures"] for s in report.get("sets", {}).values()) else OK
 
 
 def _prove(args) -> int:
@@ -393,7 +434,7 @@ def _demo(args) -> int:
         source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
     say(f"{note}: {source.name}")
     recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, 5.0, 5.0)
+    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
     _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
     worst = max(worst, _soundness(motion))
     say(comparison.table())
@@ -479,8 +520,27 @@ def _shipped_sidecar(name: str) -> Path:
 
 def _sidecar(recording: Path) -> Path | None:
     """The shipped sidecar of a known recording, unless one lies beside the file."""
-    shipped = _shipped_sidecar(f"{recording.parent.name}_{recording.stem}")
+    shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
     return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
+
+
+def _duration(args, recording: "Recording") -> float:
+    """Seconds to compare; InputError where the recording has none from --start on, or fewer than asked for."""
+    length = float(recording.times[-1] - recording.times[0])
+    left = length - args.start
+    if not 0 <= args.start <= length:
+        raise InputError(
+            "is outside of the recording",
+            file=args.recording, field="--start", value=args.start, allowed=f"0 to {length:g} s",
+        )  # fmt: skip
+    if args.duration is None:
+        return min(COMPARED_SECONDS, left)
+    if args.duration > left + length / max(len(recording.times) - 1, 1):  # the last frame may be counted as lasting
+        raise InputError(
+            "is longer than the recording",
+            file=args.recording, field="--duration", value=args.duration, allowed=f"up to {left:g} s",
+        )  # fmt: skip
+    return args.duration
 
 
 def _replicate(module, settings, recording: "Recording", start: float, duration: float, threshold: float):

@@ -15,7 +15,6 @@ import argparse
 import itertools
 import json
 import os
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -366,26 +365,16 @@ def study(base: Settings, out: Path, *, say: Callable[[str], None] = print) -> d
     return report
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog="origami-sim study bifold", description="Tables 5 and 6 of the seed paper: mass, energy and fold angle.",
-        epilog="example: origami-sim study bifold --out runs/study_bifold --set section=plate",
-    )  # fmt: skip
-    parser.add_argument("--out", type=Path, default=Path("runs/study_bifold"), help="folder for tables and figure")
-    parser.add_argument("--calibration", help="a TOML file (default: the scene's own)")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
-    a = parser.parse_args(arguments)
-    try:
-        base = scene_settings(scene_module("bifold"), a.calibration)
-        for name in (text.partition("=")[0].strip() for text in a.set):
-            if name in VARIED:
-                raise InputError(
-                    "is varied by the study", field="--set", value=name, allowed="settings other than "
-                    + ", ".join(VARIED),
-                )  # fmt: skip
-        base = base.override(a.set)
-        report = study(base, a.out)
-    except InputError as e:
-        print(e, file=sys.stderr)
-        return 2
-    return 1 if any(s["failures"] for s in report["sets"].values()) else 0
+def run(args: argparse.Namespace, say: Callable[[str], None] = print) -> dict:
+    """The command `origami-sim study bifold`; its report.
+
+    Raises:
+        InputError: a setting that the study itself varies; what the calibration refuses.
+    """
+    base = scene_settings(scene_module("bifold"), args.calibration)
+    for name in (text.partition("=")[0].strip() for text in args.set):
+        if name in VARIED:
+            raise InputError(
+                "is varied by the study", field="--set", value=name, allowed="settings other than " + ", ".join(VARIED)
+            )
+    return study(base.override(args.set, "--set"), args.out, say=say)

@@ -149,9 +149,12 @@ def open_replay(path: str | Path) -> subprocess.Popen:
     """Opens a replay in the viewer, in a process of its own that outlives this one.
 
     Raises:
-        InputError: no such file, or the viewer is not installed.
+        InputError: no such file, no display to show it on, or the viewer is not installed.
     """
-    return subprocess.Popen([_viewer(), str(_existing(path)), "--bind", "127.0.0.1"], start_new_session=True)
+    file = _existing(path)
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("there is no display to open the viewer on", file=file, allowed="--screenshot PNG, a picture")
+    return subprocess.Popen([_viewer(), str(file), "--bind", "127.0.0.1"], start_new_session=True)
 
 
 def screenshot(
@@ -182,7 +185,8 @@ def screenshot(
         Whether there is a picture.
 
     Raises:
-        InputError: no such replay, not a replay, a picture that cannot be written, a size below 320 x 200.
+        InputError: no such replay, not a replay, a time outside of it, a picture that cannot be written, a size below
+            320 x 200.
     """
     source, target = _existing(path_rrd), Path(path_png).expanduser().absolute()
     if width < 320 or height < 200:
@@ -191,6 +195,9 @@ def screenshot(
         raise InputError("cannot be written", file=target, allowed="a file in an existing folder")
     if time is None:
         time = _most_folded(source)
+    elif (span := _span(source)) and not span[0] <= time <= 1.00001 * span[1]:  # as rounded below
+        allowed = f"{span[0]:g} to {span[1]:g} s"
+        raise InputError("is outside of the recording", file=source, field="time", value=time, allowed=allowed)
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"
         why = _photograph(source, picture, time, width, height, timeout)
@@ -330,6 +337,16 @@ def _most_folded(source: Path) -> float:
         return float(times[np.argmax(total)])
     except (ValueError, RuntimeError) as e:
         raise InputError(f"is damaged ({e})", file=source) from None
+
+
+def _span(source: Path) -> tuple[float, float] | None:
+    """First and last time of a replay [s]; None if nothing in it has a time."""
+    try:
+        batches = [chunk.to_record_batch() for chunk in RrdReader(source).stream()]
+    except (ValueError, RuntimeError) as e:
+        raise InputError(f"is damaged ({e})", file=source) from None
+    times = [b[TIMELINE].cast("int64").to_numpy() * 1e-9 for b in batches if TIMELINE in b.schema.names]
+    return (min(t.min() for t in times), max(t.max() for t in times)) if times else None
 
 
 def read_series(path: str | Path) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:

@@ -113,7 +113,7 @@ def save_run(
     """
     target = Path(path).expanduser().absolute()
     settings = dict(settings or {})
-    manifest = _manifest(trajectory, scene, settings)
+    manifest = _manifest(trajectory, scene, settings) | {"tables": sorted(tables or {})}
     sheets = {name: _table(name, columns, units or {}) for name, columns in (tables or {}).items()}
     text = _json(manifest, target / MANIFEST)
     with _writing(target):
@@ -169,7 +169,7 @@ def load_run(path: str | Path) -> Run:
     manifest = _read_manifest(folder / MANIFEST)
     trajectory = _read_states(folder / STATES, manifest)
     tables, units = {}, {}
-    for file in sorted((folder / TABLES).glob("*.parquet")):
+    for file in _table_files(folder, manifest):
         try:
             sheet = pq.read_table(file)
         except (OSError, pa.ArrowException) as e:
@@ -361,12 +361,30 @@ def _writing(target: Path) -> Iterator[None]:
 def _check_target(target: Path):
     if target.exists() and not target.is_dir():
         raise InputError("is a file; a run is a folder", file=target, allowed="a new folder, or an earlier run")
-    if target.is_dir() and any(target.iterdir()) and not (target / MANIFEST).is_file():
+    if target.is_dir() and any(target.iterdir()) and _earlier(target) is None:
         raise InputError(
             "is a folder with other things in it, not a run",
             file=target,
             allowed="a new or empty folder, or an earlier run",
         )
+
+
+def _earlier(folder: Path) -> dict[str, Any] | None:
+    """The manifest of a run, however old or damaged the rest of it is; None if it is that of something else."""
+    try:
+        found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    ours = isinstance(found, dict) and isinstance(found.get("format"), int) and isinstance(found.get("scene"), str)
+    return found if ours else None
+
+
+def _table_files(folder: Path, manifest: dict[str, Any]) -> list[Path]:
+    """Those that the manifest lists; of a run from before it did, every Parquet file."""
+    names = manifest.get("tables")
+    if not isinstance(names, list):
+        return sorted((folder / TABLES).glob("*.parquet"))
+    return [folder / TABLES / f"{name}.parquet" for name in names]
 
 
 def _previous(target: Path) -> Path:
@@ -384,9 +402,15 @@ def _exchange(work: Path, target: Path):
     looks next puts the earlier one back."""
     previous = _previous(target)
     if target.is_dir():
-        for extra in target.iterdir():
-            if extra.name not in (MANIFEST, STATES, TABLES, REPLAY):
-                (shutil.copytree if extra.is_dir() else shutil.copy2)(extra, work / extra.name)
+        ours = {target / n for n in (MANIFEST, STATES, REPLAY)} | set(_table_files(target, _earlier(target) or {}))
+
+        def left_out(folder: str, names: list[str]) -> list[str]:
+            here, new = Path(folder), work / Path(folder).relative_to(target)
+            return [n for n in names if here / n in ours or (new / n).is_file()]
+
+        shutil.copytree(target, work, ignore=left_out, symlinks=True, dirs_exist_ok=True)
+        with suppress(OSError):  # no table, and nothing of others
+            (work / TABLES).rmdir()
         shutil.rmtree(previous, ignore_errors=True)
         os.replace(target, previous)
     try:

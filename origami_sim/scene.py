@@ -1,11 +1,12 @@
 """Scenes: a device with its calibration, what it computes and the table that it prints."""
 
+import difflib
 import functools
 import importlib
 import os
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -23,11 +24,16 @@ from origami_sim.solve.statics import equilibrium
 
 if TYPE_CHECKING:
     from origami_sim.diagnose.patch import Addition
+    from origami_sim.recording import Recording
 
 NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
 
 _KEYS = {"value", "unit", "range", "choices", "source", "meaning", "uncertainty"}
+_BESIDE_STATICS = {
+    "mode", "frequency", "loss_time", "decay_rate", "membrane_damping", "cells", "hinges", "motion_cells",
+    "motion_hinges", "twist",
+}  # fmt: skip
 _FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
 
 
@@ -83,14 +89,21 @@ class Settings(Mapping[str, Setting]):
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
         return Settings(out, self.file, self.effects)
 
-    def override(self, assignments: Sequence[str]) -> "Settings":
-        """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI."""
+    def override(self, assignments: Sequence[str], source: str | Path | None = None) -> "Settings":
+        """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI.
+
+        Errors name the `source` of the assignments (default: the file of the settings).
+        """
+        if source is not None:
+            changed = Settings(list(self.values()), Path(source), self.effects).override(assignments)
+            return Settings(list(changed.values()), self.file, self.effects)
         values = {}
         for text in assignments:
             name, equals, given = (part.strip() for part in text.partition("="))
             if not equals or name not in self._settings:
+                near = [] if name in self._settings else difflib.get_close_matches(name, self._settings, n=1)
                 raise InputError(
-                    "cannot apply this setting",
+                    "cannot apply this setting" + "".join(f"; '{n}' is near" for n in near),
                     file=self.file,
                     field=name,
                     value=text,
@@ -153,7 +166,7 @@ def read_calibration(source: str | Path) -> Settings:
             parameter that is not in the catalogue.
     """
     path = Path(source)
-    if path.suffix != ".toml":
+    if re.fullmatch(r"\w+", str(source)):
         path = Path(str(resources.files("origami_sim.calibrations") / f"{source}.toml"))
     try:
         data = tomllib.loads(path.read_text())
@@ -200,6 +213,18 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
     return given
+
+
+def is_reference(s: Settings, calibration: str, besides: Collection[str] = ()) -> bool:
+    """Whether a reference solution for a shipped calibration is one for these settings.
+
+    It is if no effect was added and all values are those of the calibration, `besides` some and those that decide only
+    the motion and the mesh.
+    """
+    own = read_calibration(calibration)
+    return not s.effects and all(
+        s[n].value == own[n].value for n in own if n not in _BESIDE_STATICS and n not in besides
+    )
 
 
 def _setting(name: str, table: object, path: Path) -> Setting:
@@ -302,6 +327,19 @@ def scene_module(name: str) -> ModuleType:
     if not hasattr(module.build, "__wrapped__"):
         setattr(module, "build", _extended(module.build))  # noqa: B010  a module has no declared attributes
     return module
+
+
+def check_recorded_scene(recording: "Recording", scene: str, option: str) -> None:
+    """Refuses a recording of which the sidecar says that it is of another scene; `option` would take that one."""
+    stated = (recording.metadata.get("scene") or {}).get("name")
+    if stated is not None and stated != scene:
+        raise InputError(
+            "the recording is of another scene",
+            file=recording.metadata.get("sidecar"),
+            field="scene.name",
+            value=stated,
+            allowed=f"{option} {stated}, or a sidecar for {scene}",
+        )
 
 
 def _extended(build: Callable) -> Callable:

@@ -28,7 +28,7 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.regression import strides
-from origami_sim.scene import Settings, read_calibration, scene_module
+from origami_sim.scene import Settings, scene_module, scene_settings
 from origami_sim.solve.batch import default_threads
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
@@ -519,44 +519,23 @@ def study(
     return report
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    if given[:1] == ["bifold"]:
-        from origami_sim import parameter_study
+def run(args: argparse.Namespace, say: Callable[[str], None] = print) -> dict:
+    """The command `origami-sim study crawler`; its report.
 
-        return parameter_study.main(given[1:])
-    parser = argparse.ArgumentParser(
-        prog="origami-sim study", description="Batch study over a scene's unknowns: stride maps and a robust set.",
-        epilog="example: origami-sim study crawler --out runs/study_crawler --set cell=3.8mm",
-    )  # fmt: skip
-    parser.add_argument("scene", choices=("crawler", "bifold"), help="bifold --help lists its own options")
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/study_crawler"), help="folder for results, maps and report"
-    )
-    parser.add_argument("--calibration", default="crawler", help="a TOML file, or the name of a shipped one")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
-    parser.add_argument("--cycles", type=int, default=6, help="cycles of the field; the second half counts")
-    parser.add_argument("--fine", action="store_true", help="twice as many values on each axis")
-    parser.add_argument("--samples", type=int, default=64, help="points sampled over all unknowns at once")
-    parser.add_argument("--seed", type=int, default=0, help="of the samples")
-    parser.add_argument(
-        "--screened", type=int, default=6, help="points to screen, from the maps and from the samples each"
-    )
-    parser.add_argument("--tried", type=int, default=2, help="points to try in full")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda:0")
-    parser.add_argument("--threads", type=int, help="CPU threads (default: all cores)")
-    a = parser.parse_args(arguments)
-    try:
-        if a.cycles < 4:
-            raise InputError("too few cycles for a steady gait", field="cycles", value=a.cycles, allowed=">= 4")
-        base = read_calibration(a.calibration).override(a.set)
-        study(a.scene, base, a.out, cycles=a.cycles, fine=a.fine, samples=a.samples, seed=a.seed, screened=a.screened,
-              tried=a.tried, device=a.device, threads=a.threads)  # fmt: skip
-    except InputError as e:
-        print(e, file=sys.stderr)
-        return 2
-    return 0
+    Raises:
+        InputError: counts that make no sense, before anything is computed; what the calibration refuses.
+    """
+    least = {"cycles": 4, "samples": 0, "seed": 0, "screened": 0, "tried": 0, "threads": 1}
+    for name, limit in least.items():
+        value = getattr(args, name)
+        if value is not None and value < limit:
+            raise InputError("is too small", field=f"--{name}", value=value, allowed=f">= {limit}")
+    base = scene_settings(scene_module(args.scene), args.calibration).override(args.set, "--set")
+    options = {n: getattr(args, n) for n in (*least, "fine", "device")}
+    return study(args.scene, base, args.out, **options, say=say)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from origami_sim.cli import main
+
+    main(["study", *sys.argv[1:]])

@@ -27,7 +27,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import equilibrium
 
@@ -305,16 +305,18 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     folds = np.degrees(fold_angles(model, motion.x[:, :, 0]))
     at = {"voltage": SCHEDULE[2], "field": SCHEDULE[5], "both": SCHEDULE[-1]}
     ends = {name: folds[int(np.argmin(np.abs(motion.times - t)))] for name, t in at.items()}
+    magnetic_table = {"field_mT": FIELDS * 1e3, "angle_deg": np.degrees(angles)}
+    electric = {"underlayer_MPa": MODULI / 1e6, "held_deg": np.array(held), "sliding_deg": np.array(sliding)}
+    free = {"support", "field", "voltage"}
+    if is_reference(s, CALIBRATION, besides=free):
+        magnetic_table["reference_deg"] = REFERENCE
+    if is_reference(s, CALIBRATION, besides={*free, "underlayer_modulus", *ELECTRIC}):
+        electric["expected_deg"] = REFERENCE_ELECTRIC
     return Outcome(
         motion,
         {
-            "fold_angle": {"field_mT": FIELDS * 1e3, "angle_deg": np.degrees(angles), "reference_deg": REFERENCE},
-            "electric": {
-                "underlayer_MPa": MODULI / 1e6,
-                "held_deg": np.array(held),
-                "sliding_deg": np.array(sliding),
-                "expected_deg": REFERENCE_ELECTRIC,
-            },
+            "fold_angle": {**magnetic_table},
+            "electric": {**electric},
             "both_folds": {
                 "drive": list(ends),
                 "about_x_deg": np.array([e[0] for e in ends.values()]),

@@ -13,7 +13,7 @@ from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow, read_calibration
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, read_calibration
 from origami_sim.solve.dynamics import simulate
 
 CALIBRATION = "box"
@@ -127,25 +127,21 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     model, parameters, signals = build(s)
     motion = simulate(model, parameters, signals, duration=3.0, rate=60, progress=progress)
     final = np.degrees(inclination(motion.x[-1, :, 0], pattern(s).faces))
-    table = {
-        "field_mT": FIELDS * 1e3,
-        "flap_deg": statics.mean(1),
-        "reference_deg": REFERENCE,
-        "difference_deg": statics.mean(1) - REFERENCE,
-        "spread_deg": np.ptp(statics, axis=1),
-    }
+    table, numbers = {"field_mT": FIELDS * 1e3, "flap_deg": statics.mean(1)}, {"flap_deg": float(final.mean())}
+    if is_reference(s, CALIBRATION, besides={"field"}):
+        difference = statics.mean(1) - REFERENCE
+        table |= {"reference_deg": REFERENCE, "difference_deg": difference}
+        numbers["largest_difference_deg"] = float(np.abs(difference).max())
+    table["spread_deg"] = np.ptp(statics, axis=1)
     return Outcome(
         motion,
-        {"flap_angle": table},
+        {"flap_angle": {**table}},
         summary=[
             *notes,
             f"dynamics end at {final.mean():.2f} deg, driven to {s.field * 1e3:.0f} mT "
             f"(four flaps within {np.ptp(final):.2g} deg)",
         ],
-        numbers={
-            "flap_deg": float(final.mean()),
-            "largest_difference_deg": float(np.abs(table["difference_deg"]).max()),
-        },
+        numbers=numbers,
     )
 
 

@@ -31,7 +31,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
 from origami_sim.solve.dynamics import simulate
 
 CALIBRATION = "de_bender"
@@ -315,11 +315,12 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         "constant_t_per_m": thick["curvature_per_m"],
         "excess_percent": 100 * (thin["curvature_per_m"] / thick["curvature_per_m"] - 1),
     }
-    if (s.tape_layers, True) in REFERENCE and s.voltage == VOLTAGES[-1]:
+    free = {"tape_layers", "electrode_width", "orientation", "gravity", "thinning"}
+    if (s.tape_layers, True) in REFERENCE and is_reference(s, CALIBRATION, besides=free):
         section_table["reference_thinning_per_m"] = REFERENCE[s.tape_layers, True]
         section_table["reference_constant_t_per_m"] = REFERENCE[s.tape_layers, False]
     known = REFERENCE_TIP.get(s.tape_layers)
-    if known is not None and s.thinning and s.orientation == "weightless" and s.voltage == VOLTAGES[-1]:
+    if known is not None and is_reference(s, CALIBRATION, besides={"tape_layers", "gravity"}):
         table["reference_r_over_l"] = known
     model, parameters, signals = build(s, hinges=s.motion_hinges)
     motion = simulate(model, parameters, signals, duration=2.0, rate=60, progress=progress)

@@ -15,7 +15,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Outcome, Progress, Settings, read_calibration
+from origami_sim.scene import Outcome, Progress, Settings, is_reference, read_calibration
 from origami_sim.solve.dynamics import simulate
 
 from .de_bender import Segment, chain, exponent, inclinations, settle
@@ -124,7 +124,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """Angles by statics, and the motion for the replay."""
     voltages = s.voltage * VOLTAGES / VOLTAGES[-1]
     table, notes = fold(s, voltages)
-    if s.voltage == VOLTAGES[-1] and s.orientation == "weightless" and s.notch_law == "plane_section":
+    if is_reference(s, CALIBRATION, besides={"gravity"}):
         table |= {f"reference_{k}": v for k, v in REFERENCE.items()}
     power = exponent(voltages, table["notch_deg"])
     model, parameters, signals = build(s, hinges=s.motion_hinges)

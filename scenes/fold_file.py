@@ -14,6 +14,7 @@ from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern, read_pattern
+from origami_sim.pattern.mesh import FORMATS as MESHES
 from origami_sim.scene import Outcome, Progress, Settings
 from origami_sim.solve.dynamics import simulate
 
@@ -21,10 +22,18 @@ CALIBRATION = "fold_file"
 
 
 def load(s: Settings) -> Pattern:
-    """The pattern: a path, or a file that ships with the scenes."""
+    """The pattern: a path, or a file that ships with the scenes; InputError for a mesh, which nothing folds."""
     path = Path(s.pattern)
     shipped = Path(str(resources.files("origami_sim.scenes") / s.pattern))
-    return read_pattern(shipped if not path.exists() and shipped.exists() else path)
+    pattern = read_pattern(shipped if not path.exists() and shipped.exists() else path)
+    if path.suffix.lower() in MESHES:
+        raise InputError(
+            "a mesh has a shape, but no fold to go to",
+            file=s.pattern,
+            allowed="FOLD with edges_foldAngle, or SVG as for Origami Simulator; in Python, Sheet(read_mesh(file)) "
+            "keeps the shape",
+        )
+    return pattern
 
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive, np.ndarray]:

@@ -17,7 +17,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
 from origami_sim.solve.dynamics import simulate
 
 CALIBRATION = "folding_strip"
@@ -114,7 +114,7 @@ def table(s: Settings) -> tuple[dict[str, np.ndarray], list[str]]:
     mean, end = folds.mean(axis=1), folds[:, [0, -1]].mean(axis=1)
     inner = folds[:, 1:-1].mean(axis=1) if count(s) > 2 else end
     out = {"field_mT": fields * 1e3, "end_deg": end, "inner_deg": inner, "ratio": end / inner, "mean_deg": mean}
-    if count(s) == 4 and abs(abs(s.field) - REFERENCE_FIELD) < 1e-12:
+    if abs(abs(s.field) - REFERENCE_FIELD) < 1e-12 and is_reference(s, CALIBRATION, besides={"field"}):
         out |= {"reference_end_deg": REFERENCE["end_deg"], "reference_inner_deg": REFERENCE["inner_deg"]}
     return out, notes
 

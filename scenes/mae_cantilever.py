@@ -114,7 +114,7 @@ def mesh_study(s: Settings, meshes: Sequence[int] = MESHES) -> dict[str, np.ndar
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """Shape against field and mesh by statics, and the motion for the replay."""
     table, notes = bend(s, s.field * SHARES)
-    plain = not s.gravity and not s.misalignment
+    plain = not s.gravity and not s.misalignment and not s.effects
     table["load"] = np.array([magnetic_load(s, abs(b)) for b in s.field * SHARES])
     if plain and abs(table["load"][-1] / REFERENCE_LOAD - 1) < 1e-3:
         table["reference"] = REFERENCE

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import cli, scene
+from origami_sim import __version__, cli, scene
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
 from origami_sim.recording import stand_in_double_pendulum
@@ -21,7 +21,7 @@ from origami_sim.scene import read_calibration, scene_module
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 
-COMMANDS = ("run", "replay", "compare", "effects", "stride", "demo")
+COMMANDS = ("run", "replay", "compare", "diagnose", "study", "calibrate", "prove", "effects", "stride", "demo")
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
 
@@ -64,6 +64,12 @@ def test_help_lists_commands_and_exit_codes(call):
     assert code == 0
     assert all(c in out for c in COMMANDS)
     assert "Exit codes" in out
+
+
+def test_the_module_is_the_command_and_says_its_version(tmp_path):
+    command = [sys.executable, "-m", "origami_sim", "--version"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (said.returncode, said.stdout) == (0, f"origami-sim {__version__}\n")
 
 
 def test_run_box_prints_its_table_and_leaves_a_run(call, tmp_path):
@@ -141,9 +147,26 @@ def test_compare_with_a_stand_in_recording(call, tmp_path):
     assert set(json.loads(out)["channels"]) == {"theta1", "theta2"}
 
 
+def test_compare_finds_the_shipped_sidecar_from_within_the_folder(call, tmp_path, monkeypatch):
+    (tmp_path / "pendulum_chain").mkdir()
+    stand_in_double_pendulum(tmp_path / "pendulum_chain" / "double.csv", duration=0.5)
+    monkeypatch.chdir(tmp_path / "pendulum_chain")
+    code, _, err = call("compare", "double.csv", "--scene", "pendulum_chain", "--duration", 0.2)
+    assert (code, err) == (0, "")
+
+
+@pytest.mark.parametrize("words", [("--json", "paper"), ("paper", "--json")])
+def test_calibrate_takes_json_on_either_side(call, tmp_path, words):
+    (tmp_path / "article.txt").write_text("The tape is 19 mm wide.")
+    code, out, _ = call("calibrate", *words, "article.txt", "--take", "width=tape is # mm wide")
+    assert code == 0
+    assert json.loads(out)["values"]["width"]["value"] == pytest.approx(0.019)
+
+
 def test_screenshot_of_a_run(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     code, _, err = call("replay", "here", "--screenshot", "picture.png", "--json")
+    refused(call, tmp_path, ["replay", "here", "--time", "0.01"], r"'--time', value 0\.01.*with --screenshot")
     if code == 1:
         pytest.skip(err.strip() or "no renderer here")
     assert code == 0
@@ -255,8 +278,10 @@ def refused(call, tmp_path, arguments, words):
         (["run"], r"required: scene"),
         (["run", "box", "--colour", "red"], r"unrecognized arguments: --colour red"),
         (["run", "castle"], r"no such scene.*castle.*bifold, box, crawler"),
-        (["run", "box", "--set", "gapp=1mm"], r"box\.toml: cannot apply this setting.*gapp.*gap"),
-        (["run", "box", "--set", "gap=1m"], r"out of its range.*'gap'.*0\.001 to 0\.006 m"),
+        (["run", "box", "--set", "gapp=1mm"], r"--set: cannot apply this setting; 'gap' is near.*gapp.*gap"),
+        (["run", "box", "--set", "gp=2mm"], r"--set: cannot apply this setting; 'gap' is near"),
+        (["run", "box", "--calibration", "."], r"origami-sim: \.: cannot be read \(Is a directory\)"),
+        (["run", "box", "--set", "gap=1m"], r"--set: out of its range.*'gap'.*0\.001 to 0\.006 m"),
         (["run", "box", "--set", "gap=1V"], r"wrong unit.*'gap'.*'V'.*m, cm, mm"),
         (["run", "box", "--set", "thickness=-1mm"], r"out of its range.*thickness"),
         (["run", "fold_file", "--set", "material=steel"], r"not one of the choices.*steel.*pdms"),
@@ -268,6 +293,11 @@ def refused(call, tmp_path, arguments, words):
         (["replay", "nowhere"], r"nowhere: there is no such replay"),
         (["stride", "box"], r"does not walk.*box.*crawler"),
         (["stride", "--cycles", "0"], r"whole cycles.*--cycles.*0"),
+        (["study", "nope"], r"invalid choice: 'nope'.*crawler.*bifold"),
+        (["study", "crawler", "--samples", "-3"], r"too small.*--samples.*-3.*>= 0"),
+        (["study", "--json", "crawler", "--cycles", "3"], r"too small.*--cycles.*>= 4"),
+        (["study", "crawler", "--json", "--calibration", "box"], r"box\.toml: .*lacks a setting"),
+        (["study", "bifold", "--json", "--set", "voltage=1kV"], r"varied by the study.*voltage"),
         (["compare", "none.csv", "--scene", "pendulum_chain"], r"none\.csv.*cannot be read"),
         (["compare", "none.csv", "--scene", "box"], r"cannot replicate.*box.*pendulum_chain"),
         (["compare", "none.csv", "--scene", "pendulum_chain", "--duration", "0"], r"must be positive.*--duration"),
@@ -331,6 +361,31 @@ def test_output_folders_that_cannot_be_written(call, tmp_path, monkeypatch):
     refused(call, tmp_path, ["demo", "--out", "file"], r"cannot be written")
 
 
+def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
+    (tmp_path / "stand_in.toml").write_text(SIDECAR.read_text())
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "diagnosis.json").write_text('{"patient": "me"}')
+    arguments = ["diagnose", recording, "--model", "pendulum_chain", "--suspects", "magic", "--out", "mine"]
+    refused(call, tmp_path, arguments, r"mine: is a folder with other things.*--out.*earlier diagnosis")
+    (tmp_path / "mine" / "diagnosis.json").write_text('{"verdict": "TIE", "recordings": ["monday", "tuesday"]}')
+    _, out, err = call(*arguments)
+    assert "no such effect" in err  # so that nothing is computed here
+    assert "note: replaces the report of monday, tuesday in mine." in out
+    (tmp_path / "mine" / "diagnosis.json").unlink()
+    (tmp_path / "mine" / ".resume").mkdir()
+    assert "no such effect" in call(*arguments)[2]
+
+
+def test_a_calibration_replaces_nothing_but_a_calibration(call, tmp_path):
+    (tmp_path / "article.txt").write_text("The tape is 19 mm wide.")
+    (tmp_path / "mine.toml").write_text('[project]\nname = "mine"\n')
+    arguments = ["calibrate", "paper", "article.txt", "--take", "width=tape is # mm wide", "--out"]
+    refused(call, tmp_path, [*arguments, "mine.toml"], r"mine\.toml: exists, and is not a calibration.*--out")
+    for _ in range(2):
+        assert call(*arguments, "ours.toml")[0] == 0
+
+
 def rows(count=3000, rate=1000.0) -> list[str]:
     t = np.arange(count) / rate
     noise = np.random.default_rng(0).normal(0, 1e-4, (2, count))
@@ -364,6 +419,18 @@ def test_a_window_outside_the_recording(call, tmp_path):
     arguments = ["compare", recording, "--scene", "pendulum_chain", "--sidecar", SIDECAR]
     refused(call, tmp_path, [*arguments, "--start", "9"], r"window|frames|recording")
     refused(call, tmp_path, [*arguments, "--start", "nan"], r"window|frames|recording")
+    refused(call, tmp_path, [*arguments, "--start", "-1"], r"stand_in\.csv: is outside.*--start.*0 to 0\.5 s")
+    refused(call, tmp_path, [*arguments, "--start", "0.2", "--duration", "1e9"], r"--duration.*up to 0\.3 s")
+    code, out, _ = call(*arguments, "--start", "0.4")
+    assert code == 0
+    assert "compared from t = 0.400 s to t = 0.500 s: 101 of 501 frames" in out
+
+
+def test_a_recording_of_another_scene(call, tmp_path):
+    recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
+    (tmp_path / "stand_in.toml").write_text(SIDECAR.read_text().replace('name = "pendulum_chain"', 'name = "box"'))
+    words = r"stand_in\.toml: .*another scene.*'box'.*diagnose --model box"
+    refused(call, tmp_path, ["compare", recording, "--scene", "pendulum_chain"], words)
 
 
 def test_no_pickle_is_opened(call, tmp_path):

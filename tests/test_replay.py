@@ -318,6 +318,20 @@ def test_bad_files_are_named(file, tmp_path):
         screenshot(file, tmp_path / "a.png", width=0)
 
 
+@pytest.mark.parametrize("time", [-1.0, 99.0, float("nan")])
+def test_times_outside_of_the_recording_are_refused(file, tmp_path, time):
+    with pytest.raises(InputError, match=r"swing\.rrd: is outside of the recording.*allowed: 0 to [\d.]+ s"):
+        screenshot(file, tmp_path / "a.png", time=time)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a display is always there")
+def test_without_a_display_a_picture_is_suggested(file, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(InputError, match=r"no display.*--screenshot"):
+        open_replay(file)
+
+
 def test_screenshot_without_a_renderer_says_so(file, tmp_path, monkeypatch):
     for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
         monkeypatch.setenv(name, "/nonexistent")

@@ -150,6 +150,29 @@ def test_an_earlier_run_is_replaced_and_notes_in_it_are_kept(copy, trajectory):
     assert [p.name for p in copy.parent.iterdir()] == ["run"]
 
 
+def test_files_of_others_among_the_tables_are_kept_and_are_no_tables(copy, trajectory):
+    (copy / "tables" / "mine").mkdir()
+    for name in ("mine.csv", "mine.parquet", "mine/notes.md"):
+        (copy / "tables" / name).write_text("mine")
+    save_run(copy, trajectory, scene="again", tables={"modes": {"a": [1]}}, replay=False)
+    assert load_run(copy).tables.keys() == {"modes"}
+    left = sorted(p.name for p in (copy / "tables").rglob("*"))
+    assert left == ["mine", "mine.csv", "mine.parquet", "modes.parquet", "notes.md"]
+    edit(copy, tables=...)  # a run from before the manifest listed them
+    (copy / "tables" / "mine.parquet").unlink()
+    assert load_run(copy).tables.keys() == {"modes"}
+
+
+@pytest.mark.parametrize("text", ['{"name": "webext"}', '{"format": 1}', "[]", "{"])
+def test_a_folder_with_a_manifest_of_others_is_left_alone(trajectory, tmp_path, text):
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(InputError, match="not a run"):
+        results.check_writable(tmp_path)
+    with pytest.raises(InputError, match="not a run"):
+        save_run(tmp_path, trajectory, scene="x", replay=False)
+    assert (tmp_path / "manifest.json").read_text() == text
+
+
 @pytest.mark.parametrize("where", ["write_replay", "_exchange"])
 def test_an_earlier_run_survives_a_save_that_fails(copy, trajectory, monkeypatch, where):
     def fail(*_, **__):

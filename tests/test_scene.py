@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim import scene
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration, recordings_folder, scene_module, scene_settings
+from origami_sim.scene import is_reference, read_calibration, recordings_folder, scene_module, scene_settings
 
 CALIBRATIONS = Path(importlib.import_module("origami_sim.calibrations").__path__[0])
 
@@ -155,6 +155,14 @@ def test_a_calibration_must_fit_the_scene(tmp_path):
     own.write_text(text.replace('value = 0.2\nunit = "T"\nrange = [-1.0, 1.0]', 'value = "strong"\nunit = "T"'))
     with pytest.raises(InputError, match=r"wrong kind of value.*field.*strong.*a number"):
         scene_settings(module, own)
+
+
+def test_a_reference_is_of_its_calibration_alone():
+    own = read_calibration("folding_strip")
+    assert is_reference(own, "folding_strip")
+    assert is_reference(own.replace(loss_time=0.001, mode="ramp"), "folding_strip")  # the motion, not where it ends
+    assert not is_reference(own.replace(gap=0.003), "folding_strip")
+    assert is_reference(own.replace(gap=0.003), "folding_strip", besides={"gap"})
 
 
 def test_recordings_are_found_by_the_environment(tmp_path, monkeypatch):

@@ -46,11 +46,12 @@ class _Parser(argparse.ArgumentParser):
 
 def register(parser: argparse.ArgumentParser) -> None:
     """Adds the subcommands and their options to the parser of `origami-sim calibrate`."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of text")
     commands = parser.add_subparsers(dest="calibration", required=True, metavar="HOW", parser_class=type(parser))
 
     def command(name: str, summary: str) -> argparse.ArgumentParser:
         p = commands.add_parser(name, help=summary, description=summary + ".")
-        p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
+        p.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print one JSON object")
         if name != "again":
             p.add_argument("--out", metavar="TOML", help="calibration file to write")
             p.add_argument("--plot", metavar="PNG", help="picture of fit and residual to write")
@@ -277,6 +278,8 @@ def run(args: argparse.Namespace) -> int:
                 print(f"{name}: stored {stored:.6g}, found {found:.6g}")
             print(f"{len(rows) - len(moved)} of {len(rows)} numbers as stored, within {args.tolerance:g}")
         return 1 if moved else 0
+    if args.out:
+        _check_ours(args.out)
     done = calibrate(args)
     if args.plot and done.fit is None:
         raise InputError("there is no fit to draw", field="--plot", value=args.plot)
@@ -292,6 +295,20 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(experiment.summary(done.calibration))
     return 0
+
+
+def _check_ours(path: str) -> None:
+    """Refuses, before anything is computed, to write over a file that is no calibration of this program."""
+    from origami_sim.calibrate.result import read_result
+
+    if Path(path).exists():
+        try:
+            read_result(path)
+        except InputError:
+            raise InputError(
+                "exists, and is not a calibration that this program wrote", file=path, field="--out",
+                allowed="a new file, or an earlier calibration",
+            ) from None  # fmt: skip
 
 
 def again(file: str | Path, tolerance: float = 1e-3) -> list[tuple[str, float, float, bool]]:

@@ -42,6 +42,9 @@ def run(args: Namespace) -> int:
     folder = Path(args.out or "runs/diagnose")
     _check_folder(folder, args.model)
     data = read_recordings(args.recordings, args.sidecar)
+    replaced = _earlier(folder)
+    if replaced and set(replaced) != {r.name for r in data}:
+        say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
     for recording in data:
         say(lint_report(recording))
     for note in data.notes:
@@ -218,7 +221,8 @@ def _options(args: Namespace) -> Options:
 
 
 def _check_folder(folder: Path, model: str) -> None:
-    """Refuses, before anything is computed, a folder that cannot be written, or whose patch is the model itself."""
+    """Refuses, before anything is computed, a folder that cannot be written, or whose patch is the model itself,
+    or that holds other things than a diagnosis."""
     allowed = "a folder that can be written"
     try:
         existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
@@ -233,6 +237,25 @@ def _check_folder(folder: Path, model: str) -> None:
         raise InputError(
             "the model would be overwritten", file=model, field="--out", value=str(folder), allowed="another folder"
         )
+    if _earlier(folder) is None:
+        raise InputError(
+            "is a folder with other things in it, not a diagnosis",
+            file=folder,
+            field="--out",
+            allowed="a new or empty folder, or an earlier diagnosis",
+        )
+
+
+def _earlier(folder: Path) -> list[str] | None:
+    """Recordings of the diagnosis in a folder, none if it is empty or was interrupted; None: things of others."""
+    try:
+        found = json.loads((folder / JSON).read_text())
+    except (OSError, ValueError):
+        found = None
+    if isinstance(found, dict) and "verdict" in found and isinstance(found.get("recordings"), list):
+        return [str(name) for name in found["recordings"]]
+    free = not folder.is_dir() or (folder / RESUME).is_dir() or not any(folder.iterdir())
+    return [] if free else None
 
 
 # output ---------------------------------------------------------------------------------------------------------------

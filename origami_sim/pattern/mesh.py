@@ -37,6 +37,9 @@ def read_mesh(path, *, unit="m") -> Pattern:
     read_bytes(path)
     try:
         mesh = trimesh.load(str(path), file_type=suffix[1:], process=False, force="mesh", skip_materials=True)
+    except ImportError:  # what would guess the encoding of text that is not UTF-8
+        kind = {".stl": "neither binary nor ASCII STL", ".obj": "not text in UTF-8"}[suffix]
+        raise InputError(f"cannot read the mesh: it is {kind}", file=path) from None
     except Exception as error:  # a third-party parser: whatever it trips over is the file's fault
         raise InputError(f"cannot read the mesh ({type(error).__name__}: {str(error)[:120]})", file=path) from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:

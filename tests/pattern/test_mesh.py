@@ -63,3 +63,10 @@ def test_missing_mesh_and_bad_unit(tmp_path):
         read_mesh(tmp_path / "none.obj", unit="furlong")
     with pytest.raises(InputError, match="cannot be triangulated"):
         write_mesh([(0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 3, 0)], [(0, 1, 2, 3)], tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize(("name", "words"), [("a.stl", "neither binary nor ASCII STL"), ("a.obj", "not text in UTF-8")])
+def test_bytes_that_are_no_mesh(tmp_path, name, words):
+    (tmp_path / name).write_bytes(bytes(range(128, 256)) * 4)
+    with pytest.raises(InputError, match=words):
+        read_mesh(tmp_path / name)

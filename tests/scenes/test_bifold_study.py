@@ -6,8 +6,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from origami_sim import cli
 from origami_sim import parameter_study as ps
-from origami_sim import study
 from origami_sim.drive import Drive
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import bifold
@@ -79,6 +79,12 @@ def test_slopes_are_those_of_the_beam(base, side):
         assert ps.slopes(base.replace(electrodes="layer"), side)["t1"] < -0.5
 
 
+def command(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as e:
+        cli.main(["study", *arguments])
+    return e.value.code
+
+
 def test_command_writes_tables_figure_and_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(ps, "WIDTHS", {r: w[1:2] for r, w in ps.WIDTHS.items()})
     monkeypatch.setattr(ps, "THICKNESS", {s: t[1:2] for s, t in ps.THICKNESS.items()})
@@ -86,7 +92,7 @@ def test_command_writes_tables_figure_and_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(ps, "STRENGTH", {s: v[::3] for s, v in ps.STRENGTH.items()})
     monkeypatch.setattr(ps, "EXPECTED_SLOPES", {s: {"strength": v["strength"]} for s, v in ps.EXPECTED_SLOPES.items()})
     monkeypatch.setattr(ps, "corners", lambda electric, magnetic: {"light": (0.5, 0.25)})
-    assert study.main(["bifold", "--out", str(tmp_path), "--set", "cells=1"]) == 0
+    assert command("bifold", "--out", str(tmp_path), "--set", "cells=1") == 0
     table = pq.read_table(tmp_path / "magnetic_physical.parquet")
     assert table.num_rows == 4
     assert table.schema.field("angle").metadata == {b"unit": b"deg"}
@@ -95,16 +101,18 @@ def test_command_writes_tables_figure_and_report(tmp_path, monkeypatch, capsys):
     assert report["slopes"]["electric"]["strength"] == pytest.approx(2, abs=1e-3)
     assert report["sets"]["electric_printed"]["worlds"] == 4
     text = capsys.readouterr().out
+    assert command("--json", "bifold", "--out", str(tmp_path), "--set", "cells=1") == 0
+    assert json.loads(capsys.readouterr().out)["sets"] == report["sets"]
     assert "electric: rank correlation" in text and "0.50 electric, 0.25 magnetic" in text
 
 
 def test_bad_input_is_one_sentence_and_code_2(tmp_path, capsys):
-    assert study.main(["bifold", "--set", "section=beam"]) == 2
+    assert command("bifold", "--set", "section=beam") == 2
     assert "section" in capsys.readouterr().err
-    assert study.main(["bifold", "--set", "voltage=1kV"]) == 2
+    assert command("bifold", "--set", "voltage=1kV") == 2
     assert "varied by the study" in capsys.readouterr().err
     (tmp_path / "file").touch()
-    assert study.main(["bifold", "--out", str(tmp_path / "file" / "below")]) == 2
+    assert command("bifold", "--out", str(tmp_path / "file" / "below")) == 2
     assert "cannot be written" in capsys.readouterr().err
 
 

@@ -88,6 +88,12 @@ def test_the_table_has_the_reference_beside_it(settings):
     np.testing.assert_allclose(outcome.tables["flap_angle"]["reference_deg"], LUMPED)
 
 
+def test_the_reference_is_left_out_where_it_is_of_another_box(settings):
+    outcome = box.run(settings.replace(gap=0.004))
+    assert outcome.tables["flap_angle"].keys() == {"field_mT", "flap_deg", "spread_deg"}
+    assert outcome.numbers.keys() == {"flap_deg"}
+
+
 # --- the crease by finite elements ------------------------------------------------------------------------------------
 
 

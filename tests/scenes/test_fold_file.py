@@ -9,7 +9,7 @@ import pytest
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.pattern import miura
+from origami_sim.pattern import miura, write_mesh
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import fold_file
 from origami_sim.solve.statics import equilibrium
@@ -127,6 +127,15 @@ def test_bad_patterns_are_one_sentence(settings, tmp_path, change, words):
         fold_file.run(settings.replace(pattern=str(path)))
     assert str(path) in str(e.value)
     assert "\n" not in str(e.value)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.005])
+@pytest.mark.parametrize("suffix", [".obj", ".STL"])
+def test_a_mesh_has_no_fold_to_go_to(settings, tmp_path, suffix, height):
+    path = tmp_path / f"square{suffix}"
+    write_mesh([(0, 0, 0), (0.02, 0, 0), (0.02, 0.02, height), (0, 0.02, 0)], [(0, 1, 3), (1, 2, 3)], path)
+    with pytest.raises(InputError, match=rf"square\{suffix}: a mesh has a shape, but no fold.*edges_foldAngle"):
+        fold_file.run(settings.replace(pattern=str(path)))
 
 
 def test_files_that_are_no_patterns(settings, tmp_path):
