@@ -139,6 +139,11 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
     )
+    p.add_argument(
+        "--start-at",
+        choices=("rest", "fit"),
+        help="simulate from rest, or fit every start (default: as recorded)",
+    )
     p.add_argument("--seed", type=int, default=0, help="of the draws under the null hypothesis (default 0)")
     p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
 

@@ -28,7 +28,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
-from origami_sim.scene import NAMES, Settings, read_calibration, scene_module, scene_settings
+from origami_sim.scene import NAMES, Settings, check_recorded_scene, read_calibration, scene_module, scene_settings
 from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
@@ -142,7 +142,7 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
         )
     if not given.endswith(".toml"):
         module = scene_module(given)
-        _agree(stated, given, data)
+        check_recorded_scene(data[0], given, "--model")
         return module, scene_settings(module)
     settings = read_calibration(given)
     own = {n: set(read_calibration(scene_module(n).CALIBRATION)) for n in NAMES}
@@ -158,20 +158,9 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
             field=", ".join(fitting or odd[:5]),
             allowed="[scene] name in the sidecar" if fitting else f"the settings of a scene; the nearest is {nearest}",
         )
-    _agree(stated, fitting[0], data)
+    check_recorded_scene(data[0], fitting[0], "--model")
     module = scene_module(fitting[0])
     return module, scene_settings(module, given)
-
-
-def _agree(stated: str | None, scene: str, data: DataSet) -> None:
-    if stated is not None and stated != scene:
-        raise InputError(
-            "the recording is of another scene",
-            file=data[0].metadata.get("sidecar"),
-            field="scene.name",
-            value=stated,
-            allowed=f"--model {stated}, or a sidecar for {scene}",
-        )
 
 
 def _overrides(data: DataSet, scene: str) -> list[str]:
@@ -217,7 +206,10 @@ def _options(args: Namespace) -> Options:
         raise InputError("must be positive", field="--segment", value=args.segment, allowed="> 0 s")
     if args.seed < 0:
         raise InputError("must not be negative", field="--seed", value=args.seed, allowed=">= 0")
-    return replace(THOROUGH if args.thorough else Options(), segment=args.segment, seed=args.seed)
+    if args.start_at == "rest" and args.segment is not None:
+        raise InputError("segments have starts of their own", field="--start-at", value="rest", allowed="no --segment")
+    options = THOROUGH if args.thorough else Options()
+    return replace(options, segment=args.segment, start=args.start_at, seed=args.seed)
 
 
 def _check_folder(folder: Path, model: str) -> None:

@@ -785,3 +785,11 @@ def test_a_patch_reads_back_as_it_was_written(diagnosed, tmp_path):
         again = scene_settings(scene_module(name), path)
         assert dict(again) == dict(settings)
         assert again.effects == additions(nothing, settings) == ()  # type: ignore[arg-type]
+
+
+def test_the_start_can_be_chosen_but_not_rest_for_segments():
+    chosen = {"segment": None, "seed": 0, "thorough": False, "start_at": "fit"}
+    assert command._options(SimpleNamespace(**chosen)).start == "fit"  # type: ignore[arg-type]
+    assert command._options(SimpleNamespace(**chosen | {"start_at": None, "segment": 1.0})).start is None  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"starts of their own.*--start-at.*no --segment"):
+        command._options(SimpleNamespace(**chosen | {"start_at": "rest", "segment": 1.0}))  # type: ignore[arg-type]
