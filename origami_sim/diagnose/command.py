@@ -328,7 +328,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
     lines += [
         f"report: {files['report']}",
         *(f"replay: origami-sim replay {r}" for r in replays),
-        f"patched: origami-sim run {d.subject} --calibration {files['calibration']}",
+        f"patched: origami-sim run {d.subject} --calibration {files['calibration']}"
+        + ("   (the closest explanation, which is not enough)" if d.verdict == "UNKNOWN" and d.patch else ""),
         f"{sum(d.seconds.values()):.0f} s of computing",
     ]
     return lines

@@ -9,8 +9,10 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.forward import Block, Forward, stacked
+from origami_sim.diagnose.hypothesis import Hypothesis
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.refit import Fit
+from origami_sim.diagnose.several import numbers_kept
 from origami_sim.diagnose.static import CurveForward, Static
 from origami_sim.model import Model, dihedral_angles
 from origami_sim.recording import Channel
@@ -94,7 +96,9 @@ def _positions(forward: Forward, fit: Fit, r: int, mine: list[int]) -> dict[int,
         replace(b, values=np.zeros((len(b.times), 3 * count)), begin=None) if n in mine else b
         for n, b in enumerate(forward.blocks)
     ]
-    predicted = other.predict(fit.hypothesis, fit.theta[None], fit.local[None], mine)
+    # an error of one channel is no node's
+    felt = tuple(s for s in fit.hypothesis.suspects if s.kind != "measurement" or s.entities is None)
+    predicted = other.predict(Hypothesis(felt), numbers_kept(fit, felt)[None], fit.local[None], mine)
     return {b: p[0].reshape(-1, count, 3) for b, p in zip(mine, predicted, strict=True)}
 
 

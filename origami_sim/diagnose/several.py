@@ -152,7 +152,7 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
         rest = tuple(t for t in best.hypothesis.suspects if t is not s)
         known = [f for f in (*fits, *out) if _same(f.hypothesis, rest) and not f.failed]
         rest = known[0].hypothesis.suspects if known else rest
-        place = _kept(best, rest)
+        place = numbers_kept(best, rest)
         inner = known[0] if known else fit(forward, Hypothesis(rest), weights, theta=place, local=best.local, **near)
         if inner.failed:
             continue
@@ -195,7 +195,7 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
             if abs(value - s.free[0].start) > 2.0 * deviation or near:
                 continue
             near = {"known": f.linear, "kept": len(forward.subject.nominals)}
-            fewer = fit(forward, Hypothesis(rest), weights, theta=_kept(f, rest), local=f.local, **near)
+            fewer = fit(forward, Hypothesis(rest), weights, theta=numbers_kept(f, rest), local=f.local, **near)
             if not fewer.failed:
                 scores[id(fewer)] = score(forward, fewer, weights)
                 out.append(fewer)
@@ -211,7 +211,7 @@ def _same(hypothesis: Hypothesis, wanted: tuple[Suspect, ...]) -> bool:
     return {s.label for s in hypothesis.suspects} == {s.label for s in wanted}
 
 
-def _kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
+def numbers_kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
     """The numbers of a fit that a smaller hypothesis of these suspects still has."""
     ends = np.cumsum([len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
     own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends[:-1], ends[1:], strict=True)}

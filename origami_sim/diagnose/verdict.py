@@ -378,7 +378,8 @@ def _named(w: _Weighed) -> _Said:
         text += f" (p = {probability:.2f})"
     else:
         others = [_elsewhere(f) for f in kept if f is not w.best and len(f.hypothesis.suspects) == 1]
-        sure = len(same) == 1 or w.probability(w.best) > 0.9 * probability
+        elsewhere = [f for f in same if f is not w.best and len(f.hypothesis.suspects) == 1]
+        sure = not elsewhere or w.probability(w.best) > 0.9 * probability
         where = f"these recordings do not tell that from {_join(others)}" if others else "the site is less certain"
         s = w.best.hypothesis.suspects[0]
         lacks = "there is" if s.more else "the model lacks"

@@ -193,6 +193,23 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
             np.testing.assert_allclose(np.sin(gap), 0.0, atol=1e-6)
 
 
+def test_an_error_of_one_channel_moves_no_node(recorded):
+    from origami_sim.diagnose.forward import Forward
+    from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
+    from origami_sim.diagnose.refit import Weights, fit
+
+    subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
+    forward = Forward(subject, [recording], segment=0.4)
+    late = Free("clock_delay", "clock_delay", "s", 0.0, 0.01, entities=(1,))
+    one = Hypothesis((Suspect("clock_delay", "channel theta2", "measurement", (late,), (1,)),))
+    weights = Weights(forward.blocks[0].noise)
+    plain = fit(forward, Hypothesis(), weights, fixed=True, most=0)
+    theta = np.append(plain.theta, 0.05)
+    delayed = fit(forward, one, weights, theta=theta, local=plain.local, fixed=True, most=0)
+    shown = overlay.film(forward, {"before": plain, "after": delayed}, 0)
+    np.testing.assert_allclose(shown.films["after"], shown.films["before"], atol=1e-12)
+
+
 def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, tmp_path, monkeypatch, capfd):
     shown = command.Progress.__call__
 
