@@ -337,6 +337,27 @@ def test_false_alarms_are_counted_over_a_hundred_nulls():
     assert len(alarms) <= 9, alarms
 
 
+@pytest.mark.slow
+def test_nulls_are_not_blamed_with_the_whole_catalogue_to_choose_from():
+    """As they are, with a parameter off, and with a scale off: where that is named, it is no alarm."""
+    alarms = []
+    for seed in range(12):
+        rng = np.random.default_rng([seed, 7])
+        off, scale = 1 + 0.05 * rng.normal(), 1 + 0.02 * rng.normal()
+        made = record(
+            seed=seed,
+            factors={("crease", "stiffness"): off} if seed % 3 == 1 else {},
+            scale=scale if seed % 3 == 2 else 1.0,
+            noise=float(rng.choice([1e-3, 3e-3])),
+            **SMALL,
+        )
+        found = diagnose(subject(3), [made])
+        quiet = ("ADEQUATE", "PARAMETER", *(("MEASUREMENT",) if seed % 3 == 2 else ()))
+        if found.verdict not in quiet and "nominal" not in found.chosen:
+            alarms.append((seed, found.verdict, found.chosen))
+    assert len(alarms) <= 1, alarms
+
+
 def test_frames_are_thinned_but_not_below_what_a_comparison_needs():
     swing = record(**SMALL)
     (same,) = prepared([replace(swing, times=swing.times / 100)], 200.0)
