@@ -84,17 +84,21 @@ class Curve:
     count: list[int]
 
 
+REVERSAL = "time since a reversal"
+"""Against this, the missing moment is that along the motion: it would cancel itself otherwise."""
+
+
 @dataclass
 class Place:
     """What equation error says about one coordinate (a crease's fold angle, a coordinate of the root).
 
     Attributes:
-        site: name. score: how much structure its residual moment has, in standard deviations. share: posterior of
-            being the site. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
+        site: name. score: how much structure its residual moment has, in standard deviations. share: its part
+            of all structure. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
             [s], nan: never.
         times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
         curves: the residual moment against angle, rate, what drives, its phase if it is periodic, and time since the
-            last reversal and the last step of a drive.
+            last step of a drive and the last reversal (then the moment along the motion).
         balance: unexplained power [W], blocks of 0.1 s or more of the first recording against time; None: not known.
     """
 

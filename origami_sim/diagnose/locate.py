@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from origami_sim.diagnose.articulation import Pose
-from origami_sim.diagnose.diagnosis import Curve, Place
+from origami_sim.diagnose.diagnosis import REVERSAL, Curve, Place
 from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.track import track
@@ -288,10 +288,15 @@ def since(times: np.ndarray, events: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(last), times - last, np.nan)
 
 
+def way(rate: np.ndarray) -> np.ndarray:
+    """Way in which a motion goes, 1 or -1 (0 before it goes any); it is kept until the motion goes the other."""
+    clear = np.sign(rate) * (np.abs(rate) > TURNED * np.sqrt(np.mean(rate**2)))
+    return clear[np.maximum.accumulate(np.where(clear != 0, np.arange(len(clear)), 0))]
+
+
 def reversals(rate: np.ndarray) -> np.ndarray:
     """Mask of the frames in which a motion has begun to go the other way."""
-    way = np.sign(rate) * (np.abs(rate) > TURNED * np.sqrt(np.mean(rate**2)))
-    held = way[np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))]
+    held = way(rate)
     return np.concatenate([[False], held[1:] * held[:-1] < 0])
 
 
@@ -311,7 +316,7 @@ def _against(motions: Sequence[Motion], k: int) -> dict[tuple[str, str], list[np
             out[f"time since a step of {n}", "s"] = [since(m.times, j) for m, j in zip(motions, jumps, strict=True)]
     turns = [since(m.times, reversals(m.rate[k])) for m in motions]
     if np.isfinite(np.concatenate(turns)).sum() > BINS:
-        out["time since a reversal", "s"] = turns
+        out[REVERSAL, "s"] = turns
     return out
 
 
@@ -319,11 +324,11 @@ def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     def joined(f):
         return np.concatenate([f(m) for m in motions])
 
-    y = joined(lambda m: m.missing[k])
+    missing, along = joined(lambda m: m.missing[k]), joined(lambda m: m.missing[k] * way(m.rate[k]))
     width = 2 * max(m.half for m in motions) + 1
     out = []
     for (name, unit), each in _against(motions, k).items():
-        x = np.concatenate(each)
+        x, y = np.concatenate(each), along if name == REVERSAL else missing
         order = np.argsort(x, kind="stable")[: np.isfinite(x).sum()]  # what is not a number comes last
         parts = [p for p in np.array_split(order, BINS) if len(p)]
         out.append(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import Correlation, Curve, Diagnosis, Number, Place, Suspected, Trace
+from origami_sim.diagnose.diagnosis import REVERSAL, Correlation, Curve, Diagnosis, Number, Place, Suspected, Trace
 from origami_sim.diagnose.report_markup import (
     MISSING,
     Html,
@@ -538,7 +538,8 @@ def _curve(site: str, c: Curve, name: str, unit: str) -> Html:
         for a, b, s, n in zip(x, y, e, c.count, strict=False)
     ]
     plot.level(0.0, "zero").bars(x, y - 2 * e, y + 2 * e, "place").dots(x, y, "place", titles=titles)
-    caption = element("figcaption", element("b", f"against {c.against}"), " bars: ± 2 se")
+    how = " along the motion, bars: ± 2 se" if c.against == REVERSAL else " bars: ± 2 se"
+    caption = element("figcaption", element("b", f"against {c.against}"), how)
     return element("figure", caption, plot.html())
 
 

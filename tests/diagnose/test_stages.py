@@ -12,6 +12,7 @@ from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
+from origami_sim.diagnose.diagnosis import REVERSAL
 from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
@@ -155,7 +156,10 @@ def test_the_missing_power_is_that_of_the_friction_block_by_block(rubbing):
     assert known.sum() > 10
     # the refitted viscosity has taken a part of it
     assert np.corrcoef(np.array(found.mean)[known], taken[known])[0, 1] > 0.8
-    assert {c.against for c in places["crease 1"].curves} >= {"angle", "rate", "time since a reversal"}
+    curves = {c.against: c for c in places["crease 1"].curves}
+    assert {"angle", "rate", REVERSAL} <= set(curves)
+    late = [m for t, m in zip(curves[REVERSAL].x, curves[REVERSAL].mean, strict=True) if t > 0.02]
+    assert np.mean(np.array(late) < 0) > 0.8, "friction acts against the motion, soon after it has turned"
 
 
 def test_phases_reversals_and_steps_are_those_of_the_signal():
