@@ -104,13 +104,18 @@ def _menu(forward: Forward) -> list[tuple[str, Forward]]:
         out.append((f"{names} reversed", _variant(forward, gain=-1.0)))
         for speed in (0.3, 3.0):
             out.append((f"{names} at {speed:g} times the frequency", _variant(forward, speed=speed)))
+        out.append((f"a step of {names} to its highest level, held", _variant(forward, held=True)))
     if ("gravity", "gravity_z") in set(forward.parameters):
         out.append(("the set-up tilted by 10 degrees about y", _variant(forward, tilt=np.deg2rad(10.0))))
+        if not len(forward.model.contacts):
+            out.append(("the set-up upside down", _variant(forward, tilt=np.pi)))
     out.append(("a tenth more mass on every panel", _variant(forward, load=1.1)))
     return out
 
 
-def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, tilt=0.0, load=1.0) -> Forward:
+def _variant(
+    forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, held=False, tilt=0.0, load=1.0
+) -> Forward:
     """The same object in another experiment; recordings keep their frames, whose values are replaced by predictions."""
     out = copy.copy(forward)
     arm = forward.articulation
@@ -131,6 +136,9 @@ def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, ti
         )
     if gain != 1.0 or speed != 1.0:
         out._drives = [_changed(d, gain, speed) for d in forward._drives]
+    if held:
+        spans = [float(r.times[-1] - r.times[0]) for r in forward.recordings]
+        out._drives = [_held(d, span) for d, span in zip(forward._drives, spans, strict=True)]
     if tilt or load != 1.0:
         build = forward.subject.build
 
@@ -148,6 +156,16 @@ def _variant(forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, ti
         out.subject = replace(forward.subject, build=other)
     out._built = {}
     return out
+
+
+def _held(drive: Drive, span: float) -> Drive:
+    """Every channel at the value of its that is furthest from zero, from the start on."""
+    at = np.linspace(0.0, span, 1000)
+    changed = {}
+    for name, s in drive.signals.items():
+        values = np.broadcast_to(np.squeeze(s(at)), at.shape)
+        changed[name] = float(values[np.argmax(np.abs(values))])
+    return drive.replace(**changed)
 
 
 def _changed(drive: Drive, gain: float, speed: float) -> Drive:

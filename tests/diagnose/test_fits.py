@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from origami_sim.diagnose import Options, Subject, factor
+from origami_sim.diagnose import Options, Subject, experiment, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
@@ -311,6 +311,17 @@ def test_what_looks_the_same_as_a_large_effect_is_compared_where_that_is():
     assert same.theta[-1] == pytest.approx(0.2, abs=0.01)
     again = lookalikes(forward, every, nothing, [base, same, best], weights)
     assert all(f.cost < same.cost for f in again if f.hypothesis.suspects == (drive,))
+
+
+def test_experiments_hold_a_drive_and_turn_the_set_up_upside_down():
+    forward = driven("rest")
+    menu = dict(experiment._menu(forward))
+    held = menu["a step of field to its highest level, held"]._drives[0]["field_z"]
+    assert np.abs(held(np.array([0.0, 1.3]))) == pytest.approx(0.02, rel=1e-4) and held(0.0) == held(1.3)
+    turned = menu["the set-up upside down"].subject.build({})[1]
+    given = forward.parameters["gravity", "gravity_z"]
+    assert turned["gravity", "gravity_z"] == pytest.approx(-given) and np.all(given < 0)
+    assert turned["gravity", "gravity_x"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_recording_without_segments_tells_no_start():
