@@ -214,7 +214,7 @@ def locate(forward: Forward, motions: Sequence[Motion]) -> list[Place]:
                 first.missing[k, ::thin].tolist(),
                 first.error[k, ::thin].tolist(),
                 _curves(motions, k),
-                _balance(first, k),
+                _balance(first, k) if first.told[k] else None,
             )
         )
     excess = np.array([max(p.score**2 - 1.0, 0.0) for p in out])
