@@ -16,10 +16,10 @@ demo: setup
 	$(BIN)/origami-sim demo --out runs/demo
 
 test: setup
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-all: setup
-	$(BIN)/python -m pytest -m 'slow or not slow'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'slow or not slow'
 
 bench: setup
 	$(BIN)/python benchmarks/run.py

@@ -601,7 +601,7 @@ def test_not_a_number_is_a_failure_with_that_cause():
         ({"drive": Drive(field=(0, sine(np.ones(4), 1.0), 0))}, ["number of worlds", "1 or 4"]),
         ({"device": "cuda:99"}, ["cuda:99", "cpu"]),
     ],
-    ids=str,
+    ids=lambda v: None if isinstance(v, dict) else "-".join(v),
 )
 def test_bad_input_is_named(options, words):
     model, p, drive = busy(3)
