@@ -479,47 +479,38 @@ def _impulses(d: Diagnosis) -> Html:
 def _place(p: Place) -> Html:
     unit = "N" if p.site.startswith("shift ") else "N m"
     name = "force" if unit == "N" else "moment"
-    x, y, e = _array(p.times), _array(p.moment), _array(p.error)
     figures = []
-    if len(x):
-        plot = Plot(
-            f"residual {name} at {p.site} in time",
-            span_of(x, margin=0.0),
-            span_of(y, zero=True, margin=0.15),
-            x_name="time",
-            x_unit="s",
-            y_name=f"residual {name}",
-            y_unit=unit,
-        )
-        if len(e) == len(x):
-            plot.band(x, y - 2 * e, y + 2 * e, "noise")
-        plot.level(0.0, "zero").line(x, y, "place")
+    if p.times:
+        plot = _in_time(f"residual {name}", p.site, unit, p.times, p.moment, p.error)
         if np.isfinite(_or(p.onset)):
             plot.mark(p.onset, "onset", f"departs at {amount(p.onset, 's', 3)}")
         caption = element("figcaption", element("b", "in time"), " shaded: ± 2 sd")
         figures.append(element("figure", caption, plot.html()))
-    if p.balance is not None:
-        figures.append(_balance(p.site, p.balance))
+    if p.balance is not None:  # what is left of the change of energy less the work, block by block
+        c = p.balance
+        plot = _in_time("unexplained power", p.site, "W", c.x, c.mean, c.error)
+        width = amount(float(np.median(np.diff(_array(c.x)))), "s", 2) if len(c.x) > 1 else "one block"
+        caption = element("figcaption", element("b", "unexplained power"), f" means over {width}, shaded: ± 2 sd")
+        figures.append(element("figure", caption, plot.html()))
     figures += [_curve(p.site, c, name, unit) for c in p.curves]
     return element("div", figures or _nothing("No curves."), class_="figures three")
 
 
-def _balance(site: str, c: Curve) -> Html:
-    """Power balance: what is left of the change of energy less the work, block by block."""
-    x, y, e = _array(c.x), _array(c.mean), _array(c.error)
+def _in_time(name: str, site: str, unit: str, times: Sequence, values: Sequence, error: Sequence) -> Plot:
+    """Something at a place in time, with twice its standard deviation where that is known."""
+    x, y, e = _array(times), _array(values), _array(error)
     plot = Plot(
-        f"unexplained power at {site}",
+        f"{name} at {site} in time",
         span_of(x, margin=0.0),
         span_of(y, zero=True, margin=0.15),
         x_name="time",
         x_unit="s",
-        y_name="unexplained power",
-        y_unit="W",
+        y_name=name,
+        y_unit=unit,
     )
-    plot.band(x, y - 2 * e, y + 2 * e, "noise").level(0.0, "zero").line(x, y, "place")
-    width = amount(float(np.median(np.diff(x))), "s", 2) if len(x) > 1 else "one block"
-    caption = element("figcaption", element("b", "unexplained power"), f" means over {width}, shaded: ± 2 sd")
-    return element("figure", caption, plot.html())
+    if len(e) == len(x):
+        plot.band(x, y - 2 * e, y + 2 * e, "noise")
+    return plot.level(0.0, "zero").line(x, y, "place")
 
 
 def _curve(site: str, c: Curve, name: str, unit: str) -> Html:

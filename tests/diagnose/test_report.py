@@ -82,7 +82,10 @@ def place(site: str, share: float, rng) -> Place:
         ("angle", "rad"), ("rate", "rad/s"), ("voltage", "V"))]  # fmt: skip
     moment = -share * 2e-5 * rate + 2e-6 * rng.normal(size=300)
     onset = 0.31 if share > 0.1 else NAN
-    return Place(site, 40 * share, share, -3.1e-5 * share, onset, t.tolist(), moment.tolist(), [2e-6] * 300, curve)
+    balance = Curve("time", "s", [0.05, 0.15, 0.25], [-1e-4, 2e-5, -3e-5], [1e-5] * 3, [10] * 3)
+    return Place(
+        site, 40 * share, share, -3.1e-5 * share, onset, t.tolist(), moment.tolist(), [2e-6] * 300, curve, balance
+    )
 
 
 def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
@@ -254,6 +257,15 @@ def test_numbers_on_the_page_follow_from_the_data():
     assert "21.30 µN m s/rad (20.40 to 22.20)" in text  # 2.13e-5, half-width 0.09e-5
     assert "+412 ± 21" in text
     assert "1.2 sd away" in text  # (1.312 - 1.25) / 0.05
+
+
+def test_power_that_is_not_explained_is_drawn_block_by_block():
+    text = page(example())
+    assert "unexplained power at " in text and "means over 100 ms" in text
+    silent = example()
+    for p in silent.places:
+        p.balance = None
+    assert "unexplained power at " not in page(silent)
 
 
 def test_blows_are_listed_the_most_different_first():
