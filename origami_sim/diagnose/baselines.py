@@ -24,6 +24,11 @@ FEWEST = 30
 THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the data."""
 
+RIDGE = 1e-3
+"""Ridge of the sparse regression, over the mean square of a scaled column. Without it two columns that are nearly the
+same, such as an angle and its sine, take large opposite coefficients, beside which the right one falls under the
+threshold."""
+
 LIBRARY: dict[str, Callable] = {
     "1": lambda a, w: np.ones_like(a),
     "angle": lambda a, w: a,
@@ -84,8 +89,8 @@ def _halves(forward: Forward) -> list[list[int]]:
 
 
 def _samples(forward: Forward, motions, k: int, held: list[int]):
-    """Angle, rate and missing moment of a crease (coordinate k) outside the held-out segments."""
-    parts = []
+    """Angle, rate and missing moment of the tree's crease k outside the held-out segments."""
+    row, parts = 6 * forward.articulation.floating + k, []
     for r, m in enumerate(motions):
         inside = np.zeros(len(m.times), bool)
         for b in held:
@@ -96,8 +101,9 @@ def _samples(forward: Forward, motions, k: int, held: list[int]):
         if len(motions) == 1:  # also what lies between held-out segments: nothing leaks from a neighbour
             span = m.times[inside]
             inside |= (m.times >= span.min()) & (m.times <= span.max())
-        keep = ~inside
-        parts.append((m.q[k, keep], m.rate[k, keep], m.missing[k, keep]))
+        a, w, y = m.q[row], m.rate[row], m.missing[row]
+        keep = ~inside & np.isfinite(a + w + y)
+        parts.append((a[keep], w[keep], y[keep]))
     return (np.concatenate(p) for p in zip(*parts, strict=True))
 
 
@@ -132,7 +138,8 @@ def _thresholded(x, y, threshold):
         c[:] = 0.0
         if not np.any(keep):
             break
-        c[keep] = np.linalg.lstsq(x[:, keep], y, rcond=None)[0]
+        some = x[:, keep]
+        c[keep] = np.linalg.solve(some.T @ some + RIDGE * len(y) * np.eye(some.shape[1]), some.T @ y)
         new = np.abs(c) > threshold * np.abs(c).max()
         if np.array_equal(new, keep):
             break
@@ -142,6 +149,8 @@ def _thresholded(x, y, threshold):
 
 def _process(a, w, y, grid_a, grid_w):
     """Posterior mean of a Gaussian process with a squared-exponential kernel; length scales by marginal likelihood."""
+    if not y.var():
+        return np.zeros((len(grid_a), len(grid_w))), "nothing"
     size = 350
     order = np.argsort(a + 1e-9 * np.arange(len(a)), kind="stable")
     pick = order[np.linspace(0, len(a) - 1, min(size, len(a))).astype(int)]

@@ -5,6 +5,8 @@ import pytest
 
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose.baselines import _samples, baselines
+from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.forward import drive_of
 from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
@@ -13,6 +15,7 @@ from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, start
 from origami_sim.diagnose.track import track
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0
+from origami_sim.pattern import strip
 from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
@@ -104,6 +107,42 @@ def test_what_touches_is_near_or_about_to_be():
     gaps = np.array([[0.05, 0.03, 0.01, 0.008, 0.02, 0.05]])
     assert touching(gaps, 1e-4).tolist() == [False, False, True, False, False, False]
     assert not np.any(touching(np.zeros((0, 4)), 1e-3))
+
+
+# --- free panels with a crease
+
+
+def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
+    """Coordinates of a free device begin with its shift and turn; none of them has a moment that is missing here."""
+    sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1.5e-3, modulus=1.5e6, triangulation="center")
+    sheet.panel([0, 1], rigidity=0.02)
+    sheet.crease(stiffness=5e-3).set("crease_viscosity", viscosity=2e-6)
+    sheet.magnetise(0, remanence=1.0, volume=2e-8, poling=(1, 0, 0))
+    sheet.magnetise(1, remanence=1.0, volume=2e-8, poling=(-1, 0, 0))
+    model, parameters = sheet.build()
+    times = np.arange(240) / 240.0
+    field = np.zeros((240, 3))
+    field[:, 2] = 0.03 * np.sin(2 * np.pi * 3.0 * times)
+    drive = {"field": DriveChannel("field", field, "T", False)}
+    truth = parameters.copy().set("crease_viscosity", "viscosity", 1e-4)
+    signals = drive_of(Recording("free", times, {}, drive), Drive())
+    made = simulate(model, truth, signals, duration=times[-1], rate=240)
+    rng = np.random.default_rng(0)
+    channels = {
+        f"corner{n}": Channel(
+            f"corner{n}", "marker", made.x[:, n, 0] + 2e-5 * rng.normal(size=(240, 3)), "m", 2e-5, {"node": n}
+        )
+        for n in range(6)
+    }
+    subject = Subject.from_model(model, parameters, signals, [])
+    o = Options(segment=0.12, start="fit")
+    forward = arranged(subject, prepared([Recording("free", times, channels, drive)], 240.0), o)
+    _, base, weights = nominal_fits(forward)
+    angle, rate, missing = _samples(forward, motions_of(forward, base), 0, [0])
+    assert np.ptp(angle) == pytest.approx(np.ptp(made.angles[:, 0, 0]), rel=0.1)
+    assert np.polyfit(rate, missing, 1)[0] == pytest.approx(-9.8e-5, rel=0.1)
+    refitted, *others = baselines(forward, base, weights, score(forward, base, weights))
+    assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(refitted.rms) for b in others)
 
 
 # --- on feet
