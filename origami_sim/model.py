@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
@@ -278,6 +280,31 @@ class State:
     @property
     def worlds(self) -> int:
         return self.x.shape[1]
+
+
+def magnets(model: Model, parameters: Parameters) -> np.ndarray:
+    """Magnet of each triangle [T], -1 for none: those that touch and are poled alike (within 8 degrees) are one."""
+    out = np.full(len(model.triangles), -1, np.int32)
+    for owner in {o for o, name in parameters if name == "volume"}:
+        magnet = parameters.world(0).of(owner)
+        of = np.flatnonzero(magnet["volume"][:, 0] * magnet["remanence"][:, 0])
+        a, b, n, remanence = (magnet[k][of] for k in ("poling_1", "poling_2", "poling_n", "remanence"))
+        x1, x2, x3 = np.moveaxis(model.position[model.triangles[of]], 1, 0)
+        in_plane, normal = a * (x2 - x1) + b * (x3 - x1), np.cross(x2 - x1, x3 - x1)
+        poling = np.sqrt(1 - n**2) * _unit(in_plane) + n * _unit(normal)
+        poling *= np.sign(remanence)
+        corners = np.stack([np.repeat(np.arange(len(of)), 3), model.triangles[of].ravel()])
+        touches = sp.csr_array(sp.coo_array((np.ones(corners.shape[1]), corners), (len(of), len(model.position))))
+        one, other = (touches @ touches.T).nonzero()
+        alike = (poling[one] * poling[other]).sum(axis=1) > 0.99
+        bonds = sp.coo_array((np.ones(alike.sum()), np.stack([one, other])[:, alike]), (len(of), len(of)))
+        out[of] = connected_components(bonds, directed=False)[1]
+    return out
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return v / np.where(length > 0, length, 1.0)
 
 
 def dihedral_angles(x: np.ndarray, hinges: np.ndarray) -> np.ndarray:

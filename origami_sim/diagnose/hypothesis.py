@@ -7,7 +7,7 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, magnets
 from origami_sim.recording import Recording
 from origami_sim.scene import Settings
 
@@ -245,7 +245,11 @@ def suspects(
             continue
         if not set(effect.drives) - {"time"} <= driven:
             continue
+        if effect.interacts and not (parameters and magnets(model, parameters).max(initial=-1) > 0):
+            continue
         sites = _sites(model, effect.family)
+        if effect.interacts:  # of one panel with itself there is none
+            sites = sites[-1:]
         if any(p.name in ANCHORS for p in effect.parameters):
             sites += _edges(model)
         if effect.family == "measurement":
@@ -260,7 +264,7 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
     """An effect that the model has, stronger or weaker at one crease, panel or foot than was thought."""
     effect = get(name)
     each = [s for s in _sites(model, effect.family) if s[2] is not None]
-    if effect.family not in ("crease", "triangle", *CONTACTS) or len(each) < 2:
+    if effect.family not in ("crease", "triangle", *CONTACTS) or len(each) < 2 or effect.interacts:
         return []
     out = []
     for site, kind, entities in each:

@@ -25,7 +25,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "crease": ("angle", "rate", "turn", "dt"),
     "bend": ("angle", "rate", "turn", "dt"),
     # forces on the three corners, as the rows of a 3 x 3 matrix
-    "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "dt"),
+    # stray: flux density from all other magnets at this one, stray_gradient: its dB_i/dx_j; see Effect.magnet
+    "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "stray", "stray_gradient", "dt"),
     # force on the node
     "node": ("x", "v", "mass", "dt"),
     # normal: force along the ground's normal, repulsion positive
@@ -101,6 +102,8 @@ class Effect:
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
         stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
+        magnet: dipole moment of a triangle [A m^2] and its place [m], for a law that asks for the stray field. That is
+            multiplied by the effect's strength, the mean of both triangles', so that action equals reaction.
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
             the energy, and the time-integrated work otherwise.
         stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
@@ -119,6 +122,7 @@ class Effect:
     confused_with: str = ""
     separated_by: str = ""
     energy: wp.Function | None = None
+    magnet: wp.Function | None = None
     apply: Callable | None = None
     channels: tuple[str, ...] = ()
     fitted: tuple[str, ...] = ()
@@ -140,8 +144,8 @@ class Effect:
                 raise ValueError(f"effect '{self.name}': fitted parameter '{name}' needs a typical value")
         own = {p.name for p in self.parameters} | {m.name for m in self.memory}
         known = own | set(FAMILIES[self.family]) | set(DRIVES) | {"buffer"}
-        for attribute, law in (("arguments", self.force), ("energy_arguments", self.energy)):
-            names = tuple(inspect.signature(law.func).parameters) if law is not None else ()
+        for attribute, which in (("arguments", "force"), ("energy_arguments", "energy")):
+            names = self.asked(which)
             for name in names:
                 if name not in known:
                     raise ValueError(
@@ -149,15 +153,27 @@ class Effect:
                         f"drive nor a quantity of the family '{self.family}'; allowed: {', '.join(sorted(known))}"
                     )
             object.__setattr__(self, attribute, names)
+        if self.interacts and (self.magnet is None or not self.fitted):
+            raise ValueError(f"effect '{self.name}': a law that asks for the stray field needs a magnet and a strength")
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name."""
         return next(p for p in self.parameters if p.name == name)
 
+    def asked(self, which: str) -> tuple[str, ...]:
+        """Arguments of its "force", "energy" or "magnet"."""
+        law = getattr(self, which)
+        return tuple(inspect.signature(law.func).parameters) if law is not None else ()
+
     @property
     def drives(self) -> tuple[str, ...]:
         """Drive quantities that the law depends on."""
         return tuple(d for d in DRIVES if d in self.arguments or d in self.energy_arguments)
+
+    @property
+    def interacts(self) -> bool:
+        """Whether its entities act on each other."""
+        return bool({"stray", "stray_gradient"} & {*self.arguments, *self.energy_arguments})
 
     @property
     def exchanges_work(self) -> bool:

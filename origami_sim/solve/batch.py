@@ -10,7 +10,7 @@ import warp as wp
 from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, magnets
 from origami_sim.solve.compose import compose
 
 
@@ -93,6 +93,8 @@ class Batch:
                 field="gradient",
                 allowed="switch on field_gradient",
             )
+        interacting = any(e.interacts for e in self.program.effects)
+        self.magnets = magnets(model, parameters) if interacting else np.full(len(model.triangles), -1, np.int32)
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()
@@ -107,6 +109,7 @@ class Batch:
             constant(hinges, wp.vec4i),
             constant(model.electrodes, wp.int32),
             constant(model.triangles.reshape(-1, 3), wp.vec3i),
+            constant(self.magnets, wp.int32),
             constant(model.contacts.reshape(-1, 3), wp.vec3i),
             constant(model.contact_weights.reshape(-1, 3), wp.vec3d),
             constant(model.contact_offsets, wp.float64),

@@ -8,11 +8,13 @@ by hand. The source is composed as text (see `Program.sources`), compiled once p
 import functools
 import hashlib
 import linecache
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import warp as wp
 
-from origami_sim import kinematics
+from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, Effect, get
 from origami_sim.solve.wave import wave
 
@@ -46,6 +48,7 @@ strength adds exactly nothing.
 _ARGUMENTS = """
     mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
     electrodes: wp.array(dtype=wp.int32), triangles: wp.array(dtype=wp.vec3i),
+    magnets: wp.array(dtype=wp.int32),
     contacts: wp.array(dtype=wp.vec3i), weights: wp.array(dtype=vec3), offsets: wp.array(dtype=scalar),
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
@@ -207,6 +210,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "scalar": wp.float64,
         "vec3": wp.vec3d,
         "kinematics": kinematics,
+        "magnetostatics": magnetostatics,
         "wave": wave,
         "NATURAL": NATURAL,
     }
@@ -214,6 +218,8 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         scope[f"{e.name}_force"] = e.force
         if e.energy is not None:
             scope[f"{e.name}_energy"] = e.energy
+        if e.magnet is not None:
+            scope[f"{e.name}_magnet"] = e.magnet
     exec(compile(source, filename, "exec"), scope)
     return scope[name]
 
@@ -255,8 +261,8 @@ class _Composer:
         first = self.index["drive", "offset"]
         return f"wave(P, layout, {first}, {k}, w, series_times, series_values, time)"
 
-    def call(self, effect: Effect, which: str, entity: str) -> str:
-        arguments = effect.arguments if which == "force" else effect.energy_arguments
+    def call(self, effect: Effect, which: str, entity: str, renamed: Mapping[str, str] = MappingProxyType({})) -> str:
+        arguments = effect.asked(which)
         own = {p.name: p for p in effect.parameters}
         memory = {m.name for m in effect.memory}
         given = []
@@ -272,7 +278,7 @@ class _Composer:
             elif name == "dt":
                 given.append("h")
             else:
-                given.append(name)
+                given.append(renamed.get(name, name))
         return f"{effect.name}_{which}({', '.join(given)})"
 
     def apply_law(self, t: _Text, effect: Effect, entity: str, mode: str, result: str):
@@ -456,6 +462,8 @@ class _Composer:
             t(f"field = {local}")
         for e in effects:
             i = self.number(e)
+            if e.interacts:
+                self._stray(t, e)
             self.apply_law(t, e, "c", mode, f"R{i}")
             self.add_energy(t, e, "c", mode)
             for k in (1, 2, 3):
@@ -464,6 +472,25 @@ class _Composer:
                 corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
                 self.add_work(t, e, " + ".join(corners), mode)
         t.depth -= 1
+
+    def _stray(self, t: _Text, effect: Effect):
+        """Field of all magnets but its own, at a triangle's magnet."""
+        t("stray = vec3(scalar(0.0), scalar(0.0), scalar(0.0))")
+        t("stray_gradient = wp.mat33d()")
+        t(f"own, at = {self.call(effect, 'magnet', 'c')}")
+        t("for other in range(triangles.shape[0]):")
+        t.depth += 1
+        t("u = other & NATURAL")
+        t("if magnets[u] >= 0 and magnets[u] != magnets[c]:")
+        t.depth += 1
+        for i in (1, 2, 3):
+            t(f"y{i} = X[triangles[u][{i - 1}] & NATURAL, w]")
+        t(f"source, there = {self.call(effect, 'magnet', 'u', {'x1': 'y1', 'x2': 'y2', 'x3': 'y3'})}")
+        strength = (self.value(effect.name, effect.fitted[0], entity) for entity in "cu")
+        t(f"source = scalar(0.5) * ({' + '.join(strength)}) * source")
+        t("stray = stray + magnetostatics.dipole_field(at - there, source)")
+        t("stray_gradient = stray_gradient + magnetostatics.dipole_gradient(at - there, source)")
+        t.depth -= 2
 
     def _contacts(self, t: _Text, mode: str):
         effects = self.family(*CONTACTS)

@@ -384,6 +384,8 @@ class _System:
                 groups.append(elements)
         if families & set(CONTACTS):
             groups.append(m.contacts)
+        if any(get(e).interacts for e in m.laws):
+            groups.append(np.unique(m.triangles[self._one.magnets >= 0])[None])
         pairs = [np.stack(np.broadcast_arrays(g[:, :, None], g[:, None, :])).reshape(2, -1) for g in groups]
         both = np.unique(np.concatenate(pairs, axis=1).astype(np.int64), axis=1)
         return both[0], both[1]

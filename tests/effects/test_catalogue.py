@@ -78,6 +78,8 @@ def give(parameters, model, name, rng):
     for p in effect.parameters:
         shape = (model.count(effect.family), 1) + ((p.knots,) if p.knots > 1 else ())
         parameters.set(name, p.name, sample(p, shape, rng))
+    if effect.interacts:  # only magnets that do not touch
+        parameters.set(name, "volume", 0.0, [2, 3])
 
 
 def on_ground(parameters, model, state, depth):
