@@ -31,6 +31,7 @@ class Model:
         electrodes: [C + Q] electrode group of each hinge.
         effects: names of the effects that are switched on, in the order of summation.
         names: labels by family ("crease", "panel", "contact", "node"), for reports.
+        channels: recorded channels that errors of the measurement tell apart; 1: the same for all.
     """
 
     position: np.ndarray
@@ -47,13 +48,14 @@ class Model:
     electrodes: np.ndarray
     effects: tuple[str, ...]
     names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    channels: int = 1
 
     def count(self, family: str) -> int:
         """Number of entities of a family of effects."""
         if family in CONTACTS:
             return len(self.contacts)
         if family in DISTORTIONS:
-            return 1
+            return self.channels if family == "measurement" else 1
         return len(
             {
                 "bar": self.bars,
@@ -79,15 +81,17 @@ class Model:
         for n in (*names, *without):
             get(n)
         kept = tuple(e for e in self.effects if e not in without)
-        added = tuple(n for n in names if n not in kept)
+        added = tuple(dict.fromkeys(n for n in names if n not in kept))
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return Model(**{**values, "effects": kept + added})
 
     @property
     def hash(self) -> str:
-        """Digest of everything in the model."""
+        """Digest of everything in the model that moves it."""
         h = hashlib.sha256()
         for f in fields(self):
+            if f.name == "channels":
+                continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
         return h.hexdigest()[:16]
@@ -202,9 +206,11 @@ class Parameters:
         return out
 
     def for_model(self, model: Model) -> "Parameters":
-        """The same values for a model with other effects; new effects get their defaults."""
+        """The same values for a model with other effects or channels; new effects get their defaults."""
         out = Parameters(model)
-        out._values.update({k: v for k, v in self._values.items() if k in out._values})
+        for k in self._values.keys() & out._values.keys():
+            rows, v = len(out._values[k]), self._values[k]
+            out._values[k] = v if len(v) == rows else np.repeat(v, rows, axis=0)
         return out
 
     @property
@@ -285,7 +291,7 @@ class State:
 def magnets(model: Model, parameters: Parameters) -> np.ndarray:
     """Magnet of each triangle [T], -1 for none: those that touch and are poled alike (within 8 degrees) are one."""
     out = np.full(len(model.triangles), -1, np.int32)
-    for owner in {o for o, name in parameters if name == "volume"}:
+    for owner in dict.fromkeys(o for o, name in parameters if name == "volume"):
         magnet = parameters.world(0).of(owner)
         of = np.flatnonzero(magnet["volume"][:, 0] * magnet["remanence"][:, 0])
         a, b, n, remanence = (magnet[k][of] for k in ("poling_1", "poling_2", "poling_n", "remanence"))

@@ -42,7 +42,7 @@ MANIFEST, STATES, TABLES, REPLAY = "manifest.json", "states.npz", "tables", "rep
 _PACKAGES = ("origami-sim", "warp-lang", "numpy", "scipy", "rerun-sdk", "pyarrow")
 _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
-_MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names"))
+_MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names", "channels"))
 _REQUIRED = {
     "format": int,
     "scene": str,
@@ -493,9 +493,8 @@ class _Arrays:
 
 
 def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
-    model = _with_plain_names(
-        Model(**{n: arrays[f"model.{n}"] for n in _MODEL}, effects=tuple(manifest["effects"]), names=manifest["names"])
-    )
+    given: dict[str, Any] = {n: arrays[f"model.{n}"] for n in _MODEL}
+    model = _with_plain_names(Model(**given, effects=tuple(manifest["effects"]), names=manifest["names"]))
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:
         raise InputError(

@@ -220,7 +220,7 @@ class Forward:
         if not (distort and self.local):
             return out
         try:
-            model, parameters = self._world(hypothesis, theta, hypothesis.effects)
+            _, parameters = self._world(hypothesis, theta, hypothesis.effects)
         except InputError:
             return out
         for r, recording in enumerate(self.recordings):
@@ -236,7 +236,7 @@ class Forward:
             for _ in range(UNDONE):
                 motion = lines[0] + GENTLE * rate * (grid[:, None, None] - grid[STEADY // 2])
                 motion = np.concatenate([motion, np.repeat(deep, len(grid), axis=0)], axis=1)
-                seen = self._measured(model, all_alike, recording, distort, [hypothesis], grid, motion, grid, now)
+                seen = self._measured(all_alike, recording, distort, grid, motion, grid, now)
                 half = STEADY // 2
                 rate += lines[1] - (seen[half + 1] - seen[half - 1]) / (grid[half + 1] - grid[half - 1]) / GENTLE
             for n, b in enumerate(mine):
@@ -246,12 +246,14 @@ class Forward:
     # --- predictions
 
     def built(self, values: Mapping[str, float]) -> tuple[Model, Parameters]:
-        """Model and parameters for values of the nominals, remembered."""
+        """Model and parameters for values of the nominals, remembered; of measurements one row for each channel."""
         key = tuple(values.items())
         if key not in self._built:
             if len(self._built) > 500:
                 self._built.clear()
-            self._built[key] = self.subject.build(values)[:2]
+            model, parameters, _ = self.subject.build(values)
+            model = replace(model, channels=max(len(r.channels) for r in self.recordings))
+            self._built[key] = model, parameters.for_model(model)
         return self._built[key]
 
     def predict(
@@ -285,7 +287,7 @@ class Forward:
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             for group in _by_length(self.blocks, mine):
-                for b, values in zip(group, self._roll(r, group, each, worlds, local, softness), strict=True):
+                for b, values in zip(group, self._roll(r, group, worlds, local, softness), strict=True):
                     out[b] = values
                     out[b][impossible] = np.nan
         return [out[b] for b in wanted]
@@ -367,7 +369,6 @@ class Forward:
         self,
         r: int,
         group: list[int],
-        each: list[Hypothesis],
         worlds: list[tuple[Model, Parameters]],
         local,
         softness: float,
@@ -381,8 +382,8 @@ class Forward:
         step = float(np.median(np.diff(recording.times)))
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
         once = Parameters.join([p for _, p in worlds])
-        late, shown = self._late(model, once, each, begins)
-        last = max(self._ends(model, once, each, c, times[-1], shown) for c in range(len(recording.channels)))
+        late, shown = self._late(model, once, k, begins)
+        last = max(self._ends(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
         frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, group]
         moves, of = distinct_motions(worlds, late, starts)
@@ -402,7 +403,7 @@ class Forward:
         grid = np.arange(frames) * step
         distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
-            values = self._measured(model, parameters, recording, distort, each, grid, channels, times, shown)
+            values = self._measured(parameters, recording, distort, grid, channels, times, shown)
         elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
             values = plain[: len(times)]
         else:
@@ -450,7 +451,7 @@ class Forward:
         out[:, :, batch.status() >= 0] = np.nan
         return out
 
-    def _late(self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], begins: np.ndarray):
+    def _late(self, model: Model, parameters: Parameters, worlds: int, begins: np.ndarray):
         """How late recordings are.
 
         A start that is fitted is that of the first frame, however late it was taken: the drive is late there, and the
@@ -461,29 +462,28 @@ class Forward:
             by how much later than its clock says a recording's frames at `begins` were taken [K, B], and the time since
             its start at which the motion of a segment is read first (K,) [s].
         """
-        clock = self._clock(model, parameters, each, None, [-1e3, 0.0, *begins])
+        clock = self._clock(model, parameters, worlds, None, [-1e3, 0.0, *begins])
         late = (clock[2:] - clock[1] - begins[:, None]).T
-        shown = np.zeros(len(each))
+        shown = np.zeros(worlds)
         if self.start == "fit":
-            shown = self._clock(model, parameters, each, None, [0.0])[0]
+            shown = self._clock(model, parameters, worlds, None, [0.0])[0]
             late += shown[:, None]
         return np.where(np.abs(late) > ROUNDING, late, 0.0), shown
 
-    def _ends(self, model, parameters, each, channel: int, last: float, shown: np.ndarray) -> float:
+    def _ends(self, model, parameters, channel: int, last: float, shown: np.ndarray) -> float:
         """Time since its start until which the motion of a segment is read [s]."""
-        return max(last, float(np.max(self._clock(model, parameters, each, channel, [0.0, last])[1] - shown)))
+        clock = self._clock(model, parameters, len(shown), channel, [0.0, last])
+        return max(last, float(np.max(clock[1] - shown)))
 
-    def _clock(
-        self, model: Model, parameters: Parameters, each: Sequence[Hypothesis], channel: int | None, times
-    ) -> np.ndarray:
+    def _clock(self, model: Model, parameters: Parameters, worlds: int, channel: int | None, times) -> np.ndarray:
         """[n, K] what a clock in the picture would show at frames at `times` [n], by a channel or (None) by all."""
-        rows = np.repeat(np.array(times)[:, None], len(each), axis=1)
+        rows = np.repeat(np.array(times)[:, None], worlds, axis=1)
         out = rows.copy()
         for name in model.effects:
             effect = get(name)
             if effect.family != "measurement" or effect.channels or effect.apply is None:
                 continue  # what reads angles or places has no time of its own
-            given = self._at_channel(name, channel, each, parameters)
+            given = at_channel(parameters, name, channel, worlds)
             out += effect.apply(lambda t: t[:, None], rows, **given)[:, 0] - rows
         return out
 
@@ -570,11 +570,10 @@ class Forward:
                 self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
         return self._paths[r]
 
-    def _measured(self, model, parameters, recording, distort, each, grid, channels, times, shown) -> np.ndarray:
+    def _measured(self, parameters, recording, distort, grid, channels, times, shown) -> np.ndarray:
         """Channels [n, D, W] as distorted measurements show them; what is `shown` first (K,) is the grid's start."""
         worlds = channels.shape[2]
-        repeat = worlds // len(each)
-        shown = np.repeat(shown, repeat)
+        shown = np.repeat(shown, worlds // len(shown))
         at = np.repeat(times[:, None], worlds, axis=1)
         parts, row, deep = [], 0, len(angle_mask(recording))
         for index, channel in enumerate(recording.channels.values()):
@@ -587,18 +586,19 @@ class Forward:
                 effect = get(name)
                 if effect.channels and channel.kind not in effect.channels:
                     continue
-                reader = _wrapped(effect, reader, self._at_channel(name, index, each, parameters, repeat))
+                reader = _wrapped(effect, reader, at_channel(parameters, name, index, worlds))
             parts.append(reader(at)[:, :width])
             row += width
         return np.concatenate(parts, axis=1)
 
-    def _at_channel(
-        self, name: str, channel: int | None, each: Sequence[Hypothesis], parameters: Parameters, repeat: int = 1
-    ) -> dict[str, np.ndarray]:
-        """Parameters (W,) of a measurement effect at one channel, or at all (None): else defaults."""
-        own = name in self.model.effects  # a measurement that the model itself describes holds for all
-        here = np.repeat([own or _acts(h, name, channel) for h in each], repeat)
-        return {n: np.where(here, v[0], get(name).parameter(n).default) for n, v in parameters.of(name).items()}
+
+def at_channel(parameters: Parameters, name: str, channel: int | None, worlds: int) -> dict[str, np.ndarray]:
+    """Parameters (W,) of a measurement effect at one channel; None: what all have in common, the smallest of each."""
+    out = {}
+    for n, v in parameters.of(name).items():
+        row = v[channel] if channel is not None else np.take_along_axis(v, np.abs(v).argmin(axis=0)[None], axis=0)[0]
+        out[n] = np.broadcast_to(row, (worlds,))
+    return out
 
 
 def distinct_motions(
@@ -697,11 +697,6 @@ def _with_effects(state: State, model: Model, step: int | None = None) -> State:
         power=np.zeros((count, state.worlds)),
         step=state.step if step is None else step,
     )
-
-
-def _acts(hypothesis: Hypothesis, effect: str, channel: int | None) -> bool:
-    """Whether a hypothesis distorts the measurement of a channel (None: of all of them) by an effect."""
-    return any(s.effect == effect and (s.entities is None or channel in s.entities) for s in hypothesis.suspects)
 
 
 def _wrapped(effect, inner, given):

@@ -66,13 +66,10 @@ class Suspect:
 
 
 def distinct_sites(a: Suspect, b: Suspect) -> bool:
-    """Whether both can act at once, each with numbers of its own: an effect has one value per crease, panel or node.
-
-    One of the measurement has one for all of its channels.
-    """
+    """Whether both can act at once, each with numbers of its own: one value per crease, panel or channel."""
     if a.effect != b.effect:
         return True
-    if a.kind == "measurement" or a.entities is None or b.entities is None:
+    if a.entities is None or b.entities is None:
         return False
     return not set(a.entities) & set(b.entities)
 
@@ -212,8 +209,7 @@ def apply(
                 index += 1
                 continue
             value = float(np.clip(values[index], *bounds))
-            everywhere = s.entities is None or s.kind == "measurement"  # channels are told apart where they are read
-            out.set(s.effect, f.name, value, None if everywhere else np.array(s.entities))
+            out.set(s.effect, f.name, value, None if s.entities is None else np.array(s.entities))
             index += 1
     return out
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from origami_sim.diagnose.forward import stiff
-from origami_sim.diagnose.hypothesis import Suspect, scaled
+from origami_sim.diagnose.hypothesis import Suspect, distinct_sites, scaled
 from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
 
@@ -180,12 +180,12 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
     )
 
 
-def again(screening: Screening, base: Fit, without: Sequence[str] = ()) -> Screening:
-    """The same signatures against the residual of another fit, without new simulations."""
+def again(screening: Screening, base: Fit) -> Screening:
+    """The signatures of suspects that can join another fit, against its residual, without new simulations."""
     kept = [
         (s.suspect, s.size, s.parts)
         for s in (*screening.signatures, *screening.untestable)
-        if s.suspect.effect not in without and s.parts
+        if s.parts and all(distinct_sites(s.suspect, t) for t in base.hypothesis.suspects)
     ]
     return rated(kept, base, screening.blocks)
 

@@ -104,7 +104,7 @@ def further(
 ) -> tuple[list[Fit], Fit | None]:
     """New fits of the best explanation and one effect more; of all such, the one that held-out data ask for."""
     base = fits[0]
-    left = again(screening, best, without=best.hypothesis.effects)
+    left = again(screening, best)
     if not left.signatures:
         return [], None
     top, found = left.signatures[0], distinct(left.signatures)
@@ -138,7 +138,7 @@ def stands_out(
     none, less, all_ = (g.reweighted(weights, new) for g in (base, best, f))
     if less.cost - all_.cost < words.INEXACT * (none.cost - less.cost):
         return False
-    left = again(reweighted(screening, none, weights, new), less, without=less.hypothesis.effects)
+    left = again(reweighted(screening, none, weights, new), less)
     if not left.signatures or look_elsewhere(left, o.draws, o.seed, small=words.SMALL) > o.level:
         return False
     return better(score(forward, all_, new), score(forward, less, new))
@@ -159,7 +159,7 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
         if not known:
             scores[id(inner)] = score(forward, inner, weights)
             out.append(inner)
-        left = again(screening, inner, without=inner.hypothesis.effects)
+        left = again(screening, inner)
         for g in distinct(left.signatures)[:RIVALS]:
             wanted = (*inner.hypothesis.suspects, g.suspect)
             if any(_same(f.hypothesis, wanted) for f in (*fits, *out)):

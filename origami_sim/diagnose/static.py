@@ -15,6 +15,7 @@ from origami_sim.diagnose.forward import (
     Block,
     Forward,
     angle_mask,
+    at_channel,
     component_names,
     continuous,
     distinct_motions,
@@ -119,7 +120,7 @@ class CurveForward(Forward, ABC):
             curve = self._curve(r, [worlds[m] for m in moves])
             first = np.repeat(stacked(recording)[0][0][:, None], len(moves), axis=1)
             continuous(curve, angle_mask(recording), first)
-            curves[r] = self._read(each, worlds, recording, curve[:, :, of])
+            curves[r] = self._read(worlds, recording, curve[:, :, of])
         out = []
         for b in wanted:
             block = self.blocks[b]
@@ -153,7 +154,7 @@ class CurveForward(Forward, ABC):
         """Undistorted channels [n, D, K] of a recording."""
         ...
 
-    def _read(self, each: list[Hypothesis], worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
+    def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
         """The channels [n, D, K] as distorted measurements show them."""
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
         names = [e for e in model.effects if get(e).family == "measurement" and not (recording.by_step and e in TIMED)]
@@ -166,7 +167,7 @@ class CurveForward(Forward, ABC):
                 effect = get(name)
                 if effect.apply is None or (effect.channels and channel.kind not in effect.channels):
                     continue
-                given = self._at_channel(name, index, each, parameters)
+                given = at_channel(parameters, name, index, len(worlds))
                 known = out[:, part].copy()
                 read = (lambda t, v=known: v) if recording.by_step else _interpolated(recording.times, known)
                 out[:, part] = effect.apply(read, at, **given)

@@ -689,8 +689,13 @@ def title(effect: str) -> str:
 
 def _tied(fits: Sequence[Fit], p: Sequence[float]) -> str:
     """What the explanations of a tie have in common, and between which they leave the choice."""
-    common = set.intersection(*({s.effect for s in f.hypothesis.suspects} for f in fits))
-    shared = [s.label for s in fits[0].hypothesis.suspects if s.effect in common]
+    every = [f.hypothesis.suspects for f in fits]
+    shared = [s.label for s in every[0] if all(any(t.label == s.label for t in other) for other in every)]
+    at_one = {s.effect for s in every[0] if s.label in shared}
+    common = set.intersection(*({s.effect for s in suspects} for suspects in every))
+    shared += [
+        f"{e} at one place or another" for e in dict.fromkeys(s.effect for s in every[0]) if e in common - at_one
+    ]
     text = "These recordings do not decide between "
     text += _join([f"{f.hypothesis.label} (p = {q:.2f})" for f, q in zip(fits[:4], p, strict=False)])
     if len(fits) > 4:

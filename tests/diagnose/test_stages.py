@@ -214,7 +214,7 @@ def test_whatever_is_added_to_whatever_was_recorded_never_fits_worse(seed):
         assert f.failed or f.cost <= base.cost * (1 + 1e-9), found.suspect.label
         if f.failed:
             continue
-        for g in again(screening, f, without=f.hypothesis.effects).signatures[:1]:
+        for g in again(screening, f).signatures[:1]:
             both = refit(forward, f, g, weights, screening, most=2)
             assert both.failed or both.cost <= f.cost * (1 + 1e-9), both.hypothesis.label
 
@@ -302,6 +302,21 @@ def test_an_offset_of_one_encoder_is_the_measurement():
     r.channels["fold1"].values[:] += 0.03
     found = diagnose(subject(3), [r], catalogue=(*LOOPS, "angle_offset"))
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_offset at channel fold1"
+
+
+def test_wrong_zeros_of_two_encoders_are_found_beside_each_other():
+    r = record(**SMALL)
+    for name, zero in (("fold1", 0.03), ("fold2", -0.02)):
+        r.channels[name].values[:] += zero
+    found = diagnose(subject(3), [r], catalogue=("angle_offset", "angle_scale", "crease_friction"))
+    assert found.verdict == "SEVERAL"
+    best = found.candidates[0]
+    zeros = {s: n for s, n in zip(best.sites, best.numbers[-2:], strict=True)}
+    assert set(zeros) == {"channel fold1", "channel fold2"}
+    for site, truth in (("channel fold1", 0.03), ("channel fold2", -0.02)):
+        assert zeros[site].value == pytest.approx(truth, abs=6e-4)
+        assert zeros[site].low < truth < zeros[site].high
+    assert set(found.patch) >= {"angle_offset.angle_offset@0", "angle_offset.angle_offset@1"}
 
 
 def test_a_large_error_of_the_scale_is_the_measurement():
@@ -451,14 +466,14 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
 
 
 def test_one_number_cannot_have_two_values():
-    """Two channels share an effect of the measurement, all creases that of each; two creases do not."""
+    """All creases share an effect with each of them, all channels likewise; two creases do not, nor two channels."""
     forward = arranged(subject(3), [record(**SMALL)], Options())
     every = {s.label: s for s in suspects(forward.model, forward.recordings, forward.drive)}
     one, two, each = (every[f"crease_friction at {s}"] for s in ("crease 0", "crease 1", "all creases"))
     assert distinct_sites(one, two) and distinct_sites(two, one) and not distinct_sites(one, one)
     assert not distinct_sites(one, each) and not distinct_sites(each, two)
     left, right = (every[f"angle_offset at channel fold{n}"] for n in (1, 2))
-    assert not distinct_sites(left, right) and not distinct_sites(left, every["angle_offset at the measurement"])
+    assert distinct_sites(left, right) and not distinct_sites(left, every["angle_offset at the measurement"])
     assert distinct_sites(left, every["angle_scale at channel fold1"])
 
 

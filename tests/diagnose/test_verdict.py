@@ -8,7 +8,7 @@ import pytest
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.diagnose.verdict import _named
+from origami_sim.diagnose.verdict import _named, _tied
 
 
 def explanation(site: str, strength: float):
@@ -35,6 +35,20 @@ def test_the_sentence_says_where_else_the_same_effect_may_act():
     assert ") (these recordings do not tell that from less at fold2), p = " in sentence(0.6, 0.4)
     for sure in (sentence(1.0), sentence(0.95, 0.05)):
         assert "these recordings" not in sure and "), p = " in sure
+
+
+def test_a_tie_says_what_all_of_its_explanations_contain():
+    def hypothesis(*pairs):
+        suspects = tuple(Suspect(effect, site, "crease", ()) for effect, site in pairs)
+        return SimpleNamespace(hypothesis=Hypothesis(suspects))
+
+    one, two, tilt = ("angle_offset", "channel 1"), ("angle_offset", "channel 2"), ("gravity_tilt", "the body")
+    p = (0.7, 0.3)
+    assert _tied([hypothesis(one, two), hypothesis(one, tilt)], p).endswith(
+        "; all of them contain angle_offset at channel 1"
+    )
+    assert _tied([hypothesis(one), hypothesis(two)], p).endswith("contain angle_offset at one place or another")
+    assert "contain" not in _tied([hypothesis(one), hypothesis(tilt)], p)
 
 
 def place(law, *, memory=0.0, share=0.9) -> Place:
