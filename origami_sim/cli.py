@@ -130,7 +130,11 @@ def _parser() -> argparse.ArgumentParser:
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
     p.add_argument(
-        "--prior", action="append", default=[], metavar="NAME=SD", help="how well a setting is known: 0.5mm, 5%%, or SI"
+        "--prior",
+        action="append",
+        default=[],
+        metavar="NAME=SD",
+        help="how well a setting is known (0.5mm, 5%%, or SI), or the alignment (clock_delay.clock_delay=5ms)",
     )
     p.add_argument("--suspects", metavar="A,B", help="suspect only these effects (default: all that can act)")
     p.add_argument(

@@ -16,16 +16,17 @@ import numpy as np
 
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.hypothesis import Subject
+from origami_sim.diagnose.hypothesis import Free, Subject
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.diagnose.report import geometry_of, write_report
-from origami_sim.diagnose.subject import spreads
+from origami_sim.diagnose.subject import alignments, divided, spreads
 from origami_sim.effects import get
 from origami_sim.errors import InputError
+from origami_sim.model import Model
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.scene import NAMES, Settings, check_recorded_scene, read_calibration, scene_module, scene_settings
@@ -70,8 +71,8 @@ def run(args: Namespace) -> int:
         recordings.append(
             replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
         )
-    known = _priors(settings, data, args.prior)
-    subject = Subject.from_scene(module, settings, spreads=known, name=name)
+    known, aligned = _priors(settings, data, args.prior, model)
+    subject = Subject.from_scene(module, settings, spreads=known, name=name).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
     options = _options(args)
@@ -186,10 +187,14 @@ def _naming(file: str | None) -> Iterator[None]:
         raise error if error.file is not None else InputError(str(error), file=file) from None
 
 
-def _priors(settings: Settings, data: DataSet, given: Sequence[str]) -> dict[str, float]:
-    """Standard deviations [SI] from the sidecar, and over them from the command line."""
+def _priors(
+    settings: Settings, data: DataSet, given: Sequence[str], model: Model
+) -> tuple[dict[str, float], list[Free]]:
+    """Standard deviations [SI] by the sidecar, and over them by the command line; and numbers of further effects."""
     first = data[0].metadata
-    out = spreads(settings, first.get("priors") or {}, source=first.get("sidecar"))
+    sidecar = first.get("sidecar")
+    own, further = divided(first.get("priors") or {}, model)
+    out, aligned = spreads(settings, own, source=sidecar), alignments(further, source=sidecar)
     stated: dict[str, float | str] = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -198,7 +203,9 @@ def _priors(settings: Settings, data: DataSet, given: Sequence[str]) -> dict[str
                 "not a prior", field="--prior", value=text, allowed="name=sd, e.g. length_1=0.5mm or mass_1=1%"
             )
         stated[name] = value
-    return out | spreads(settings, stated, source="--prior")
+    own, further = divided(stated, model)
+    aligned = [*(f for f in aligned if f.name not in further), *alignments(further, source="--prior")]
+    return out | spreads(settings, own, source="--prior"), aligned
 
 
 def _options(args: Namespace) -> Options:

@@ -216,12 +216,14 @@ class Forward:
         A scale of the measurement scales the recorded rates too; it is undone by fixed-point steps.
         """
         out = np.zeros((len(self.blocks), self.local))
-        distort = [e for e in hypothesis.effects if get(e).family == "measurement"]
-        if not (distort and self.local):
+        if not self.local:
             return out
         try:
-            _, parameters = self._world(hypothesis, theta, hypothesis.effects)
+            model, parameters = self._world(hypothesis, theta, hypothesis.effects)
         except InputError:
+            return out
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        if not distort:
             return out
         for r, recording in enumerate(self.recordings):
             mine = [b for b, block in enumerate(self.blocks) if block.recording == r and block.line is not None]

@@ -150,6 +150,24 @@ class Subject:
 
         return cls(build, tuple(nominals))
 
+    def beside(self, numbers: Sequence[Free]) -> "Subject":
+        """The same with effects that act in any case, as strongly as the fit says: such as a clock that may be late.
+
+        A number is named "effect.parameter" and holds for all of the effect's entities.
+        """
+        owners = dict.fromkeys(f.name.partition(".")[0] for f in numbers)
+        own = [replace(f, owner=f.name.partition(".")[0], name=f.name.partition(".")[2]) for f in numbers]
+        acting = Hypothesis(tuple(Suspect(e, "", "", tuple(f for f in own if f.owner == e)) for e in owners))
+        ordered = [f.label for f in acting.free]
+
+        def build(values: Mapping[str, float]):
+            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in ordered})
+            richer = model.with_effects(*owners)
+            given = [values.get(f.label, f.start) for f in acting.free]
+            return richer, apply(parameters, acting, given, richer), drive
+
+        return Subject(build, (*self.nominals, *numbers), self.name) if numbers else self
+
 
 def factor(name: str, spread: float) -> Free:
     """A nominal parameter "effect.parameter" of `Subject.from_model`, known to within a relative `spread`."""

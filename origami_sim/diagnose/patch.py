@@ -181,18 +181,19 @@ def _found(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addit
             effect, _, parameter = name.partition(".")
             found.setdefault((effect, entities), {})[parameter] = value
     best = patched(diagnosis)
-    sites = best.sites if best is not None else [""] * len(found)
+    suspected = [] if best is None else best.effects
+    sites = iter([] if best is None else best.sites)
     source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
     return tuple(
         Addition(
             effect,
             values,
             tuple(map(int, entities.split(","))) if entities else None,
-            site,
+            next(sites) if effect in suspected else "",
             source,
             effect in diagnosis.changed,
         )
-        for ((effect, entities), values), site in zip(found.items(), sites, strict=True)
+        for (effect, entities), values in found.items()
     )
 
 

@@ -6,8 +6,9 @@ from types import ModuleType
 
 import numpy as np
 
-from origami_sim.diagnose.hypothesis import Free, Subject, factor
+from origami_sim.diagnose.hypothesis import NOMINAL, Free, Subject, factor
 from origami_sim.drive import Drive
+from origami_sim.effects import CATALOGUE, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Setting, Settings, _parse, scene_module, scene_settings
@@ -29,7 +30,8 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
     Args:
         source: see `Source`.
         priors: standard deviations of what was known before. For a scene: by setting, see `spreads`. For a model with
-            parameters: by "effect.parameter", relative ("5 %" or 0.05), one factor for all entities.
+            parameters: by "effect.parameter", relative ("5 %" or 0.05), one factor for all entities. For both: by
+            "effect.parameter" of an effect that the model lacks, see `alignments`.
 
     Raises:
         InputError: no such scene, setting or parameter; a prior that is not positive; what is no model.
@@ -44,17 +46,56 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         source = (source, scene_settings(source))
     match source:
         case (ModuleType() as module, Settings() as settings):
-            return Subject.from_scene(module, settings, spreads=spreads(settings, priors or {}))
+            own, further = divided(priors or {}, module.build(settings)[0])
+            subject = Subject.from_scene(module, settings, spreads=spreads(settings, own))
+            return subject.beside(alignments(further))
         case (Model() as model, Parameters() as parameters) | (Model() as model, Parameters() as parameters, Drive()):
             drive = source[2] if len(source) == 3 else None
-            nominals = [_factor(parameters, name, given) for name, given in (priors or {}).items()]
-            return Subject.from_model(model, parameters, drive, nominals)
+            own, further = divided(priors or {}, model)
+            nominals = [_factor(parameters, name, given) for name, given in own.items()]
+            return Subject.from_model(model, parameters, drive, nominals).beside(alignments(further))
     raise InputError(
         "this is no model",
         field="model",
         value=type(source).__name__,
         allowed="a scene, (model, parameters), (model, parameters, drive), or a Subject",
     )
+
+
+def divided(priors: Mapping[str, float | str], model: Model) -> tuple[dict, dict]:
+    """Priors of the model's own numbers, and those of effects that it lacks."""
+    lacking = {n for n, e in CATALOGUE.items() if e.fitted and n not in model.effects}
+    further = {n: v for n, v in priors.items() if n.partition(".")[0] in lacking}
+    return {n: v for n, v in priors.items() if n not in further}, further
+
+
+def alignments(priors: Mapping[str, float | str], *, source: object = None) -> list[Free]:
+    """Numbers of effects that may act without being a fault, such as a clock that is late by some milliseconds.
+
+    Args:
+        priors: standard deviations by "effect.parameter", in the parameter's unit or with one ("5 ms").
+
+    Raises:
+        InputError: no such effect or parameter, or none that a diagnosis fits; a value that is no positive number.
+    """
+    out = []
+    for label, given in priors.items():
+        name, _, parameter = label.partition(".")
+        effect = get(name)
+        if parameter not in effect.fitted:
+            allowed = ", ".join(f"{name}.{p}" for p in effect.fitted)
+            raise InputError("not a number that is fitted", file=source, field="priors", value=label, allowed=allowed)
+        p = effect.parameter(parameter)
+        s = Setting(label, p.default, p.unit, "", p.meaning)
+        spread = _positive(
+            label,
+            str(_parse(s, str(given).strip(), Path(str(source or "")))),
+            given,
+            f"in {p.unit} or with a unit",
+            source,
+        )
+        out.append(Free(NOMINAL, label, p.unit, p.default, 0.3 * spread, *p.bounds, spread))
+    return out
 
 
 def _factor(parameters: Parameters, name: str, given: float | str) -> Free:

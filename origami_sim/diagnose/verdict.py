@@ -23,7 +23,7 @@ from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import LITTLE, Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.diagnose.trust import trust
-from origami_sim.effects import get
+from origami_sim.effects import CATALOGUE, get
 from origami_sim.recording.units import quantity
 
 FLOOR = 1.3
@@ -425,12 +425,16 @@ def _adequate_or_parameter(w: _Weighed, given: Fit, weights: Weights) -> _Said:
         return _Said("ADEQUATE", _adequate(w.over), probability, [], base)
     far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
     f, t = far[0]
+    effect = CATALOGUE.get(f.name.partition(".")[0])
+    recorder = effect is not None and effect.family == "measurement"
     text = (
-        f"Refitting the nominal parameters within their priors is enough: {f.label} goes from "
+        f"{'Aligning the recording' if recorder else 'Refitting the nominal parameters'} within "
+        f"{'what is known of it' if recorder else 'their priors'} is enough: {f.label} goes from "
         f"{said(f.start, f.unit)} to {said(t, f.unit)}, {abs(t - f.start) / f.spread:.1f} standard deviations of what "
         f"was known; held-out error is then {w.over:.2f} times the noise."
     )
-    return _Said("PARAMETER", text, probability, [f.label for f, t in far if abs(t - f.start) > f.spread], base)
+    word = "MEASUREMENT" if recorder else "PARAMETER"
+    return _Said(word, text, probability, [f.label for f, t in far if abs(t - f.start) > f.spread], base)
 
 
 def _adequate(over: float) -> str:

@@ -55,6 +55,7 @@
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
     mass_1 = 0.5e-3                     # in the unit of the scene's setting, or "5 %" of its value, or "0.5 mm"
+    "clock_delay.clock_delay" = "5 ms"  # of an effect that may act without being a fault: how well it is aligned
 
 Any other key is an error. Units: see `origami_sim.recording.units`.
 """

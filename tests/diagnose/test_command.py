@@ -621,6 +621,9 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
         (("--model", "pendulum_chain", "--prior", "mass_1=-1%"), "not a standard deviation"),
         (("--model", "pendulum_chain", "--prior", "mass_1=2 mm"), "wrong unit"),
         (("--model", "pendulum_chain", "--prior", "nothing=1"), "for a number of the model"),
+        (("--model", "pendulum_chain", "--prior", "clock_delay.delay=5ms"), "clock_delay.clock_delay"),
+        (("--model", "pendulum_chain", "--prior", "clock_delay.clock_delay=5mm"), "wrong unit"),
+        (("--model", "pendulum_chain", "--prior", "clock_delay.clock_delay=-5ms"), "not a standard deviation"),
         (("--model", "pendulum_chain", "--set", "gravity=0"), "--set: out of its range"),
         (("--model", "pendulum_chain", "--set", "weight=1"), "--set: cannot apply"),
         (("--model", "pendulum_chain", "--segment", "0"), "must be positive"),
@@ -674,10 +677,29 @@ def test_priors_come_in_the_settings_unit_with_a_unit_or_as_a_share(recorded):
         {"mass_1": 0.02 * settings.mass_1, "length_1": 5e-4, "viscosity_1": 2e-5}
     )
     data = command.read_recordings([str(recorded)])
-    known = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"])
+    model = scene_module("pendulum_chain").build(settings)[0]
+    known, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], model)
     assert known == pytest.approx(
         {"length_1": 1e-3, "mass_1": 1e-3, "viscosity_1": 5e-5}
     )  # the command line over the sidecar
+    assert not aligned
+
+
+def test_an_alignment_is_a_number_of_the_model_and_comes_into_the_patch(recorded, tmp_path):
+    """A scale that is known to 1 %, on the command line over the sidecar; beside it friction is found as without."""
+    sidecar = recorded.with_suffix(".toml").read_text() + '"angle_scale.angle_scale" = 0.5\n'
+    t, angle = np.loadtxt(recorded, delimiter=",", skiprows=1).T
+    table(tmp_path / "scaled.csv", t, {"theta1_rad": 0.985 * angle}, sidecar)
+    given = ("--model", "pendulum_chain", "--prior", "angle_scale.angle_scale=0.01", "--out", tmp_path / "out", *QUICK)
+    assert main("diagnose", tmp_path / "scaled.csv", *given) == EXIT["MECHANISM"]
+    data = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    scale = next(n for n in data["candidates"][0]["numbers"] if n["label"] == "angle_scale.angle_scale")
+    assert scale["spread"] == 0.01 and scale["low"] < -0.015 < scale["high"]
+    assert data["patch"]["crease_friction.friction_moment@0"] == pytest.approx(FRICTION, rel=0.1)
+    patch = read_calibration(tmp_path / "out" / "patched.toml")
+    added = {a.effect: a.values for a in patch.effects}
+    assert added["angle_scale"] == {"angle_scale": pytest.approx(scale["value"])}
+    assert "crease_friction" in added
 
 
 def test_several_recordings_are_one_data_set(recorded, tmp_path):
@@ -730,6 +752,10 @@ def test_python_takes_a_scene_or_a_model_with_parameters():
     for source, said in ((3, "no model"), ("nothing", "no such scene")):
         with pytest.raises(InputError, match=said):
             subject_of(source)  # type: ignore[arg-type]
+    late = subject_of((model, parameters), {"clock_delay.clock_delay": "5 ms"})
+    assert [(f.name, f.spread, f.unit) for f in late.nominals] == [("clock_delay.clock_delay", 0.005, "s")]
+    richer, numbers, _ = late.build({"clock_delay.clock_delay": 0.02})
+    assert richer.effects[-1] == "clock_delay" and numbers["clock_delay", "clock_delay"] == 0.02
     with pytest.raises(InputError, match="no such parameter"):
         subject_of((model, parameters), {"crease.nothing": 0.1})
     with pytest.raises(InputError, match="states its own priors"):

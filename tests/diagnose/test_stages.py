@@ -18,6 +18,7 @@ from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, si
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, again, screen
 from origami_sim.diagnose.search import chosen, look_elsewhere, refit, unbent
+from origami_sim.diagnose.subject import alignments
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
@@ -324,6 +325,14 @@ def test_a_large_error_of_the_scale_is_the_measurement():
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_scale at the measurement"
     scale = next(n for n in found.candidates[0].numbers if n.label == "angle_scale.angle_scale")
     assert scale.low < -0.3 < scale.high and scale.high - scale.low < 0.06
+
+
+def test_an_alignment_within_what_is_known_is_the_measurement():
+    aligned = subject(3).beside(alignments({"angle_scale.angle_scale": 0.02}))
+    found = diagnose(aligned, [record(scale=0.96, **SMALL)], catalogue=LOOPS[:3])
+    assert found.verdict == "MEASUREMENT" and found.chosen == ["angle_scale.angle_scale"]
+    assert found.sentence.startswith("Aligning the recording within what is known of it is enough: angle_scale")
+    assert found.patch["angle_scale.angle_scale"] == pytest.approx(-0.04, abs=0.02)
 
 
 def test_more_loss_at_one_crease_is_found_where_the_model_has_that_loss():
