@@ -220,6 +220,35 @@ def body_point(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
     return x[:, node] + height * doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
 
 
+def body_axes(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
+    """The model's axes x, y, z as the triangle under a marker has turned them, as the channel sees directions.
+
+    Returns:
+        (F, 3 axes, 3): x, y, z of a marker; right, up and towards the camera of one in a picture. For x [F, N, 3].
+    """
+    if "panel" in channel.attachment:
+        panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
+        nodes = _on_panel(model, panel, np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float))[0]
+    else:
+        node = _index(model, channel, "node", len(model.position))
+        around = np.flatnonzero((model.triangles == node).any(axis=1))
+        nodes = model.triangles[around[0]] if len(around) else None
+    turned = np.broadcast_to(np.eye(3), (len(x), 3, 3))
+    if nodes is not None:  # a node without a panel does not turn
+        turned = np.einsum("ka,fkb->fab", _own_axes(model.position[nodes][None])[0], _own_axes(x[:, nodes]))
+    if channel.camera is not None:
+        turned = turned @ np.vstack([channel.camera.axes, np.cross(*channel.camera.axes)]).T
+    return turned
+
+
+def _own_axes(corners: np.ndarray) -> np.ndarray:
+    """Right-handed axes [F, 3, 3] of triangles [F, 3, 3]: along the first side, across it, along the normal."""
+    along = corners[:, 1] - corners[:, 0]
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    normal = _normals(corners)
+    return np.stack([along, np.cross(normal, along), normal], axis=1)
+
+
 def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     """Force on the object of its support at a `node` or some `nodes`, or of the `ground`: (F, 3) [N].
 
@@ -380,12 +409,16 @@ def _distorted(trajectory, channel, frames, values, times, world) -> np.ndarray:
     if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
         depth = channel.camera.depth(body_point(trajectory.model, trajectory.x[:, :, world], channel))
         columns = np.column_stack([columns, depth])
+    measured = sorted(_measured(trajectory.model, channel), key=lambda name: not get(name).on_body)
+    if measured and get(measured[0]).on_body:
+        axes = body_axes(trajectory.model, trajectory.x[:, :, world], channel)
+        columns = np.column_stack([columns, axes.reshape(len(frames), -1)])
     spline = CubicSpline(frames, columns)
 
     def read(at: np.ndarray) -> np.ndarray:
         return np.moveaxis(spline(np.clip(at, frames[0], frames[-1])), -1, 1)  # [n, W, d] -> [n, d, W]
 
-    for name in _measured(trajectory.model, channel):
+    for name in measured:
         read = _through(get(name), trajectory.parameters, world, read)
     seen = read(times[:, None])[:, : values[0].size, 0]
     return seen.reshape(len(times), *values.shape[1:])

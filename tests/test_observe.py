@@ -262,3 +262,27 @@ def test_a_recording_is_held_against_the_model(motion):
         check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="arm")), same)
     with pytest.raises(InputError, match=r"nothing of that name.*channels\.c\.panel.*lid"):
         check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="lid")), model)
+
+
+@pytest.mark.parametrize("camera", [None, Camera(np.zeros(3), np.eye(3)[[0, 2]])])
+def test_a_marker_offset_is_a_marker_at_another_point_of_its_panel(motion, camera):
+    """In the model's axes at the reference state, as `point`, and the height along the panel's normal."""
+    model, parameters = motion.model.with_effects("marker_offset"), None
+    panel = model.names["panel"].index("arm2")
+    nodes = model.triangles[model.triangle_panel == panel]
+    corners = model.position[nodes[0]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.linalg.norm(normal)
+    inside = 2e-3 * (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+    offset = inside + 3e-3 * normal
+    parameters = motion.parameters.for_model(model)
+    for axis, value in zip("xyz", offset, strict=True):
+        parameters.set("marker_offset", f"offset_{axis}", value)
+    kind, width = ("marker", 3) if camera is None else ("marker_2d", 2)
+    times = motion.times[:40]
+    plain = replace(channel(kind, np.zeros((40, width)), unit="m", panel="arm2", point=[0, 0, 0]), camera=camera)
+    moved = replace(plain, attachment={"panel": "arm2", "point": inside.tolist(), "height": 3e-3})
+    found = observe(replace(motion, model=model, parameters=parameters), recording(times, plain))["c"]
+    expected = observe(motion, recording(times, moved))["c"]
+    np.testing.assert_allclose(found, expected, atol=2e-7)  # panels bend by that much
+    assert np.abs(found - observe(motion, recording(times, plain))["c"]).max() > 2e-3

@@ -4,7 +4,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.model import Model, dihedral_angles
-from origami_sim.observe import _index, body_point
+from origami_sim.observe import _index, body_axes, body_point
 from origami_sim.recording import Camera, Channel, Recording
 
 
@@ -80,6 +80,19 @@ def depths(model: Model, recording: Recording, x: np.ndarray) -> np.ndarray:
     pictured = [c for c in recording.channels.values() if c.kind == "marker_2d"]
     found = [_camera(c).depth(_points(model, c, x)) for c in pictured]
     return np.stack(found, axis=1) if found else np.zeros((len(x), 0, x.shape[2]))
+
+
+def turned_axes(model: Model, recording: Recording, x: np.ndarray) -> np.ndarray:
+    """The axes of the body under each marker as its channel sees them, [F, 9 k, W] at positions x [F, N, W, 3]."""
+    frames, nodes, worlds, _ = x.shape
+    each = np.moveaxis(x, 2, 1).reshape(frames * worlds, nodes, 3)
+    found = [body_axes(model, each, c).reshape(frames, worlds, 9) for c in marked(recording)]
+    return np.moveaxis(np.concatenate(found, axis=2), 2, 1) if found else np.zeros((frames, 0, worlds))
+
+
+def marked(recording: Recording) -> list[Channel]:
+    """The channels that follow a marker."""
+    return [c for c in recording.channels.values() if c.kind in ("marker", "marker_2d")]
 
 
 def _points(model: Model, channel: Channel, x: np.ndarray) -> np.ndarray:

@@ -8,7 +8,15 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from origami_sim.diagnose.articulation import Articulation, Pose
-from origami_sim.diagnose.channels import angle_mask, channel_values, component_names, depths, stacked
+from origami_sim.diagnose.channels import (
+    angle_mask,
+    channel_values,
+    component_names,
+    depths,
+    marked,
+    stacked,
+    turned_axes,
+)
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times, told_apart
 from origami_sim.diagnose.track import coordinates, placed
 from origami_sim.distort import distorted
@@ -222,7 +230,7 @@ class Forward:
             model, parameters = self._world(hypothesis, theta, hypothesis.effects)
         except InputError:
             return out
-        distort = [e for e in model.effects if get(e).family == "measurement"]
+        distort = [e for e in model.effects if get(e).family == "measurement" and not get(e).on_body]
         if not distort:
             return out
         for r, recording in enumerate(self.recordings):
@@ -577,12 +585,16 @@ class Forward:
         worlds = channels.shape[2]
         shown = np.repeat(shown, worlds // len(shown))
         at = np.repeat(times[:, None], worlds, axis=1)
+        distort = sorted(distort, key=lambda name: not get(name).on_body)
         parts, row, deep = [], 0, len(angle_mask(recording))
+        axes = deep + sum(c.kind == "marker_2d" for c in recording.channels.values())
         for index, channel in enumerate(recording.channels.values()):
             width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
             rows = [*range(row, row + width)]
             if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
                 rows, deep = [*rows, deep], deep + 1
+            if get(distort[0]).on_body and channel in marked(recording):
+                rows, axes = [*rows, *range(axes, axes + 9)], axes + 9
             reader = _reader(grid, channels[:, rows], shown, rested=self.start != "fit")
             for name in distort:
                 effect = get(name)
@@ -665,7 +677,7 @@ FILMED = 64e6
 
 
 def filmed(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):
-    """Channels of the next frames and depths of markers in pictures, in parts [f, D + k, W].
+    """Channels of the next frames and what else is asked of markers (`_pictured`), in parts [f, D + k, W].
 
     With the present state as the first frame, if `first`.
     """
@@ -686,8 +698,11 @@ def filmed(batch: Batch, recording: Recording, frames: int, substeps: int, step:
 
 
 def _pictured(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
-    """All components, and after them the depth of every marker in a picture, [F, D + k, W]."""
-    return np.concatenate([channel_values(model, recording, x, angles), depths(model, recording, x)], axis=1)
+    """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W]."""
+    parts = [channel_values(model, recording, x, angles), depths(model, recording, x)]
+    if any(get(e).on_body for e in model.effects):
+        parts.append(turned_axes(model, recording, x))
+    return np.concatenate(parts, axis=1)
 
 
 def _with_effects(state: State, model: Model, step: int | None = None) -> State:

@@ -268,6 +268,8 @@ def suspects(
             sites += _edges(model)
         if effect.family == "measurement":
             sites = _channel_sites(recordings[0], effect.channels)
+            if effect.on_body and len(sites) > 1:  # each marker is beside its own point
+                sites = sites[1:]
         for site, kind, entities in sites:
             free = tuple(_free(name, p, entities) for p in effect.fitted)
             found.append(Suspect(name, site, kind, free, entities, len(sites)))

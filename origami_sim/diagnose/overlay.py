@@ -9,11 +9,12 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.forward import Block, Forward, stacked
-from origami_sim.diagnose.hypothesis import Hypothesis
+from origami_sim.diagnose.hypothesis import Hypothesis, Suspect
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.several import numbers_kept
 from origami_sim.diagnose.static import CurveForward, Static
+from origami_sim.effects import get
 from origami_sim.model import Model, dihedral_angles
 from origami_sim.recording import Channel
 from origami_sim.replay import Overlay, write_overlay
@@ -97,9 +98,14 @@ def _positions(forward: Forward, fit: Fit, r: int, mine: list[int]) -> dict[int,
         for n, b in enumerate(forward.blocks)
     ]
     # an error of one channel is no node's
-    felt = tuple(s for s in fit.hypothesis.suspects if s.kind != "measurement" or s.entities is None)
+    felt = tuple(s for s in fit.hypothesis.suspects if s.kind != "measurement" or _of_all(s))
     predicted = other.predict(Hypothesis(felt), numbers_kept(fit, felt)[None], fit.local[None], mine)
     return {b: p[0].reshape(-1, count, 3) for b, p in zip(mine, predicted, strict=True)}
+
+
+def _of_all(s: Suspect) -> bool:
+    """Whether an error of the measurement is that of all channels."""
+    return s.entities is None and not get(s.effect).on_body
 
 
 def _recorded(forward: Forward, block: Block, frames: np.ndarray) -> np.ndarray:

@@ -142,7 +142,7 @@ class CurveForward(Forward, ABC):
         Load steps have no clock: what needs one is left out. In time, an effect with a time constant is suspected with
         several, spread over the recording, because its signature changes with it altogether. See also `told_apart`.
         """
-        every = told_apart(every, len(self.components))
+        every = [s for s in told_apart(every, len(self.components)) if not get(s.effect).on_body]
         if all(r.by_step for r in self.recordings):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]
@@ -157,7 +157,8 @@ class CurveForward(Forward, ABC):
     def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
         """The channels [n, D, K] as distorted measurements show them."""
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
-        names = [e for e in model.effects if get(e).family == "measurement" and not (recording.by_step and e in TIMED)]
+        without = {*(TIMED if recording.by_step else ()), *(e for e in model.effects if get(e).on_body)}
+        names = [e for e in model.effects if get(e).family == "measurement" and e not in without]
         out, row = curve.copy(), 0
         at = np.repeat(recording.times[:, None], len(worlds), axis=1)
         for index, channel in enumerate(recording.channels.values()):

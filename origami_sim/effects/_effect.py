@@ -99,6 +99,9 @@ class Effect:
             undistorted channel [n, d, W], a marker in a picture with its depth towards the camera as the third
             component. Parameters are arrays [W].
         channels: kinds of channels that a distortion of the measurement can act on (empty: all).
+        on_body: of a measurement that acts on markers as their panels turn, before anything else. `read` then gives
+            three components of the marker (right, up and towards the camera in a picture), and after them those of the
+            model's axes x, y and z as the panel has turned them.
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
         stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
@@ -125,6 +128,7 @@ class Effect:
     magnet: wp.Function | None = None
     apply: Callable | None = None
     channels: tuple[str, ...] = ()
+    on_body: bool = False
     fitted: tuple[str, ...] = ()
     stated: tuple[str, ...] = ()
     conservative: bool = False

@@ -65,9 +65,10 @@ def test_is_a_suspect_that_is_silent_by_default(name):
         assert set(effect.channels) <= set(CHANNEL_KINDS)
 
         def motion(t):
-            return np.stack([np.sin(WAVE * t), t, 1 + t * t], axis=1)
+            place = np.stack([np.sin(WAVE * t), t, 1 + t * t], axis=1)
+            return np.concatenate([place, turned_about_y(t)], axis=1) if effect.on_body else place
 
-        clean = motion(TIMES[:, None])
+        clean = motion(TIMES[:, None])[:, :3]
         assert np.array_equal(measured(name, motion, **off), clean)
         assert np.abs(measured(name, motion, **typical) - clean).max() > 1e-4
     else:
@@ -79,6 +80,13 @@ def test_is_a_suspect_that_is_silent_by_default(name):
         assert touched == set(effect.channels) or (name == "drive_delay" and len(touched) == 4)
 
 
+def turned_about_y(t):
+    """The nine components [n, 9, W] of axes that turn about y by the angle t."""
+    nothing = 0 * t
+    x, z = (np.cos(t), nothing, -np.sin(t)), (np.sin(t), nothing, np.cos(t))
+    return np.stack([*x, nothing, nothing + 1, nothing, *z], axis=1)
+
+
 @pytest.mark.parametrize("name", [*DRIVES, *MEASUREMENTS])
 def test_worlds_are_independent(name):
     """Two worlds with other values, and a drive that itself differs, are what each of them is alone."""
@@ -88,10 +96,11 @@ def test_worlds_are_independent(name):
     if effect.family == "measurement":
 
         def motion(t):
-            return np.stack([np.sin(WAVE * t), t], axis=1)
+            place = np.stack([np.sin(WAVE * t), t, t][: 3 if effect.on_body else 2], axis=1)
+            return np.concatenate([place, turned_about_y(t)], axis=1) if effect.on_body else place
 
         together = measured(name, motion, **both)
-        assert together.shape == (len(TIMES), 2, 2)
+        assert together.shape == (len(TIMES), 3 if effect.on_body else 2, 2)
         for w in (0, 1):
             assert np.allclose(together[:, :, w], measured(name, motion, **values[w])[:, :, 0], rtol=0, atol=1e-13)
         return

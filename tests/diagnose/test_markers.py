@@ -1,0 +1,51 @@
+"""A marker that is not where it was said to be on its panel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose import diagnose
+from origami_sim.diagnose.articulation import Articulation
+from origami_sim.diagnose.hypothesis import suspects
+from origami_sim.drive import Drive
+from origami_sim.model import State
+from origami_sim.observe import observe
+from origami_sim.recording import Camera, Channel, Recording
+from origami_sim.solve.dynamics import simulate
+from tests.diagnose.strips import hanging, subject
+
+LIFT, DOWN, NOISE = 1.5e-3, 0.5e-3, 1e-4
+
+
+def filmed() -> Recording:
+    """A swing of two panels in a picture; the last marker is lifted off its panel (x), and glued too high (z)."""
+    model, parameters = hanging(3)
+    arm, rng = Articulation(model), np.random.default_rng(0)
+    start = arm.positions(arm.moved(arm.reference(), np.array([[0.9], [-0.7]])))[:, 0]
+    made = simulate(model, parameters, Drive(), duration=3.0, rate=100, state=State.at_rest(model, position=start))
+    camera = Camera(np.zeros(3), np.eye(3)[[0, 2]])
+
+    def recorded(last: dict) -> Recording:
+        blank = np.zeros((len(made.times), 2))
+        places = {"m1": {"panel": 1, "point": [0.0, 0.0, -0.012]}, "m2": {"panel": 2} | last}
+        channels = {n: Channel(n, "marker_2d", blank, "m", NOISE, at, camera=camera) for n, at in places.items()}
+        return Recording("film", made.times, channels)
+
+    true = observe(made, recorded({"point": [0.0, 0.0, -0.012 + DOWN], "height": LIFT}))
+    said = recorded({"point": [0.0, 0.0, -0.012]})
+    seen = {n: replace(c, values=true[n] + NOISE * rng.normal(size=c.values.shape)) for n, c in said.channels.items()}
+    return replace(said, channels=seen)
+
+
+def test_a_marker_beside_its_place_is_the_measurement():
+    recording = filmed()
+    every = suspects(hanging(3)[0], [recording], Drive())
+    assert [s.site for s in every if s.effect == "marker_offset"] == ["channel m1", "channel m2"]
+    wrong = ("marker_offset", "length_offset", "length_scale", "crease_offset")
+    found = diagnose(subject(3), [recording], catalogue=wrong)
+    assert found.verdict == "MEASUREMENT" and found.chosen[0] == "marker_offset at channel m2"
+    numbers = {n.label: n for n in found.candidates[0].numbers}
+    for axis, truth in (("x", LIFT), ("z", DOWN)):
+        n = numbers[f"marker_offset.offset_{axis}"]
+        assert n.value == pytest.approx(truth, abs=5e-5) and n.low < truth < n.high
