@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from effects.kit import make_model, quiet, random_rotation, slope, start
 
+from origami_sim.diagnose import diagnose
 from origami_sim.diagnose.hypothesis import suspects
-from origami_sim.drive import Drive
+from origami_sim.drive import Drive, series
 from origami_sim.materials import MU0
 from origami_sim.model import magnets
 from origami_sim.recording import Channel, Recording
+from origami_sim.recording.recording import DriveChannel
 from origami_sim.scene import read_calibration, scene_module
 from origami_sim.solve.batch import forces
+from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import tangent
 
 NAME = "dipole_interaction"
@@ -138,6 +141,31 @@ def test_a_flap_of_the_box_sags_without_a_field(tmp_path):
     without, with_it = (np.degrees(box.flap_angles(read_calibration(c), np.zeros(1))[0]) for c in ("box", str(file)))
     assert (with_it - without).mean() == pytest.approx(-0.56, abs=0.12)
     assert np.ptp(with_it) < 1e-6
+
+
+@pytest.mark.slow
+def test_magnets_in_each_others_field_are_found_where_they_were_left_out(tmp_path):
+    """A box in 20 and 80 mT, of which the model knows the field of the coil only."""
+    file = tmp_path / "box.toml"
+    file.write_text(read_calibration("box").file.read_text() + "\n[[effects.dipole_interaction]]\ncoupling = 1.0\n")
+    box, times, rng = scene_module("box"), np.arange(0, 2, 1 / 120), np.random.default_rng(1)
+    model, parameters, _ = box.build(read_calibration(str(file)))
+    recordings = []
+    for name, level in (("weak", 0.02), ("strong", 0.08)):
+        field = level * np.sin(2 * np.pi * times)[:, None] * [0.0, 0.0, 1.0]
+        made = simulate(
+            model, parameters, Drive(field=(0, 0, series(times, field[:, 2]))), duration=times[-1], rate=120
+        )
+        read = made.creases[:, :, 0] + 2e-3 * rng.normal(size=(len(times), 4))
+        channels = {
+            f"fold{c}": Channel(f"fold{c}", "crease_angle", read[:, c], "rad", 2e-3, {"crease": c}) for c in range(4)
+        }
+        recordings.append(Recording(name, times, channels, {"field": DriveChannel("field", field, "T", False)}))
+    others = ("crease_offset", "gravity_tilt", "remanence_error", "eccentric_weight", "crease_friction")
+    found = diagnose(box, recordings, catalogue=(NAME, *others))
+    assert found.verdict == "MECHANISM" and found.chosen == ["dipole_interaction at all panels"]
+    coupling = found.candidates[0].numbers[-1]
+    assert coupling.value == pytest.approx(1.0, abs=0.03)
 
 
 @pytest.mark.parametrize(
