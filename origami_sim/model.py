@@ -294,6 +294,7 @@ def magnets(model: Model, parameters: Parameters) -> np.ndarray:
     for owner in dict.fromkeys(o for o, name in parameters if name == "volume"):
         magnet = parameters.world(0).of(owner)
         of = np.flatnonzero(magnet["volume"][:, 0] * magnet["remanence"][:, 0])
+        magnet.setdefault("poling_n", np.zeros_like(magnet["volume"]))
         a, b, n, remanence = (magnet[k][of] for k in ("poling_1", "poling_2", "poling_n", "remanence"))
         x1, x2, x3 = np.moveaxis(model.position[model.triangles[of]], 1, 0)
         in_plane, normal = a * (x2 - x1) + b * (x3 - x1), np.cross(x2 - x1, x3 - x1)
