@@ -210,6 +210,8 @@ class Parameters:
         out = Parameters(model)
         for k in self._values.keys() & out._values.keys():
             rows, v = len(out._values[k]), self._values[k]
+            if len(v) not in (1, rows):
+                raise InputError("parameters are for another model", field=".".join(k), value=len(v), allowed=rows)
             out._values[k] = v if len(v) == rows else np.repeat(v, rows, axis=0)
         return out
 
@@ -288,24 +290,39 @@ class State:
         return self.x.shape[1]
 
 
-def magnets(model: Model, parameters: Parameters) -> np.ndarray:
-    """Magnet of each triangle [T], -1 for none: those that touch and are poled alike (within 8 degrees) are one."""
+def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:
+    """Magnet of each triangle [T] by the parameters of an effect, -1 for none.
+
+    Magnetised triangles that touch and are poled alike (within 8 degrees) are one magnet.
+
+    Raises:
+        InputError: worlds in which other triangles join.
+    """
+    magnet = parameters.of(owner)
+    given = [magnet["volume"] != 0, np.sign(magnet["remanence"]), *(magnet[f"poling_{k}"] for k in "12n")]
+    columns = np.stack(np.broadcast_arrays(*(np.asarray(g, float) for g in given)))
+    found = [_joined(model, c) for c in np.unique(columns, axis=2).transpose(2, 0, 1)]
+    if any(not np.array_equal(f, found[0]) for f in found):
+        raise InputError(
+            "magnets of the worlds join in other ways", field=f"{owner}.poling", allowed="the same in all worlds"
+        )
+    return found[0]
+
+
+def _joined(model: Model, magnet: np.ndarray) -> np.ndarray:
+    """Magnets of one world from rows of volume, sign of the remanence and poling along both edges and the normal."""
     out = np.full(len(model.triangles), -1, np.int32)
-    for owner in dict.fromkeys(o for o, name in parameters if name == "volume"):
-        magnet = parameters.world(0).of(owner)
-        of = np.flatnonzero(magnet["volume"][:, 0] * magnet["remanence"][:, 0])
-        magnet.setdefault("poling_n", np.zeros_like(magnet["volume"]))
-        a, b, n, remanence = (magnet[k][of] for k in ("poling_1", "poling_2", "poling_n", "remanence"))
-        x1, x2, x3 = np.moveaxis(model.position[model.triangles[of]], 1, 0)
-        in_plane, normal = a * (x2 - x1) + b * (x3 - x1), np.cross(x2 - x1, x3 - x1)
-        poling = np.sqrt(1 - n**2) * _unit(in_plane) + n * _unit(normal)
-        poling *= np.sign(remanence)
-        corners = np.stack([np.repeat(np.arange(len(of)), 3), model.triangles[of].ravel()])
-        touches = sp.csr_array(sp.coo_array((np.ones(corners.shape[1]), corners), (len(of), len(model.position))))
-        one, other = (touches @ touches.T).nonzero()
-        alike = (poling[one] * poling[other]).sum(axis=1) > 0.99
-        bonds = sp.coo_array((np.ones(alike.sum()), np.stack([one, other])[:, alike]), (len(of), len(of)))
-        out[of] = connected_components(bonds, directed=False)[1]
+    of = np.flatnonzero(magnet[0] * magnet[1])
+    _, sign, a, b, n = magnet[:, of, None]
+    x1, x2, x3 = np.moveaxis(model.position[model.triangles[of]], 1, 0)
+    in_plane, normal = a * (x2 - x1) + b * (x3 - x1), np.cross(x2 - x1, x3 - x1)
+    poling = sign * (np.sqrt(1 - n**2) * _unit(in_plane) + n * _unit(normal))
+    corners = np.stack([np.repeat(np.arange(len(of)), 3), model.triangles[of].ravel()])
+    touches = sp.csr_array(sp.coo_array((np.ones(corners.shape[1]), corners), (len(of), len(model.position))))
+    one, other = (touches @ touches.T).nonzero()
+    alike = (poling[one] * poling[other]).sum(axis=1) > 0.99
+    bonds = sp.coo_array((np.ones(alike.sum()), np.stack([one, other])[:, alike]), (len(of), len(of)))
+    out[of] = connected_components(bonds, directed=False)[1]
     return out
 
 

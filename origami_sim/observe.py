@@ -47,12 +47,12 @@ def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> 
         )
     aligned = len(frames) >= len(times) and np.allclose(frames[: len(times)], times, atol=1e-9)
     out = {}
-    for name, channel in recording.channels.items():
+    for index, (name, channel) in enumerate(recording.channels.items()):
         values = channel_frames(trajectory, channel, world=world)
         if channel.is_angle:
             values = values + _turns(channel, values[0])
         if _measured(trajectory.model, channel):
-            out[name] = _distorted(trajectory, channel, frames, values, times, world)
+            out[name] = _distorted(trajectory, channel, index, frames, values, times, world)
         else:
             out[name] = values[: len(times)] if aligned else CubicSpline(frames, values)(times)
     return out
@@ -403,7 +403,7 @@ def _measured(model: Model, channel: Channel) -> list[str]:
     return [e.name for e in effects if e.family == "measurement" and (not e.channels or channel.kind in e.channels)]
 
 
-def _distorted(trajectory, channel, frames, values, times, world) -> np.ndarray:
+def _distorted(trajectory, channel, index, frames, values, times, world) -> np.ndarray:
     """The channel (n,) or (n, d) after the measurement effects; the run is held at its ends."""
     columns = values.reshape(len(frames), -1)
     if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
@@ -419,13 +419,14 @@ def _distorted(trajectory, channel, frames, values, times, world) -> np.ndarray:
         return np.moveaxis(spline(np.clip(at, frames[0], frames[-1])), -1, 1)  # [n, W, d] -> [n, d, W]
 
     for name in measured:
-        read = _through(get(name), trajectory.parameters, world, read)
+        row = index if trajectory.model.channels > 1 else 0
+        read = _through(get(name), trajectory.parameters, row, world, read)
     seen = read(times[:, None])[:, : values[0].size, 0]
     return seen.reshape(len(times), *values.shape[1:])
 
 
-def _through(effect, parameters: Parameters, world: int, read):
-    given = {n: v[0, [world if v.shape[1] > 1 else 0]] for n, v in parameters.of(effect.name).items()}
+def _through(effect, parameters: Parameters, row: int, world: int, read):
+    given = {n: v[row, [world if v.shape[1] > 1 else 0]] for n, v in parameters.of(effect.name).items()}
     return lambda at: effect.apply(read, at, **given)
 
 

@@ -307,7 +307,7 @@ def _with_plain_names(model: Model) -> Model:
 def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
     out = {name: getattr(t, name) for name in _FRAMES}
     out |= {f"energies.{n}": v for n, v in t.energies.items()} | {f"work.{n}": v for n, v in t.work.items()}
-    out |= {f"model.{n}": getattr(t.model, n) for n in _MODEL}
+    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, "channels")}
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
     for channel, signal in t.drive.signals.items():
         out |= {f"drive.{channel}.{n}": v for n in _SIGNAL if (v := getattr(signal, n)) is not None}
@@ -494,6 +494,7 @@ class _Arrays:
 
 def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     given: dict[str, Any] = {n: arrays[f"model.{n}"] for n in _MODEL}
+    given["channels"] = int(arrays.values.get("model.channels", 1))
     model = _with_plain_names(Model(**given, effects=tuple(manifest["effects"]), names=manifest["names"]))
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:

@@ -116,7 +116,7 @@ class Settings(Mapping[str, Setting]):
         return {n: s.value for n, s in self._settings.items()}
 
 
-def _parse(setting: Setting, text: str, file: Path):
+def _parse(setting: Setting, text: str, file: Path | None):
     if isinstance(setting.value, bool):
         if text.lower() not in ("true", "false"):
             raise InputError("not a switch", file=file, field=setting.name, value=text, allowed="true, false")

@@ -286,3 +286,14 @@ def test_a_marker_offset_is_a_marker_at_another_point_of_its_panel(motion, camer
     expected = observe(motion, recording(times, moved))["c"]
     np.testing.assert_allclose(found, expected, atol=2e-7)  # panels bend by that much
     assert np.abs(found - observe(motion, recording(times, plain))["c"]).max() > 2e-3
+
+
+def test_each_channel_has_errors_of_its_own(motion):
+    model = replace(motion.model.with_effects("angle_offset"), channels=2)
+    parameters = motion.parameters.for_model(model).set("angle_offset", "angle_offset", np.array([0.03, -0.02]))
+    seen = [replace(channel("crease_angle", np.zeros(40), crease=c), name=f"c{c}") for c in (0, 1)]
+    found = observe(replace(motion, model=model, parameters=parameters), recording(motion.times[:40], *seen))
+    for c, zero in ((0, 0.03), (1, -0.02)):
+        np.testing.assert_allclose(found[f"c{c}"], motion.creases[:40, c, 0] + zero, atol=1e-12)
+    with pytest.raises(InputError, match="another model"):
+        parameters.for_model(replace(model, channels=3))

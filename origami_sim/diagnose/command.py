@@ -26,7 +26,7 @@ from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.diagnose.subject import alignments, divided, spreads
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model
+from origami_sim.model import Model, Parameters
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.scene import NAMES, Settings, check_recorded_scene, read_calibration, scene_module, scene_settings
@@ -71,7 +71,7 @@ def run(args: Namespace) -> int:
         recordings.append(
             replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
         )
-    known, aligned = _priors(settings, data, args.prior, model)
+    known, aligned = _priors(settings, data, args.prior, model, parameters)
     subject = Subject.from_scene(module, settings, spreads=known, name=name).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
@@ -188,13 +188,13 @@ def _naming(file: str | None) -> Iterator[None]:
 
 
 def _priors(
-    settings: Settings, data: DataSet, given: Sequence[str], model: Model
+    settings: Settings, data: DataSet, given: Sequence[str], model: Model, parameters: Parameters
 ) -> tuple[dict[str, float], list[Free]]:
     """Standard deviations [SI] by the sidecar, and over them by the command line; and numbers of further effects."""
     first = data[0].metadata
     sidecar = first.get("sidecar")
     own, further = divided(first.get("priors") or {}, model)
-    out, aligned = spreads(settings, own, source=sidecar), alignments(further, source=sidecar)
+    out, aligned = spreads(settings, own, source=sidecar), alignments(further, parameters, source=sidecar)
     stated: dict[str, float | str] = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -204,7 +204,7 @@ def _priors(
             )
         stated[name] = value
     own, further = divided(stated, model)
-    aligned = [*(f for f in aligned if f.name not in further), *alignments(further, source="--prior")]
+    aligned = [*(f for f in aligned if f.name not in further), *alignments(further, parameters, source="--prior")]
     return out | spreads(settings, own, source="--prior"), aligned
 
 

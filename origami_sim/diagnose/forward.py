@@ -17,7 +17,15 @@ from origami_sim.diagnose.channels import (
     stacked,
     turned_axes,
 )
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, apply, at_several_times, told_apart
+from origami_sim.diagnose.hypothesis import (
+    Hypothesis,
+    Subject,
+    Suspect,
+    along_every_axis,
+    apply,
+    at_several_times,
+    told_apart,
+)
 from origami_sim.diagnose.track import coordinates, placed
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
@@ -309,7 +317,8 @@ class Forward:
         """
         frame = float(np.median(np.diff(self.recordings[0].times)))
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
-        return at_several_times(told_apart(every, len(self.components)), FASTEST * frame, longest)
+        every = along_every_axis(told_apart(every, len(self.components)))
+        return at_several_times(every, FASTEST * frame, longest)
 
     def soften(self) -> None:
         """Finds how much softer panels may be for derivatives: at most so much that the motion stays the same.
@@ -607,11 +616,11 @@ class Forward:
 
 
 def at_channel(parameters: Parameters, name: str, channel: int | None, worlds: int) -> dict[str, np.ndarray]:
-    """Parameters (W,) of a measurement effect at one channel; None: what all have in common, the smallest of each."""
+    """Parameters (W,) of a measurement effect at one channel; None: what all have in common, the least of one sign."""
     out = {}
     for n, v in parameters.of(name).items():
-        row = v[channel] if channel is not None else np.take_along_axis(v, np.abs(v).argmin(axis=0)[None], axis=0)[0]
-        out[n] = np.broadcast_to(row, (worlds,))
+        common = np.where(np.all(v > 0, axis=0), v.min(axis=0), np.where(np.all(v < 0, axis=0), v.max(axis=0), 0.0))
+        out[n] = np.broadcast_to(common if channel is None else v[channel], (worlds,))
     return out
 
 

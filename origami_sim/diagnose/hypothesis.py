@@ -24,6 +24,7 @@ class Free:
         start: where fits begin. scale: a change that is noticeable. lower, upper: physical bounds.
         spread: standard deviation of what was known before; infinite if nothing was.
         entities: entities of the effect's family that share the number; None for all.
+        aligned: whether it says how recorder or supply are aligned, named "effect.parameter"; see `Subject.beside`.
     """
 
     owner: str
@@ -35,6 +36,7 @@ class Free:
     upper: float = np.inf
     spread: float = np.inf
     entities: tuple[int, ...] | None = None
+    aligned: bool = False
 
     @property
     def label(self) -> str:
@@ -63,6 +65,12 @@ class Suspect:
     @property
     def label(self) -> str:
         return f"{self.effect} at {self.site}"
+
+    @property
+    def strengths(self) -> tuple[Free, ...]:
+        """The strength, and what else is a component of it: an offset has three."""
+        first, *rest = self.free
+        return first, *(f for f in rest if f.unit == first.unit and not f.start)
 
 
 def distinct_sites(a: Suspect, b: Suspect) -> bool:
@@ -156,17 +164,28 @@ class Subject:
         A number is named "effect.parameter" and holds for all of the effect's entities.
         """
         owners = dict.fromkeys(f.name.partition(".")[0] for f in numbers)
-        own = [replace(f, owner=f.name.partition(".")[0], name=f.name.partition(".")[2]) for f in numbers]
-        acting = Hypothesis(tuple(Suspect(e, "", "", tuple(f for f in own if f.owner == e)) for e in owners))
-        ordered = [f.label for f in acting.free]
+        own = {f.name: f.start for f in numbers}
 
         def build(values: Mapping[str, float]):
-            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in ordered})
-            richer = model.with_effects(*owners)
-            given = [values.get(f.label, f.start) for f in acting.free]
-            return richer, apply(parameters, acting, given, richer), drive
+            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in own})
+            lacking = [e for e in owners if e not in model.effects]
+            richer = model.with_effects(*lacking)
+            out = apply(parameters, Hypothesis(tuple(Suspect(e, "", "", ()) for e in lacking)), (), richer)
+            for effect in lacking:
+                for name, value in silent(effect).items():
+                    out.set(effect, name, value)
+            for label, start in own.items():
+                effect, _, name = label.partition(".")
+                out.set(effect, name, np.clip(values.get(label, start), *get(effect).parameter(name).bounds))
+            return richer, out, drive
 
         return Subject(build, (*self.nominals, *numbers), self.name) if numbers else self
+
+
+def silent(effect: str) -> dict[str, float]:
+    """Values of an effect's fitted numbers with which it does nothing: its strength, and what else has that unit."""
+    fitted = [get(effect).parameter(n) for n in get(effect).fitted]
+    return {p.name: p.default for p in fitted if p.unit == fitted[0].unit}
 
 
 def factor(name: str, spread: float) -> Free:
@@ -259,11 +278,11 @@ def suspects(
             continue
         if not set(effect.drives) - {"time"} <= driven:
             continue
-        if effect.interacts and not (parameters and magnets(model, parameters).max(initial=-1) > 0):
+        if effect.interacts and not (parameters and _several_magnets(model, parameters)):
             continue
         sites = _sites(model, effect.family)
         if effect.interacts:  # of one panel with itself there is none
-            sites = sites[-1:]
+            sites = [("all panels", "panel", None)]
         if any(p.name in ANCHORS for p in effect.parameters):
             sites += _edges(model)
         if effect.family == "measurement":
@@ -291,6 +310,12 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
             )
         out.append(Suspect(name, site, kind, (strength,), entities, len(each), more=True))
     return out
+
+
+def _several_magnets(model: Model, parameters: Parameters) -> bool:
+    """Whether panels are magnets that do not join."""
+    stated = {owner for owner, name in parameters if name == "poling_n"}
+    return any(int(magnets(model, parameters, owner).max(initial=-1)) > 0 for owner in stated)
 
 
 def _off(parameters: Parameters, name: str) -> bool:
@@ -413,6 +438,19 @@ def at_several_times(every: Sequence[Suspect], shortest: float, longest: float) 
             given = {"start": float(time), "scale": float(time), "spread": PLAUSIBLE * float(time)}
             free = [replace(f, **given) if n in slow else f for n, f in enumerate(s.free)]
             out.append(replace(s, free=tuple(free)))
+    return out
+
+
+def along_every_axis(every: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects; those of which the strength has a direction, with each component first: it is the one screened."""
+    out = []
+    for s in every:
+        out.append(s)
+        for n, f in enumerate(s.free):
+            if n and f in s.strengths and not f.start and not s.more:
+                lead = replace(f, scale=s.free[0].scale, spread=np.inf)
+                rest = [replace(g, start=0.0, spread=PLAUSIBLE * g.scale) if g is s.free[0] else g for g in s.free]
+                out.append(replace(s, free=(lead, *(g for k, g in enumerate(rest) if k != n))))
     return out
 
 

@@ -97,6 +97,14 @@ def _positions(forward: Forward, fit: Fit, r: int, mine: list[int]) -> dict[int,
         replace(b, values=np.zeros((len(b.times), 3 * count)), begin=None) if n in mine else b
         for n, b in enumerate(forward.blocks)
     ]
+    build = forward.subject.build
+
+    def bare(values):
+        model, parameters, drive = build(values)
+        plain = model.with_effects(without=tuple(e for e in model.effects if get(e).on_body))
+        return plain, parameters.for_model(plain), drive
+
+    other.subject = replace(forward.subject, build=bare)
     # an error of one channel is no node's
     felt = tuple(s for s in fit.hypothesis.suspects if s.kind != "measurement" or _of_all(s))
     predicted = other.predict(Hypothesis(felt), numbers_kept(fit, felt)[None], fit.local[None], mine)

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
-from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply
+from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -183,6 +183,10 @@ def _found(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addit
     best = patched(diagnosis)
     suspected = [] if best is None else best.effects
     sites = iter([] if best is None else best.sites)
+    there = {a.effect for a in getattr(settings, "effects", ())}
+    for (effect, entities), values in found.items():
+        if effect not in suspected and effect not in there:  # of what is aligned, the rest does nothing
+            found[effect, entities] = silent(effect) | values
     source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
     return tuple(
         Addition(

@@ -300,7 +300,7 @@ def _affordable(forward, base: Fit, s: Suspect, change: float, least: float) -> 
 
 def _typical(s: Suspect) -> float:
     """A noticeable strength; ten times as much is the most that is plausible."""
-    return abs(get(s.effect).parameter(s.free[0].name).typical or 0.0)
+    return max(abs(get(s.effect).parameter(f.name).typical or 0.0) for f in s.strengths)
 
 
 def _admissible(s: Suspect, change: float) -> float:

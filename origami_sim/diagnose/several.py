@@ -68,7 +68,7 @@ def _counterpart(screening: Screening, found: Signature) -> Signature:
     """The same signature in other weights, in which it may not stand out enough to be tested."""
 
     def key(s: Suspect):
-        return s.label, tuple(n.start for n in s.free[1:])
+        return s.label, tuple((n.name, n.start) for n in s.free[1:])
 
     return next(s for s in (*screening.signatures, *screening.untestable) if key(s.suspect) == key(found.suspect))
 
@@ -189,10 +189,10 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
             continue
         sure = dict(zip((id(n) for n in f.free), zip(f.theta, f.deviations(), strict=True), strict=True))
         for s in f.hypothesis.suspects:
-            value, deviation = sure[id(s.free[0])]
+            told = max(abs(sure[id(n)][0] - n.start) / sure[id(n)][1] for n in s.strengths)
             rest = tuple(t for t in f.hypothesis.suspects if t is not s)
             near = [g for g in (*fits, *out) if _same(g.hypothesis, rest) and g.cost < f.cost + words.CLOSE]
-            if abs(value - s.free[0].start) > 2.0 * deviation or near:
+            if told > 2.0 or near:
                 continue
             near = {"known": f.linear, "kept": len(forward.subject.nominals)}
             fewer = fit(forward, Hypothesis(rest), weights, theta=numbers_kept(f, rest), local=f.local, **near)

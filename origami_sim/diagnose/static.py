@@ -22,13 +22,14 @@ from origami_sim.diagnose.forward import (
     drive_of,
     stacked,
 )
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, at_several_times, told_apart
+from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
 from origami_sim.diagnose.locate import BINS, PASSIVE
 from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.track import coordinates
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
+from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
@@ -75,6 +76,11 @@ class CurveForward(Forward, ABC):
         self.values = {f.name: f.start for f in subject.nominals}
         self._given = np.array([f.start for f in subject.nominals])
         self.model, self.parameters, self.drive = subject.build(self.values)
+        for e in self.model.effects:
+            if get(e).on_body:
+                raise InputError(
+                    "curves do not tell how panels turn under a marker", field=e, allowed="recordings of a motion"
+                )
         self.articulation = Articulation(self.model)
         silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
         self._drives = [drive_of(self._driven(r), silent) for r in self.recordings]
@@ -143,6 +149,7 @@ class CurveForward(Forward, ABC):
         several, spread over the recording, because its signature changes with it altogether. See also `told_apart`.
         """
         every = [s for s in told_apart(every, len(self.components)) if not get(s.effect).on_body]
+        every = along_every_axis(every)
         if all(r.by_step for r in self.recordings):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]
@@ -157,8 +164,7 @@ class CurveForward(Forward, ABC):
     def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
         """The channels [n, D, K] as distorted measurements show them."""
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
-        without = {*(TIMED if recording.by_step else ()), *(e for e in model.effects if get(e).on_body)}
-        names = [e for e in model.effects if get(e).family == "measurement" and e not in without]
+        names = [e for e in model.effects if get(e).family == "measurement" and not (recording.by_step and e in TIMED)]
         out, row = curve.copy(), 0
         at = np.repeat(recording.times[:, None], len(worlds), axis=1)
         for index, channel in enumerate(recording.channels.values()):

@@ -6,9 +6,9 @@ from types import ModuleType
 
 import numpy as np
 
-from origami_sim.diagnose.hypothesis import NOMINAL, Free, Subject, factor
+from origami_sim.diagnose.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
 from origami_sim.drive import Drive
-from origami_sim.effects import CATALOGUE, get
+from origami_sim.effects import CATALOGUE, DISTORTIONS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Setting, Settings, _parse, scene_module, scene_settings
@@ -31,7 +31,7 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         source: see `Source`.
         priors: standard deviations of what was known before. For a scene: by setting, see `spreads`. For a model with
             parameters: by "effect.parameter", relative ("5 %" or 0.05), one factor for all entities. For both: by
-            "effect.parameter" of an effect that the model lacks, see `alignments`.
+            "effect.parameter" of an effect that may act besides, see `alignments`.
 
     Raises:
         InputError: no such scene, setting or parameter; a prior that is not positive; what is no model.
@@ -46,14 +46,15 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         source = (source, scene_settings(source))
     match source:
         case (ModuleType() as module, Settings() as settings):
-            own, further = divided(priors or {}, module.build(settings)[0])
+            model, parameters, *_ = module.build(settings)
+            own, further = divided(priors or {}, model)
             subject = Subject.from_scene(module, settings, spreads=spreads(settings, own))
-            return subject.beside(alignments(further))
+            return subject.beside(alignments(further, parameters))
         case (Model() as model, Parameters() as parameters) | (Model() as model, Parameters() as parameters, Drive()):
             drive = source[2] if len(source) == 3 else None
             own, further = divided(priors or {}, model)
             nominals = [_factor(parameters, name, given) for name, given in own.items()]
-            return Subject.from_model(model, parameters, drive, nominals).beside(alignments(further))
+            return Subject.from_model(model, parameters, drive, nominals).beside(alignments(further, parameters))
     raise InputError(
         "this is no model",
         field="model",
@@ -63,39 +64,52 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
 
 
 def divided(priors: Mapping[str, float | str], model: Model) -> tuple[dict, dict]:
-    """Priors of the model's own numbers, and those of effects that it lacks."""
-    lacking = {n for n, e in CATALOGUE.items() if e.fitted and n not in model.effects}
-    further = {n: v for n, v in priors.items() if n.partition(".")[0] in lacking}
+    """Priors of the model's own numbers, and those that say how recorder and supply are aligned (see `alignments`)."""
+    effects = {n for n, e in CATALOGUE.items() if e.family in DISTORTIONS or n not in model.effects}
+    further = {n: v for n, v in priors.items() if "." in n and n.partition(".")[0] in effects}
     return {n: v for n, v in priors.items() if n not in further}, further
 
 
-def alignments(priors: Mapping[str, float | str], *, source: object = None) -> list[Free]:
+def alignments(
+    priors: Mapping[str, float | str], parameters: Parameters | None = None, *, source: object = None
+) -> list[Free]:
     """Numbers of effects that may act without being a fault, such as a clock that is late by some milliseconds.
 
     Args:
-        priors: standard deviations by "effect.parameter", in the parameter's unit or with one ("5 ms").
+        priors: standard deviations by "effect.parameter", in the parameter's unit or with one ("5 ms"). The effect is
+            one of the measurement, of the drive or of the whole body (gravity that is tilted).
+        parameters: of the model; where it has the effect, its number is what was known.
 
     Raises:
-        InputError: no such effect or parameter, or none that a diagnosis fits; a value that is no positive number.
+        InputError: no such effect or parameter, or none that can be aligned; a value that is no positive number.
     """
     out = []
     for label, given in priors.items():
         name, _, parameter = label.partition(".")
         effect = get(name)
-        if parameter not in effect.fitted:
-            allowed = ", ".join(f"{name}.{p}" for p in effect.fitted)
-            raise InputError("not a number that is fitted", file=source, field="priors", value=label, allowed=allowed)
+        can = effect.fitted if effect.family in (*DISTORTIONS, "node") else ()
+        if parameter not in can or set(ANCHORS) & {p.name for p in effect.parameters}:
+            allowed = ", ".join(f"{name}.{p}" for p in can) or "an effect of the measurement, the drive or all nodes"
+            raise InputError(
+                "not a number that can be aligned", file=source, field="priors", value=label, allowed=allowed
+            )
         p = effect.parameter(parameter)
-        s = Setting(label, p.default, p.unit, "", p.meaning)
-        spread = _positive(
-            label,
-            str(_parse(s, str(given).strip(), Path(str(source or "")))),
-            given,
-            f"in {p.unit} or with a unit",
-            source,
-        )
-        out.append(Free(NOMINAL, label, p.unit, p.default, 0.3 * spread, *p.bounds, spread))
+        spread = _aligned(Setting(label, p.default, p.unit, "", p.meaning), given, source)
+        known = parameters is not None and (name, parameter) in set(parameters)
+        start = float(parameters[name, parameter].flat[0]) if known and parameters is not None else p.default
+        out.append(Free(NOMINAL, label, p.unit, start, 0.3 * spread, *p.bounds, spread, aligned=True))
     return out
+
+
+def _aligned(s: Setting, given: float | str, source: object) -> float:
+    """A standard deviation of such a number [SI]."""
+    text = str(given).strip()
+    allowed = f"a standard deviation in {s.unit}, or with a unit"
+    if s.unit == "-" and text.endswith("%"):
+        return 0.01 * _positive(s.name, text[:-1], given, allowed, source)
+    return _positive(
+        s.name, str(_parse(s, text, None if source is None else Path(str(source)))), given, allowed, source
+    )
 
 
 def _factor(parameters: Parameters, name: str, given: float | str) -> Free:

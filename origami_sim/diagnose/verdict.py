@@ -23,7 +23,7 @@ from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.refit import LITTLE, Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.diagnose.trust import trust
-from origami_sim.effects import CATALOGUE, get
+from origami_sim.effects import get
 from origami_sim.recording.units import quantity
 
 FLOOR = 1.3
@@ -425,16 +425,17 @@ def _adequate_or_parameter(w: _Weighed, given: Fit, weights: Weights) -> _Said:
         return _Said("ADEQUATE", _adequate(w.over), probability, [], base)
     far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
     f, t = far[0]
-    effect = CATALOGUE.get(f.name.partition(".")[0])
-    recorder = effect is not None and effect.family == "measurement"
+    beyond = [m for m, v in far if abs(v - m.start) > m.spread]
+    aligned = all(m.aligned for m in [f, *beyond])
+    recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in [f, *beyond])
     text = (
-        f"{'Aligning the recording' if recorder else 'Refitting the nominal parameters'} within "
-        f"{'what is known of it' if recorder else 'their priors'} is enough: {f.label} goes from "
+        f"{'Aligning the recording' if aligned else 'Refitting the nominal parameters'} within "
+        f"{'what is known of it' if aligned else 'their priors'} is enough: {f.label} goes from "
         f"{said(f.start, f.unit)} to {said(t, f.unit)}, {abs(t - f.start) / f.spread:.1f} standard deviations of what "
         f"was known; held-out error is then {w.over:.2f} times the noise."
     )
     word = "MEASUREMENT" if recorder else "PARAMETER"
-    return _Said(word, text, probability, [f.label for f, t in far if abs(t - f.start) > f.spread], base)
+    return _Said(word, text, probability, [m.label for m in beyond], base)
 
 
 def _adequate(over: float) -> str:
@@ -655,7 +656,7 @@ def _say(f: Fit, *, sites: bool = True) -> str:
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
     for s in f.hypothesis.suspects:
-        n = s.free[0]
+        n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
         t, d = value[id(n)], deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
         low, high = (said(v, n.unit, digits) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))

@@ -93,8 +93,9 @@ class Batch:
                 field="gradient",
                 allowed="switch on field_gradient",
             )
-        interacting = any(e.interacts for e in self.program.effects)
-        self.magnets = magnets(model, parameters) if interacting else np.full(len(model.triangles), -1, np.int32)
+        interacting = next((e.name for e in self.program.effects if e.interacts), None)
+        none = np.full(len(model.triangles), -1, np.int32)
+        self.magnets = none if interacting is None else magnets(model, parameters, interacting)
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()

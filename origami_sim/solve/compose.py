@@ -481,7 +481,7 @@ class _Composer:
         t("for other in range(triangles.shape[0]):")
         t.depth += 1
         t("u = other & NATURAL")
-        t("if magnets[u] >= 0 and magnets[u] != magnets[c]:")
+        t("if magnets[c] >= 0 and magnets[u] >= 0 and magnets[u] != magnets[c]:")
         t.depth += 1
         for i in (1, 2, 3):
             t(f"y{i} = X[triangles[u][{i - 1}] & NATURAL, w]")

@@ -677,8 +677,8 @@ def test_priors_come_in_the_settings_unit_with_a_unit_or_as_a_share(recorded):
         {"mass_1": 0.02 * settings.mass_1, "length_1": 5e-4, "viscosity_1": 2e-5}
     )
     data = command.read_recordings([str(recorded)])
-    model = scene_module("pendulum_chain").build(settings)[0]
-    known, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], model)
+    built = scene_module("pendulum_chain").build(settings)[:2]
+    known, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], *built)
     assert known == pytest.approx(
         {"length_1": 1e-3, "mass_1": 1e-3, "viscosity_1": 5e-5}
     )  # the command line over the sidecar
@@ -700,6 +700,38 @@ def test_an_alignment_is_a_number_of_the_model_and_comes_into_the_patch(recorded
     added = {a.effect: a.values for a in patch.effects}
     assert added["angle_scale"] == {"angle_scale": pytest.approx(scale["value"])}
     assert "crease_friction" in added
+
+
+def test_of_an_alignment_only_the_stated_component_acts():
+    for source, label, unit in (("box", "gravity_tilt.tilt_y", "rad"), ("box", "field_misalignment.turn_x", "rad")):
+        subject = subject_of(source, {label: 0.01})
+        effect, _, name = label.partition(".")
+        aligned = subject.nominals[-1]
+        assert (aligned.name, aligned.unit, aligned.aligned) == (label, unit, True)
+        for value in (0.0, 0.02):
+            given = subject.build({label: value})[1].of(effect)
+            moved = {n: float(v.flat[0]) for n, v in given.items() if n in CATALOGUE[effect].fitted}
+            assert moved.pop(name) == value and not any(moved.values())
+
+
+def test_an_alignment_starts_where_the_calibration_has_it(tmp_path):
+    """A patched calibration is diagnosed again with the same sidecar."""
+    settings = scene_settings(scene_module("pendulum_chain"))
+    late = Settings(list(settings.values()), settings.file, [Addition("clock_delay", {"clock_delay": 0.004})])
+    subject = subject_of((scene_module("pendulum_chain"), late), {"clock_delay.clock_delay": "5 ms"})
+    assert subject.nominals[-1].start == 0.004 and subject.nominals[-1].spread == 0.005
+    for values, expected in (({}, 0.004), ({"clock_delay.clock_delay": 0.006}, 0.006)):
+        assert np.all(subject.build(values)[1]["clock_delay", "clock_delay"] == expected)
+
+
+def test_alignments_are_of_the_measurement_the_drive_or_the_body():
+    with pytest.raises(InputError, match=r"not a number that can be aligned.*crease_friction"):
+        subject_of("pendulum_chain", {"crease_friction.friction_moment": 1e-5})
+    # settings that are called like an effect keep their priors
+    assert [f.spread for f in subject_of("cube_toss", {"length_scale": 0.01}).nominals if f.name == "length_scale"] == [
+        0.01
+    ]
+    assert subject_of("box", {"angle_scale.angle_scale": "1 %"}).nominals[-1].spread == 0.01
 
 
 def test_several_recordings_are_one_data_set(recorded, tmp_path):
@@ -757,7 +789,9 @@ def test_python_takes_a_scene_or_a_model_with_parameters():
     richer, numbers, _ = late.build({"clock_delay.clock_delay": 0.02})
     assert richer.effects[-1] == "clock_delay" and numbers["clock_delay", "clock_delay"] == 0.02
     with pytest.raises(InputError, match="no such parameter"):
-        subject_of((model, parameters), {"crease.nothing": 0.1})
+        subject_of((model, parameters), {"crease_viscosity.nothing": 0.1})
+    with pytest.raises(InputError, match="not a number that can be aligned"):
+        subject_of((model, parameters), {"crease.stiffness": 0.1})
     with pytest.raises(InputError, match="states its own priors"):
         subject_of(subject_of(module), {"mass_1": 1.0})
     # the package can be called by the name of its function, however it was imported

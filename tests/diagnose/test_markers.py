@@ -1,5 +1,6 @@
 """A marker that is not where it was said to be on its panel."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +16,10 @@ from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 
-LIFT, DOWN, NOISE = 1.5e-3, 0.5e-3, 1e-4
+NOISE = 1e-4
 
 
-def filmed() -> Recording:
+def filmed(lift: float, down: float) -> Recording:
     """A swing of two panels in a picture; the last marker is lifted off its panel (x), and glued too high (z)."""
     model, parameters = hanging(3)
     arm, rng = Articulation(model), np.random.default_rng(0)
@@ -32,20 +33,25 @@ def filmed() -> Recording:
         channels = {n: Channel(n, "marker_2d", blank, "m", NOISE, at, camera=camera) for n, at in places.items()}
         return Recording("film", made.times, channels)
 
-    true = observe(made, recorded({"point": [0.0, 0.0, -0.012 + DOWN], "height": LIFT}))
+    true = observe(made, recorded({"point": [0.0, 0.0, -0.012 + down], "height": lift}))
     said = recorded({"point": [0.0, 0.0, -0.012]})
     seen = {n: replace(c, values=true[n] + NOISE * rng.normal(size=c.values.shape)) for n, c in said.channels.items()}
     return replace(said, channels=seen)
 
 
-def test_a_marker_beside_its_place_is_the_measurement():
-    recording = filmed()
+@pytest.mark.parametrize(
+    "lift, down, words", [(1.5e-3, 0.5e-3, r"offset x 1\.[45]"), (0.0, 1.5e-3, r"offset z 1\.[45]")]
+)
+def test_a_marker_beside_its_place_is_the_measurement(lift, down, words):
+    """Whatever the direction: each component is screened by itself, and the one that is told best is named."""
+    recording = filmed(lift, down)
     every = suspects(hanging(3)[0], [recording], Drive())
     assert [s.site for s in every if s.effect == "marker_offset"] == ["channel m1", "channel m2"]
     wrong = ("marker_offset", "length_offset", "length_scale", "crease_offset")
     found = diagnose(subject(3), [recording], catalogue=wrong)
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "marker_offset at channel m2"
+    assert re.search(words, found.sentence)
     numbers = {n.label: n for n in found.candidates[0].numbers}
-    for axis, truth in (("x", LIFT), ("z", DOWN)):
+    for axis, truth in (("x", lift), ("z", down)):
         n = numbers[f"marker_offset.offset_{axis}"]
         assert n.value == pytest.approx(truth, abs=5e-5) and n.low < truth < n.high

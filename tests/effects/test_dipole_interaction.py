@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from effects.kit import make_model, quiet, random_rotation, slope, start
 
+from origami_sim.build import Sheet
 from origami_sim.diagnose import diagnose
 from origami_sim.diagnose.hypothesis import suspects
 from origami_sim.drive import Drive, series
+from origami_sim.errors import InputError
 from origami_sim.materials import MU0
 from origami_sim.model import magnets
+from origami_sim.pattern import strip
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.scene import read_calibration, scene_module
@@ -111,13 +114,43 @@ def test_action_equals_reaction_also_between_different_strengths():
 
 def test_magnets_that_touch_and_are_poled_alike_are_one():
     alone, values = plates(2, (np.eye(3), np.zeros(3)))
-    assert magnets(alone, values).tolist() == [0] * 8
+    assert magnets(alone, values, NAME).tolist() == [0] * 8
     assert not forces(alone, values, Drive(), start(alone), 0.0).forces[NAME].any()
     half = np.array([1, 1, -1, -1, 1, 1, -1, -1.0])  # cells in rows, first the lower triangles and then the upper
     values.set(NAME, "remanence", BR * half)
-    assert magnets(alone, values).tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
+    assert magnets(alone, values, NAME).tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
     values.set(NAME, "volume", 0.0, [2, 3, 6, 7])
-    assert magnets(alone, values).tolist() == [0, 0, -1, -1, 0, 0, -1, -1]
+    assert magnets(alone, values, NAME).tolist() == [0, 0, -1, -1, 0, 0, -1, -1]
+
+
+def test_magnets_that_join_in_one_world_only_are_refused():
+    model, values = plates(1, (np.eye(3), np.zeros(3)))
+    values.set(NAME, "remanence", np.array([[BR, BR], [BR, -BR]]))
+    with pytest.raises(InputError, match="join in other ways"):
+        forces(model, values, Drive(), start(model, 2), 0.0)
+    values.set(NAME, "remanence", np.array([[BR, -BR], [BR, -BR]]))  # alike in both
+    assert not forces(model, values, Drive(), start(model, 2), 0.0).forces[NAME].any()
+
+
+def test_a_panel_without_a_magnet_feels_none_even_where_it_lies_on_one():
+    placed = (np.eye(3), np.zeros(3)), (np.eye(3), np.array([0.05, 0, 0])), (np.eye(3), np.zeros(3))
+    model, values = plates(1, *placed)
+    values.set(NAME, "volume", 0.0, [4, 5])
+    found = forces(model, values, Drive(), start(model), 0.0)
+    assert np.isfinite(found.energies[NAME]).all() and not found.forces[NAME][8:].any()
+    assert found.forces[NAME][:8].any()
+
+
+def test_a_flap_on_a_held_magnet_is_suspected_of_both():
+    """Also where one panel only can move."""
+    sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1e-3)
+    sheet.crease(stiffness=1e-3).fix(panels=[0])
+    for panel, poling in ((0, (1, 0, 0)), (1, (-1, 0, 0))):
+        sheet.magnetise(panel, remanence=BR, volume=VOLUME, poling=poling)
+    model, parameters = sheet.build()
+    fold = Channel("fold", "crease_angle", np.zeros(9), "rad", 1e-3, {"crease": 0})
+    found = suspects(model, [Recording("r", np.arange(9.0), {"fold": fold})], Drive(), parameters)
+    assert [(x.site, x.entities) for x in found if x.effect == NAME] == [("all panels", None)]
 
 
 def test_the_tangent_knows_that_magnets_feel_each_other():
