@@ -122,7 +122,8 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
             away = np.nanmedian(values[head], axis=0) - now
             drift = np.nanstd(values[head], axis=0)
         scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
-        moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max()), 3 * noise) if standing else 0.2 * scale
+        # what does not move at all, such as a marker across the plane of a motion, scatters by its noise
+        moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max() if standing else 0.0), 3 * noise)
         near = np.maximum(0.05 * scale, 5 * noise)
         still = np.all(np.abs(away) <= near) and np.all(drift <= moves)
         if not still and not _just_begun(recording.times, values, noise, now, near):

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import diagnose
+from origami_sim.diagnose import Subject, diagnose
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.hypothesis import suspects
-from origami_sim.drive import Drive
+from origami_sim.diagnose.prepare import starting
+from origami_sim.drive import Drive, ramp
 from origami_sim.model import State
 from origami_sim.observe import observe
 from origami_sim.recording import Camera, Channel, Recording
@@ -55,3 +56,21 @@ def test_a_marker_beside_its_place_is_the_measurement(lift, down, words):
     for axis, truth in (("x", lift), ("z", down)):
         n = numbers[f"marker_offset.offset_{axis}"]
         assert n.value == pytest.approx(truth, abs=5e-5) and n.low < truth < n.high
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_markers_that_scatter_across_the_plane_of_the_motion_do_not_hide_that_it_began_at_rest(seed):
+    model, parameters = hanging(3)
+    loaded = model.with_effects("load")
+    pushed = parameters.for_model(loaded).set("load", "force_x", 2e-3, [int(np.argmin(model.position[:, 2]))])
+    push = Drive(load=ramp(1.0, 1.0))
+    made = simulate(loaded, pushed, push, duration=1.0, rate=100)
+    rng, nodes = np.random.default_rng(seed), np.argsort(model.position[:, 2])[:4]
+    channels = {
+        f"n{n}": Channel(
+            f"n{n}", "marker", made.x[:, n, 0] + NOISE * rng.normal(size=(101, 3)), "m", NOISE, {"node": int(n)}
+        )
+        for n in nodes
+    }
+    subject = Subject.from_model(loaded, pushed, push)
+    assert starting(subject, [Recording("pushed", made.times, channels)]) == "rest"
