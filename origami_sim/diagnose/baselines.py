@@ -6,6 +6,7 @@ and predicts the other half, with the starts adapted exactly as for every hypoth
 """
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 
@@ -24,10 +25,10 @@ FEWEST = 30
 THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Thresholds of the sparse regression, as parts of the largest scaled coefficient; chosen on a third of the data."""
 
-RIDGE = 1e-3
-"""Ridge of the sparse regression, over the mean square of a scaled column. Without it two columns that are nearly the
-same, such as an angle and its sine, take large opposite coefficients, beside which the right one falls under the
-threshold."""
+RIDGES = (0.0, 1e-3)
+"""Ridges of the sparse regression, over the mean square of a scaled column, chosen likewise. Without one, two columns
+that are nearly the same, such as an angle and its sine, may take large opposite coefficients, beside which the right
+one falls under the threshold."""
 
 LIBRARY: dict[str, Callable] = {
     "1": lambda a, w: np.ones_like(a),
@@ -120,18 +121,18 @@ def _sparse(a, w, y, grid_a, grid_w):
     x = columns / scale
     third = len(y) // 3
     best, error = np.zeros(len(names)), np.inf
-    for threshold in THRESHOLDS:
-        c = _thresholded(x[third:], y[third:], threshold)
+    for threshold, ridge in product(THRESHOLDS, RIDGES):
+        c = _thresholded(x[third:], y[third:], threshold, ridge)
         e = float(np.mean((y[:third] - x[:third] @ c) ** 2))
         if e < error:
-            best, error = _thresholded(x, y, threshold), e
+            best, error = _thresholded(x, y, threshold, ridge), e
     mesh_a, mesh_w = np.meshgrid(grid_a, grid_w, indexing="ij")
     table = sum(c / s * LIBRARY[n](mesh_a, mesh_w) for n, c, s in zip(names, best, scale, strict=True))
     used = [f"{c / s:.2g} {n}" for n, c, s in zip(names, best, scale, strict=True) if c]
     return np.broadcast_to(table, mesh_a.shape), " + ".join(used) or "nothing"
 
 
-def _thresholded(x, y, threshold):
+def _thresholded(x, y, threshold, ridge):
     keep = np.ones(x.shape[1], bool)
     c = np.zeros(x.shape[1])
     for _ in range(10):
@@ -139,7 +140,8 @@ def _thresholded(x, y, threshold):
         if not np.any(keep):
             break
         some = x[:, keep]
-        c[keep] = np.linalg.solve(some.T @ some + RIDGE * len(y) * np.eye(some.shape[1]), some.T @ y)
+        both = np.concatenate([some, np.sqrt(ridge * len(y)) * np.eye(some.shape[1])])
+        c[keep] = np.linalg.lstsq(both, np.append(y, np.zeros(some.shape[1])), rcond=None)[0]
         new = np.abs(c) > threshold * np.abs(c).max()
         if np.array_equal(new, keep):
             break
