@@ -428,12 +428,14 @@ def _adequate_or_parameter(w: _Weighed, given: Fit, weights: Weights) -> _Said:
     beyond = [m for m, v in far if abs(v - m.start) > m.spread]
     aligned = all(m.aligned for m in [f, *beyond])
     recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in [f, *beyond])
-    text = (
-        f"{'Aligning the recording' if aligned else 'Refitting the nominal parameters'} within "
-        f"{'what is known of it' if aligned else 'their priors'} is enough: {f.label} goes from "
-        f"{said(f.start, f.unit)} to {said(t, f.unit)}, {abs(t - f.start) / f.spread:.1f} standard deviations of what "
-        f"was known; held-out error is then {w.over:.2f} times the noise."
-    )
+    strain = abs(t - f.start) / f.spread
+    text = "Aligning the recording" if aligned else "Refitting the nominal parameters"
+    if strain <= STRAINED:
+        text += f" within {'what is known of it' if aligned else 'their priors'}"
+    text += f" is enough: {f.label} goes from {said(f.start, f.unit)} to {said(t, f.unit)}, {strain:.1f} standard "
+    text += f"deviations of what was known; held-out error is then {w.over:.2f} times the noise."
+    if strain > STRAINED:
+        text += " That is far from what was known: that number was wrong, or stands for something that acts like it."
     word = "MEASUREMENT" if recorder else "PARAMETER"
     return _Said(word, text, probability, [m.label for m in beyond], base)
 
