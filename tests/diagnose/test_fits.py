@@ -209,7 +209,7 @@ def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_n
         theta = [np.ones(3), np.array([1.0, 1.0, 1.0, value])]
         worlds = [forward._world(h, t, (effect,)) for h, t in zip(each, theta, strict=True)]
         joined = Parameters.join([p for _, p in worlds])
-        return forward._late(worlds[0][0], joined, each, begins)[0]
+        return forward._late(worlds[0][0], joined, len(each), begins)[0]
 
     assert np.array_equal(late("clock_rate", 0.01)[0], [0.0] * 3)
     assert late("clock_rate", 0.01)[1] == pytest.approx(0.01 * begins, abs=1e-12)

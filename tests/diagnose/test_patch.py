@@ -90,7 +90,8 @@ def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_mode
     """No model has channels, so that it could not be read back; it is named in the file."""
     numbers = {"crease_friction.friction_moment@1": 1e-4, "angle_offset.angle_offset@1": 0.02}
     sites = ["crease 1", "channel fold2"]
-    best = SimpleNamespace(numbers=[SimpleNamespace(value=v, label=n) for n, v in numbers.items()], sites=sites)
+    said, effects = [SimpleNamespace(value=v, label=n) for n, v in numbers.items()], ["crease_friction", "angle_offset"]
+    best = SimpleNamespace(numbers=said, sites=sites, effects=effects)
     found = SimpleNamespace(
         patch=numbers, changed=[], candidates=[best], recordings=["swing"], verdict="SEVERAL", sentence="Two."
     )
