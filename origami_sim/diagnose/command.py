@@ -190,7 +190,7 @@ def _naming(file: str | None) -> Iterator[None]:
 def _priors(
     settings: Settings, data: DataSet, given: Sequence[str], model: Model, parameters: Parameters
 ) -> tuple[dict[str, float], list[Free]]:
-    """Standard deviations [SI] by the sidecar, and over them by the command line; and numbers of further effects."""
+    """Standard deviations [SI] by the sidecar, and over them by the command line; and what is aligned."""
     first = data[0].metadata
     sidecar = first.get("sidecar")
     own, further = divided(first.get("priors") or {}, model)

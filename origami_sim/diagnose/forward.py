@@ -617,11 +617,12 @@ class Forward:
 
 def at_channel(parameters: Parameters, name: str, channel: int | None, worlds: int) -> dict[str, np.ndarray]:
     """Parameters (W,) of a measurement effect at one channel; None: what all have in common, the least of one sign."""
-    out = {}
-    for n, v in parameters.of(name).items():
-        common = np.where(np.all(v > 0, axis=0), v.min(axis=0), np.where(np.all(v < 0, axis=0), v.max(axis=0), 0.0))
-        out[n] = np.broadcast_to(common if channel is None else v[channel], (worlds,))
-    return out
+    values = parameters.of(name)
+    if channel is None:
+        row = {n: np.maximum(v.min(axis=0), 0.0) + np.minimum(v.max(axis=0), 0.0) for n, v in values.items()}
+    else:
+        row = {n: v[channel] for n, v in values.items()}
+    return {n: np.broadcast_to(v, (worlds,)) for n, v in row.items()}
 
 
 def distinct_motions(

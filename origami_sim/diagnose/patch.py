@@ -26,7 +26,7 @@ from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply, si
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Setting, Settings
+from origami_sim.scene import Settings
 
 _WORDS = ("site", "source")
 
@@ -159,12 +159,12 @@ def patched(diagnosis: Diagnosis) -> Candidate | None:
     return next((c for c in diagnosis.candidates if values and [n.value for n in c.numbers] == values), None)
 
 
-def additions(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addition, ...]:
+def additions(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
     """The effects that the diagnosis found missing, one for each site; see also `of_channels`."""
     return tuple(a for a in _found(diagnosis, settings) if not _of_channel(a))
 
 
-def of_channels(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> list[str]:
+def of_channels(diagnosis: Diagnosis, settings: Settings) -> list[str]:
     """Errors of single channels that the diagnosis found: the recording's, so that no model can have them."""
     return [f"{a.effect} at {a.site}" for a in _found(diagnosis, settings) if _of_channel(a)]
 
@@ -173,7 +173,7 @@ def _of_channel(a: Addition) -> bool:
     return get(a.effect).family == "measurement" and a.entities is not None
 
 
-def _found(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addition, ...]:
+def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
     found: dict[tuple[str, str], dict[str, float]] = {}
     for label, value in diagnosis.patch.items():
         name, _, entities = label.partition("@")
@@ -183,7 +183,7 @@ def _found(diagnosis: Diagnosis, settings: Mapping[str, Setting]) -> tuple[Addit
     best = patched(diagnosis)
     suspected = [] if best is None else best.effects
     sites = iter([] if best is None else best.sites)
-    there = {a.effect for a in getattr(settings, "effects", ())}
+    there = {a.effect for a in settings.effects}
     for (effect, entities), values in found.items():
         if effect not in suspected and effect not in there:  # of what is aligned, the rest does nothing
             found[effect, entities] = silent(effect) | values

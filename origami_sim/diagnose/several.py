@@ -189,10 +189,10 @@ def spared(forward: Forward, fits: Sequence[Fit], scores: dict[int, Score], weig
             continue
         sure = dict(zip((id(n) for n in f.free), zip(f.theta, f.deviations(), strict=True), strict=True))
         for s in f.hypothesis.suspects:
-            told = max(abs(sure[id(n)][0] - n.start) / sure[id(n)][1] for n in s.strengths)
+            told = any(abs(sure[id(n)][0] - n.start) > 2.0 * sure[id(n)][1] for n in s.strengths)
             rest = tuple(t for t in f.hypothesis.suspects if t is not s)
             near = [g for g in (*fits, *out) if _same(g.hypothesis, rest) and g.cost < f.cost + words.CLOSE]
-            if told > 2.0 or near:
+            if told or near:
                 continue
             near = {"known": f.linear, "kept": len(forward.subject.nominals)}
             fewer = fit(forward, Hypothesis(rest), weights, theta=numbers_kept(f, rest), local=f.local, **near)

@@ -95,8 +95,9 @@ def alignments(
             )
         p = effect.parameter(parameter)
         spread = _aligned(Setting(label, p.default, p.unit, "", p.meaning), given, source)
-        known = parameters is not None and (name, parameter) in set(parameters)
-        start = float(parameters[name, parameter].flat[0]) if known and parameters is not None else p.default
+        start = p.default
+        if parameters is not None and (name, parameter) in parameters:
+            start = float(parameters[name, parameter].flat[0])
         out.append(Free(NOMINAL, label, p.unit, start, 0.3 * spread, *p.bounds, spread, aligned=True))
     return out
 

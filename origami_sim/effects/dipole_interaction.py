@@ -39,7 +39,7 @@ def force(
     poling_n: scalar,
     offset: scalar,
 ):
-    moment = (remanence * volume / scalar(MU0)) * poled(x1, x2, x3, poling_1, poling_2, poling_n)
+    moment, _ = magnet(x1, x2, x3, remanence, volume, poling_1, poling_2, poling_n, offset)
     pull = stray_gradient * moment
     t = normal_gradients(x1, x2, x3)
     third = pull / scalar(3.0)

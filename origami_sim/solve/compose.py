@@ -8,9 +8,7 @@ by hand. The source is composed as text (see `Program.sources`), compiled once p
 import functools
 import hashlib
 import linecache
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import warp as wp
 
@@ -261,7 +259,7 @@ class _Composer:
         first = self.index["drive", "offset"]
         return f"wave(P, layout, {first}, {k}, w, series_times, series_values, time)"
 
-    def call(self, effect: Effect, which: str, entity: str, renamed: Mapping[str, str] = MappingProxyType({})) -> str:
+    def call(self, effect: Effect, which: str, entity: str, **renamed: str) -> str:
         arguments = effect.asked(which)
         own = {p.name: p for p in effect.parameters}
         memory = {m.name for m in effect.memory}
@@ -485,7 +483,7 @@ class _Composer:
         t.depth += 1
         for i in (1, 2, 3):
             t(f"y{i} = X[triangles[u][{i - 1}] & NATURAL, w]")
-        t(f"source, there = {self.call(effect, 'magnet', 'u', {'x1': 'y1', 'x2': 'y2', 'x3': 'y3'})}")
+        t(f"source, there = {self.call(effect, 'magnet', 'u', x1='y1', x2='y2', x3='y3')}")
         strength = (self.value(effect.name, effect.fitted[0], entity) for entity in "cu")
         t(f"source = scalar(0.5) * ({' + '.join(strength)}) * source")
         t("stray = stray + magnetostatics.dipole_field(at - there, source)")

@@ -55,7 +55,7 @@ def test_a_marker_beside_its_place_is_the_measurement(lift, down, words):
     numbers = {n.label: n for n in found.candidates[0].numbers}
     for axis, truth in (("x", lift), ("z", down)):
         n = numbers[f"marker_offset.offset_{axis}"]
-        assert n.value == pytest.approx(truth, abs=5e-5) and n.low < truth < n.high
+        assert n.value == pytest.approx(truth, abs=2e-5) and n.low < truth < n.high
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -40,7 +40,7 @@ def test_more_of_an_effect_is_patched_in_as_it_was_fitted(tmp_path, change):
             recordings=["swing"],
             verdict="MECHANISM",
         ),  # type: ignore[arg-type]
-        {},
+        read_calibration("pendulum_chain"),
     )
     assert found.more
     again = table({"entities": list(found.entities or ()), "more": True, **found.values}, tmp_path)
@@ -95,11 +95,11 @@ def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_mode
     found = SimpleNamespace(
         patch=numbers, changed=[], candidates=[best], recordings=["swing"], verdict="SEVERAL", sentence="Two."
     )
-    assert [a.effect for a in additions(found, {})] == ["crease_friction"]  # type: ignore[arg-type]
     settings = read_calibration("pendulum_chain")
+    assert [a.effect for a in additions(found, settings)] == ["crease_friction"]  # type: ignore[arg-type]
     path = write_patch(tmp_path / "patched.toml", settings, found, scene="pendulum_chain")  # type: ignore[arg-type]
     assert "Left out, as it is an error of the recording: angle_offset at channel fold2" in path.read_text()
     again = scene_settings(scene_module("pendulum_chain"), path)
     assert [a.effect for a in again.effects] == ["crease_friction"]
     numbers["angle_offset.angle_offset"] = numbers.pop("angle_offset.angle_offset@1")  # of all channels
-    assert [a.effect for a in additions(found, {})] == ["crease_friction", "angle_offset"]  # type: ignore[arg-type]
+    assert [a.effect for a in additions(found, settings)] == ["crease_friction", "angle_offset"]  # type: ignore[arg-type]

@@ -315,7 +315,7 @@ def test_wrong_zeros_of_two_encoders_are_found_beside_each_other():
     zeros = {s: n for s, n in zip(best.sites, best.numbers[-2:], strict=True)}
     assert set(zeros) == {"channel fold1", "channel fold2"}
     for site, truth in (("channel fold1", 0.03), ("channel fold2", -0.02)):
-        assert zeros[site].value == pytest.approx(truth, abs=6e-4)
+        assert zeros[site].value == pytest.approx(truth, abs=1e-4)
         assert zeros[site].low < truth < zeros[site].high
     assert set(found.patch) >= {"angle_offset.angle_offset@0", "angle_offset.angle_offset@1"}
 

@@ -79,8 +79,8 @@ def test_two_magnets_in_line_attract_as_dipoles_do():
     model, parameters = plates(1, *FAR)
     moment = BR * SIDE**2 * 0.002 / MU0
     force, _ = wrench(model, parameters)
-    assert force[0] == pytest.approx(6e-7 * moment**2, rel=6 * SIDE**2)  # the next term is (size / distance)^2
-    assert np.abs(force[1:]).max() < 1e-3 * force[0]  # the dipoles of two triangles are not the plate's middle
+    assert force[0] == pytest.approx(6e-7 * moment**2, rel=SIDE**2)  # the next term is (size / distance)^2
+    assert np.abs(force[1:]).max() < 3e-4 * force[0]  # the dipoles of two triangles are not the plate's middle
     half, _ = wrench(*plates(1, *FAR, coupling=0.5))
     assert half == pytest.approx(force / 2, rel=1e-12)
 
@@ -97,9 +97,9 @@ def test_finer_triangles_come_to_finely_divided_magnets():
             [np.linalg.norm(f - force) / np.linalg.norm(force), np.linalg.norm(t - torque) / np.linalg.norm(torque)]
         )
     errors = np.array(errors)
-    assert errors[0].max() < 0.25  # two triangles a magnet
-    assert slope(1 / cells, errors[:, 0]) == pytest.approx(2, abs=0.3), errors
-    assert slope(1 / cells, errors[:, 1]) == pytest.approx(2, abs=0.3), errors
+    assert errors[0].max() < 0.16  # two triangles a magnet
+    assert slope(1 / cells, errors[:, 0]) == pytest.approx(2, abs=0.15), errors
+    assert slope(1 / cells, errors[:, 1]) == pytest.approx(2, abs=0.15), errors
 
 
 def test_action_equals_reaction_also_between_different_strengths():
@@ -167,12 +167,12 @@ def test_the_tangent_knows_that_magnets_feel_each_other():
 
 
 def test_a_flap_of_the_box_sags_without_a_field(tmp_path):
-    """By 0.56 deg in an independent solution of one dipole a patch; here four, above the sheet where the patch is."""
+    """By 0.56 deg in an independent solution; here 0.66 by four dipoles a patch, above the sheet as the patch is."""
     file = tmp_path / "box.toml"
     file.write_text(read_calibration("box").file.read_text() + "\n[[effects.dipole_interaction]]\ncoupling = 1.0\n")
     box = scene_module("box")
     without, with_it = (np.degrees(box.flap_angles(read_calibration(c), np.zeros(1))[0]) for c in ("box", str(file)))
-    assert (with_it - without).mean() == pytest.approx(-0.56, abs=0.12)
+    assert (with_it - without).mean() == pytest.approx(-0.56, abs=0.1)
     assert np.ptp(with_it) < 1e-6
 
 
@@ -198,7 +198,7 @@ def test_magnets_in_each_others_field_are_found_where_they_were_left_out(tmp_pat
     found = diagnose(box, recordings, catalogue=(NAME, *others))
     assert found.verdict == "MECHANISM" and found.chosen == ["dipole_interaction at all panels"]
     coupling = found.candidates[0].numbers[-1]
-    assert coupling.value == pytest.approx(1.0, abs=0.03)
+    assert coupling.value == pytest.approx(1.0, abs=0.015)
 
 
 @pytest.mark.parametrize(
