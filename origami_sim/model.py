@@ -291,9 +291,9 @@ class State:
 
 
 def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:
-    """Magnet of each triangle [T] by the parameters of an effect, -1 for none.
+    """Magnet of each triangle [T] by the parameters of an effect, -1 for none in any world.
 
-    Magnetised triangles that touch and are poled alike (within 8 degrees) are one magnet.
+    Magnetised triangles that touch and are poled alike (within 8 degrees) are one magnet. Worlds may lack magnets.
 
     Raises:
         InputError: worlds in which other triangles join.
@@ -302,11 +302,14 @@ def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:
     given = [magnet["volume"] != 0, np.sign(magnet["remanence"]), *(magnet[f"poling_{k}"] for k in "12n")]
     columns = np.stack(np.broadcast_arrays(*(np.asarray(g, float) for g in given)))
     found = [_joined(model, c) for c in np.unique(columns, axis=2).transpose(2, 0, 1)]
-    if any(not np.array_equal(f, found[0]) for f in found):
-        raise InputError(
-            "magnets of the worlds join in other ways", field=f"{owner}.poling", allowed="the same in all worlds"
-        )
-    return found[0]
+    most = max(found, key=lambda f: np.count_nonzero(f >= 0))
+    for f in found:
+        pairs = np.stack([f, most], axis=1)[f >= 0]
+        if len({len(np.unique(p, axis=0)) for p in (pairs, pairs[:, 0], pairs[:, 1])}) > 1 or np.any(pairs < 0):
+            raise InputError(
+                "magnets of the worlds join in other ways", field=f"{owner}.poling", allowed="the same in all worlds"
+            )
+    return most
 
 
 def _joined(model: Model, magnet: np.ndarray) -> np.ndarray:

@@ -112,7 +112,7 @@ def diagnose(
     lap("locate")
     finalists = chosen(screening, o.finalists)
     fits = contest(forward, base, finalists, screening, weights, lambda part: tell("refit", part))
-    fits += unbent(forward, base, every, fits, weights, o)
+    fits = renewed(fits, unbent(forward, base, every, fits, weights, o))
     fits += pairs(forward, base, screening, fits, weights, o)
     rough, seen = screening, (base, screening, weights)
     screening, fits, weights = settled(forward, rough, fits, weights)

@@ -169,25 +169,35 @@ def bent(forward: Forward, f: Fit, by: float = 1.0) -> list[int]:
 def unbent(
     forward: Forward, base: Fit, every: Sequence[Suspect], fits: Sequence[Fit], weights: Weights, o: Options
 ) -> list[Fit]:
-    """The suspects that stand out where starts that were bent to make up for them are put back, fitted from there.
+    """The suspects that stand out where what was bent to make up for them is put back, fitted from there.
 
-    Seen from a bent start, an effect can have the wrong sign.
+    Put back are starts far from what was recorded, and numbers far from what was known of them. Seen from a bent
+    start, an effect can have the wrong sign; from a bent number, it can seem not to matter, so that then those that
+    were fitted are fitted again.
     """
-    if not forward.local:
+    far, given = bent(forward, base, FAR), np.array([f.start for f in base.free])
+    strained = np.abs(base.theta - given) > words.STRAINED * np.array([f.spread for f in base.free])
+    if not (far or strained.any()):
         return []
-    far = bent(forward, base, FAR)
-    if not len(far):
-        return []
-    local = base.local.copy()
-    local[far] = forward.told(base.hypothesis, base.theta)[far]
-    back = fit(forward, base.hypothesis, weights, theta=base.theta, local=local, most=0)
+    theta, local = np.where(strained, given, base.theta), base.local.copy()
+    if far:
+        local[far] = forward.told(base.hypothesis, theta)[far]
+    back = fit(forward, base.hypothesis, weights, theta=theta, local=local, most=0)
     if back.failed:
         return []
     seen = screen(forward, every, back, weights, most=o.screened)
-    known = {f.hypothesis.label for f in fits}
-    return [
-        refit(forward, back, s, weights, seen, most=8) for s in chosen(seen, UNBENT) if s.suspect.label not in known
-    ]
+    if strained.any():
+        found = contest(forward, back, chosen(seen, o.finalists), seen, weights)[1:]
+    else:
+        known = {f.hypothesis.label for f in fits}
+        new = [s for s in chosen(seen, UNBENT) if s.suspect.label not in known]
+        found = [refit(forward, back, s, weights, seen, most=8) for s in new]
+    return nearer(found, fits)
+
+
+def nearer(new: Sequence[Fit], fits: Sequence[Fit]) -> list[Fit]:
+    """Those of new fits that end below all of the same hypothesis."""
+    return [f for f in new if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label)]
 
 
 TWINS = 5
@@ -267,10 +277,8 @@ def lookalikes(
         begin = np.concatenate([best.theta[:own], [value], [f.start for f in s.free[1:]]])
         near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
         f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)
-        f = finished(forward, f, weights) if min(f.cost, f.promise) < best.cost + NEAR else f
-        if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label):
-            out.append(f)
-    return out
+        out.append(finished(forward, f, weights) if min(f.cost, f.promise) < best.cost + NEAR else f)
+    return nearer(out, fits)
 
 
 def renewed(fits: Sequence[Fit], new: Sequence[Fit]) -> list[Fit]:

@@ -21,7 +21,8 @@ MORE = 4.0
 def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: Weights, o: Options) -> list[Fit]:
     """The best pair of suspects by the screening, if it promises much more than the best single one gives.
 
-    What they promise is measured by the noise alone: in the weights of the model without them, they are noise.
+    What they promise is measured by the noise alone: in the weights of the model without them, they are noise. No pair
+    can explain more than there is beside the noise.
     """
     if o.most < 2:
         return []
@@ -38,6 +39,7 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
 
     gains = {f.hypothesis.label: missed(base) - missed(f) for f in fits if not f.failed}
     single = max([*(s.score**2 for s in top), *gains.values()])
+    there = missed(base) - sum(np.isfinite(forward.blocks[b].values).sum() for b in seen.blocks)
     best, most = None, 0.0
     for a, b in combinations(top, 2):
         both = np.stack([a.shape, b.shape], axis=1)
@@ -50,7 +52,7 @@ def pairs(forward, base: Fit, screening: Screening, fits: list[Fit], weights: We
             continue
         # fits gain other amounts than signatures promise, for which strengths are small
         more = max(gains.get(s.suspect.label, 0.0) / s.score**2 for s in (a, b))
-        explained = float(np.sum((both @ x) ** 2)) * float(np.clip(more, 1.0, MORE))
+        explained = min(float(np.sum((both @ x) ** 2)) * float(np.clip(more, 1.0, MORE)), there)
         if explained > most:
             best, most = (a, b), explained
     if best is None or most - single < 9.0 + 0.1 * single:

@@ -101,6 +101,21 @@ def test_starts_that_were_bent_are_put_back_to_look_again(rubbing):
     assert not {f.hypothesis.label for f in again} & set(labels)
 
 
+def test_numbers_that_were_bent_are_put_back_to_look_again(rubbing):
+    """A number far from what was known can stand for an effect, which then seems not to matter."""
+    forward, _, base, weights, _ = rubbing
+    every = [s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect in LOOPS]
+    first, local = base.free[0], forward.told(base.hypothesis, base.theta)
+    assert unbent(forward, replace(base, local=local), every, [], weights, Options()) == []
+    theta = base.theta.copy()
+    theta[0] = first.start + 4.0 * first.spread
+    found = unbent(forward, replace(base, local=local, theta=theta), every, [base], weights, Options())
+    best = min(found, key=lambda f: f.cost)
+    assert best.hypothesis.label in ("crease_friction at crease 1", "crease_hysteresis at crease 1")
+    assert best.cost < 0.5 * base.cost and abs(best.theta[0] - first.start) < 3.0 * first.spread
+    assert unbent(forward, replace(base, local=local, theta=theta), every, found, weights, Options()) == []
+
+
 def test_equation_error_finds_the_crease(rubbing):
     forward, _, base, _, _ = rubbing
     places = locate(forward, motions_of(forward, base))

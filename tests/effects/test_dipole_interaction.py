@@ -132,6 +132,16 @@ def test_magnets_that_join_in_one_world_only_are_refused():
     assert not forces(model, values, Drive(), start(model, 2), 0.0).forces[NAME].any()
 
 
+def test_worlds_may_lack_magnets():
+    """As those of a batch in which some worlds try the effect and others do not."""
+    model, values = plates(1, *FAR)
+    alone = forces(model, values, Drive(), start(model), 0.0).forces[NAME][:, 0]
+    values.set(NAME, "remanence", np.array([[0.0, BR, 0.0], [0.0, BR, 0.0], [0.0, BR, BR], [0.0, BR, BR]]))
+    assert magnets(model, values, NAME).tolist() == [0, 0, 1, 1]
+    found = forces(model, values, Drive(), start(model, 3), 0.0).forces[NAME]
+    assert np.array_equal(found[:, 1], alone) and not found[:, [0, 2]].any()
+
+
 def test_a_panel_without_a_magnet_feels_none_even_where_it_lies_on_one():
     placed = (np.eye(3), np.zeros(3)), (np.eye(3), np.array([0.05, 0, 0])), (np.eye(3), np.zeros(3))
     model, values = plates(1, *placed)
