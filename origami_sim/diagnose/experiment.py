@@ -11,12 +11,18 @@ from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.refit import Fit, Linearisation, Weights, linearise
 from origami_sim.diagnose.static import CurveForward
 from origami_sim.drive import Drive, Signal
+from origami_sim.model import Parameters
 
 WANTED = 5.0
 """Separation d' at which two explanations count as told apart."""
 
 TOLD = 1.0
 """Separation in the best experiment of the menu below which a rival is left out: no number of repeats would do."""
+
+CREASE, PANEL = ("crease", "stiffness"), ("panel_bending", "stiffness")
+
+CLAMPED = 300.0
+"""Times as stiff as the stiffest crease that a clamped one is; as stiff as panels where creases have no stiffness."""
 
 
 def propose(
@@ -110,11 +116,33 @@ def _menu(forward: Forward) -> list[tuple[str, Forward]]:
         if not len(forward.model.contacts):
             out.append(("the set-up upside down", _variant(forward, tilt=np.pi)))
     out.append(("a tenth more mass on every panel", _variant(forward, load=1.1)))
+    if len(forward.articulation.creases) > 1 and _splint(forward.parameters):
+        for joint, c in enumerate(forward.articulation.creases):
+            name = forward.model.name("crease", int(c))
+            out.append((f"{name} clamped as it is in the reference state", _variant(forward, clamped=joint)))
     return out
 
 
+def _splint(parameters: Parameters) -> float:
+    """Stiffness of a clamped crease [N m/rad]; 0 where neither creases nor panels have one."""
+    known = set(parameters)
+    if CREASE not in known:
+        return 0.0
+    panel = float(np.max(parameters[PANEL])) if PANEL in known else 0.0
+    return CLAMPED * float(np.max(parameters[CREASE])) or panel
+
+
 def _variant(
-    forward: Forward, *, size=1.0, stretch=1.0, gain=1.0, speed=1.0, held=False, tilt=0.0, load=1.0
+    forward: Forward,
+    *,
+    size=1.0,
+    stretch=1.0,
+    gain=1.0,
+    speed=1.0,
+    held=False,
+    tilt=0.0,
+    load=1.0,
+    clamped: int | None = None,
 ) -> Forward:
     """The same object in another experiment; recordings keep their frames, whose values are replaced by predictions."""
     out = copy.copy(forward)
@@ -127,6 +155,10 @@ def _variant(
             rest = arm.reference()
             pose = arm.moved(rest, size * (b.pose.angles - rest.angles))
             rates = size * rates
+        if clamped is not None:
+            here = np.arange(len(pose.angles)) == clamped
+            pose = replace(pose, angles=np.where(here[:, None], arm.reference().angles, pose.angles))
+            rates = np.where(np.arange(len(rates)) == len(rates) - len(here) + clamped, 0.0, rates)
         times = b.times
         if stretch != 1.0:
             step = times[1] - times[0]
@@ -139,12 +171,16 @@ def _variant(
     if held:
         spans = [float(r.times[-1] - r.times[0]) for r in forward.recordings]
         out._drives = [_held(d, span) for d, span in zip(forward._drives, spans, strict=True)]
-    if tilt or load != 1.0:
+    if tilt or load != 1.0 or clamped is not None:
         build = forward.subject.build
 
         def other(values):
             model, parameters, drive = build(values)
             parameters = parameters.copy()
+            if clamped is not None:
+                c = arm.creases[clamped : clamped + 1]
+                parameters.set("crease", "stiffness", _splint(parameters), c)
+                parameters.set("crease", "rest_angle", arm.reference().angles[clamped], c)
             if load != 1.0:
                 parameters.set("inertia", "mass", parameters["inertia", "mass"] * load)
             if tilt:

@@ -594,6 +594,26 @@ def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
         assert again == pytest.approx(fresh, abs=0.26), what  # measured: 0.01, 0.25, 0.18 of 1.1, 0.4, 0.7
 
 
+def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_acts(rubbing):
+    forward, _, base, weights, screening = rubbing
+    menu = dict(experiment._menu(forward))
+    clamped = menu["crease 1 clamped as it is in the reference state"]
+    free = menu["repeat the same experiment"]
+    nothing = np.zeros((1, len(clamped.blocks), clamped.local))
+    for made, least, most in ((clamped, 0.0, 0.02), (free, 0.2, 2.0)):
+        swings = [v[0] for v in made.predict(base.hypothesis, base.theta[None], nothing)]
+        assert least < max(np.ptp(s[:, 1]) for s in swings) < most
+        assert max(np.ptp(s[:, 0]) for s in swings) > 0.2
+    friction = next(s for s in screening.signatures if s.suspect.label == "crease_friction at crease 1")
+    rubs = refit(forward, base, friction, weights, screening)
+    rubs = replace(rubs, theta=np.concatenate([base.theta, rubs.theta[len(base.theta) :]]))
+    d = [
+        experiment.separation(menu[f"crease {c} clamped as it is in the reference state"], rubs, base, weights)[0]
+        for c in range(2)
+    ]
+    assert d[1] < 0.1 * d[0]  # what acts at a clamped crease does not show
+
+
 @pytest.mark.parametrize(("second", "told", "best"), [(0.5, [0, 2], "c"), (3.5, [0, 1, 2], "b")])
 def test_the_next_experiment_is_for_rivals_that_can_be_told(monkeypatch, second, told, best):
     """The nearest rival counts, but for one that nothing in the menu would tell apart."""
