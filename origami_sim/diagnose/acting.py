@@ -3,7 +3,8 @@
 The forces that a recorded motion needs beyond the model's (`locate.py`) are those of the tree's coordinates. A moment
 at a crease acts on the fold there and on no other; a force on a panel acts on all folds between it and what holds the
 device. For each such action, whatever its size from window to window, it is counted how much of what is missing it
-leaves, in the covariance that the noise of accelerations and inexact forces of the model give.
+leaves, in the covariance that the noise of accelerations and inexact forces of the model give; its size in each window
+is the one that leaves least.
 """
 
 from collections import defaultdict
@@ -12,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.diagnose.articulation import Articulation
-from origami_sim.diagnose.diagnosis import Acting
-from origami_sim.diagnose.locate import Motion
+from origami_sim.diagnose.diagnosis import REVERSAL, Acting, Curve
+from origami_sim.diagnose.locate import BINS, Motion, against, way
 
 SAME = 0.999
 """|cos| from which on two actions are one."""
@@ -24,6 +25,12 @@ INEXACT = 0.01
 On strips with known forces on panels, the uncertainty of the refitted numbers and of the angles is too little (nothing
 missing then looks like a moment), and with half as much the wrong panel can come first.
 """
+
+DRAWN = 6
+"""Actions, the best, whose size is given."""
+
+BLIND = 10.0
+"""Times the median error of a size beyond which a window tells nothing of it, as the action has no lever there."""
 
 SEEN = 5.0
 """Standard deviations by which what is missing must exceed the noise for anything to be said of it."""
@@ -43,12 +50,13 @@ def acting(arm: Articulation, motions: Sequence[Motion]) -> list[Acting]:
         needed.append(np.einsum("wmn,nw->wm", white, m.mean(m.missing)[m.told]))
         for site, direction in _actions(arm, m).items():
             d = np.einsum("wmn,nw->wm", white, m.mean(direction)[m.told])
-            sites.setdefault(site, []).append(d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300))
+            sites.setdefault(site, []).append(d)
     y = np.concatenate(needed)
     total, freedom = float(np.sum(y**2)), y.size
     if total - freedom < SEEN * np.sqrt(2.0 * freedom):
         return []
-    unit = {site: np.concatenate(u) for site, u in sites.items()}
+    reach = {site: [np.maximum(np.linalg.norm(d, axis=1), 1e-300) for d in by] for site, by in sites.items()}
+    unit = {site: np.concatenate(by) / np.concatenate(reach[site])[:, None] for site, by in sites.items()}
     rest = {site: max(total - float(np.sum(np.sum(u * y, axis=1) ** 2)), 0.0) for site, u in unit.items()}
     weight = np.sum(y**2, axis=1)
 
@@ -63,13 +71,58 @@ def acting(arm: Articulation, motions: Sequence[Motion]) -> list[Acting]:
             found[twin].same.append(" ".join(site))
         else:
             what, where = site
-            found[site] = Acting(what, where, float(np.sqrt(rest[site] / (freedom - len(y)))), [], "", 0.0)
+            left = float(np.sqrt(rest[site] / (freedom - len(y))))
+            found[site] = Acting(what, where, left, [], "", 0.0, "N" if what.startswith("force") else "N m")
     for site, a in found.items():
         others = {s: overlap(site, s) for s in found if s != site}
         if others:
             nearest = max(others, key=lambda s: others[s])
             a.like, a.overlap = " ".join(nearest), others[nearest]
+    beside = _beside(arm)
+    for site, a in list(found.items())[:DRAWN]:
+        sizes = [np.sum(d * n, axis=1) / r**2 for d, n, r in zip(sites[site], needed, reach[site], strict=True)]
+        a.curves = _curves(motions, beside[site], sizes, [1.0 / r for r in reach[site]])
     return list(found.values())
+
+
+def _curves(
+    motions: Sequence[Motion], k: int, sizes: Sequence[np.ndarray], errors: Sequence[np.ndarray]
+) -> list[Curve]:
+    """The size of an action in windows: in time, and in bins of what it may go with at a coordinate."""
+    first, size, error = motions[0], np.concatenate(sizes), np.concatenate(errors)
+    weight = 1.0 / error**2
+    seen = error < BLIND * np.median(error)
+    head = np.flatnonzero(seen[: len(sizes[0])])
+    times = first.mean(first.times)[head].tolist()
+    out = [Curve("time", "s", times, size[head].tolist(), error[head].tolist(), [first.width] * len(head))]
+    along = size * np.concatenate([m.middle(way(m.rate[k])) for m in motions])
+    for (name, unit), each in against(motions, k).items():
+        x = np.concatenate([m.middle(v) for m, v in zip(motions, each, strict=True)])
+        y = along if name == REVERSAL else size
+        order = np.argsort(np.where(seen, x, np.nan), kind="stable")[: np.count_nonzero(seen & np.isfinite(x))]
+        parts = [p for p in np.array_split(order, BINS) if len(p)]
+        out.append(
+            Curve(
+                name,
+                unit,
+                [float(x[p].mean()) for p in parts],
+                [float(np.average(y[p], weights=weight[p])) for p in parts],
+                [float(weight[p].sum() ** -0.5) for p in parts],
+                [len(p) for p in parts],
+            )
+        )
+    return out
+
+
+def _beside(arm: Articulation) -> "dict[Site, int]":
+    """Coordinate of the crease of each action: of a panel, the one that moves it."""
+    out: dict[Site, int] = {}
+    for k, c in enumerate(arm.creases, arm.size - len(arm.creases)):
+        out.setdefault(("moment at", arm.model.name("crease", int(c))), k)
+    for p, (_, hinge) in arm.outer.items():
+        for what in ("force across", "moment on"):
+            out.setdefault((what, arm.model.name("panel", p)), hinge)
+    return out
 
 
 Site = tuple[str, str]

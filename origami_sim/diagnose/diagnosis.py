@@ -123,6 +123,8 @@ class Acting:
         left: root mean square of what it leaves, in standard deviations: 1 if it explains all.
         same: actions that are no different in these recordings.
         like: of the others, the one that is most like it. overlap: |cos| of the two, 1 if they look the same.
+        unit: "N m" or "N". curves: its size in time (means over windows of the first recording), and against angle and
+            rate of the crease there (of a panel: the one that moves it), what drives, and the rest as in `Place`.
     """
 
     what: str
@@ -131,6 +133,8 @@ class Acting:
     same: list[str]
     like: str
     overlap: float
+    unit: str = ""
+    curves: list[Curve] = field(default_factory=list)
 
 
 @dataclass

@@ -57,8 +57,16 @@ class Motion:
 
     def mean(self, values: np.ndarray) -> np.ndarray:
         """Means of values [..., n] over windows."""
+        return self._windows(values).mean(-1)
+
+    def middle(self, values: np.ndarray) -> np.ndarray:
+        """Values [..., n] in the middle of windows."""
+        windows = self._windows(values)
+        return windows[..., windows.shape[-1] // 2]
+
+    def _windows(self, values: np.ndarray) -> np.ndarray:
         width, count = self.width, max(1, len(self.times) // self.width)
-        return values[..., : count * width].reshape(*values.shape[:-1], count, -1).mean(-1)
+        return values[..., : count * width].reshape(*values.shape[:-1], count, -1)
 
     @property
     def width(self) -> int:
@@ -300,7 +308,7 @@ def reversals(rate: np.ndarray) -> np.ndarray:
     return np.concatenate([[False], held[1:] * held[:-1] < 0])
 
 
-def _against(motions: Sequence[Motion], k: int) -> dict[tuple[str, str], list[np.ndarray]]:
+def against(motions: Sequence[Motion], k: int) -> dict[tuple[str, str], list[np.ndarray]]:
     """What a missing moment may go with, by name and unit: for each motion (n,); nan where it is not defined."""
     out = {("angle", "rad"): [m.q[k] for m in motions], ("rate", "rad/s"): [m.rate[k] for m in motions]}
     for n in sorted(set.intersection(*(set(m.drive) for m in motions))):
@@ -327,7 +335,7 @@ def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     missing, along = joined(lambda m: m.missing[k]), joined(lambda m: m.missing[k] * way(m.rate[k]))
     width = 2 * max(m.half for m in motions) + 1
     out = []
-    for (name, unit), each in _against(motions, k).items():
+    for (name, unit), each in against(motions, k).items():
         x, y = np.concatenate(each), along if name == REVERSAL else missing
         order = np.argsort(x, kind="stable")[: np.isfinite(x).sum()]  # what is not a number comes last
         parts = [p for p in np.array_split(order, BINS) if len(p)]

@@ -14,7 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import REVERSAL, Correlation, Curve, Diagnosis, Number, Place, Suspected, Trace
+from origami_sim.diagnose.diagnosis import (
+    REVERSAL,
+    Acting,
+    Correlation,
+    Curve,
+    Diagnosis,
+    Number,
+    Place,
+    Suspected,
+    Trace,
+)
 from origami_sim.diagnose.report_markup import (
     MISSING,
     Html,
@@ -428,7 +438,7 @@ def _where(d: Diagnosis, geometry: dict | None) -> list:
         out.append(
             element("p", f"{len(ordered) - PLACES} more places share {percent(rest)}; their curves are in the data.")
         )
-    return [*out, *blows]
+    return [*out, *_actions(d), *blows]
 
 
 def _alone(d: Diagnosis) -> Html:
@@ -439,6 +449,7 @@ def _alone(d: Diagnosis) -> Html:
             element("th", ", ".join([f"{a.what} {a.site}", *a.same]), scope="row"),
             element("td", number(a.left), class_="n"),
             element("td", f"{a.like} ({a.overlap:.2f})" if a.like else ""),
+            element("td", amount(_size(a), a.unit) if a.curves else "", class_="n"),
         )
         for a in d.acting[:ALONE]
     ]
@@ -446,10 +457,38 @@ def _alone(d: Diagnosis) -> Html:
         "If one thing alone acted, as strongly as it takes from moment to moment: what would be left of the missing "
         "forces, in standard deviations (1: nothing), and which other action looks most like it (1: the same)."
     )
-    head = _header("Acting alone", "Leaves [sd]", "Most like it")
+    head = _header("Acting alone", "Leaves [sd]", "Most like it", "Size (rms)")
     return element(
         "div", element("h3", "One action"), element("p", about, class_="quiet"), _table(head, body, "Actions")
     )
+
+
+def _actions(d: Diagnosis) -> list[Html]:
+    """The sizes of actions that could each be the mismatch."""
+    return [
+        element(
+            "details",
+            element("summary", element("h3", f"If only a {a.what} {a.site}")),
+            element("div", *_action(a), class_="figures three"),
+            open=not n,
+        )
+        for n, a in enumerate(a for a in d.acting if a.curves)
+    ]
+
+
+def _size(a: Acting) -> float:
+    """Root mean square of an action in time, less its error's."""
+    c = a.curves[0]
+    return float(np.sqrt(max(np.mean(_array(c.mean) ** 2 - _array(c.error) ** 2), 0.0)))
+
+
+def _action(a: Acting) -> list[Html]:
+    """The size of an action in time, and against what it may go with."""
+    time, *rest = a.curves
+    name = a.what.split()[0]
+    plot = _in_time(name, a.site, a.unit, time.x, time.mean, time.error)
+    caption = element("figcaption", element("b", "in time"), " shaded: ± 2 sd")
+    return [element("figure", caption, plot.html()), *(_curve(a.site, c, name, a.unit) for c in rest)]
 
 
 def _impulses(d: Diagnosis) -> Html:
@@ -492,7 +531,7 @@ def _place(p: Place) -> Html:
         width = amount(float(np.median(np.diff(_array(c.x)))), "s", 2) if len(c.x) > 1 else "one block"
         caption = element("figcaption", element("b", "unexplained power"), f" means over {width}, shaded: ± 2 sd")
         figures.append(element("figure", caption, plot.html()))
-    figures += [_curve(p.site, c, name, unit) for c in p.curves]
+    figures += [_curve(p.site, c, f"residual {name}", unit) for c in p.curves]
     return element("div", figures or _nothing("No curves."), class_="figures three")
 
 
@@ -516,12 +555,12 @@ def _in_time(name: str, site: str, unit: str, times: Sequence, values: Sequence,
 def _curve(site: str, c: Curve, name: str, unit: str) -> Html:
     x, y, e = _array(c.x), _array(c.mean), _array(c.error)
     plot = Plot(
-        f"residual {name} at {site} against {c.against}",
+        f"{name} at {site} against {c.against}",
         span_of(x),
         span_of(y - 2 * np.nan_to_num(e), y + 2 * np.nan_to_num(e), zero=True),
         x_name=c.against,
         x_unit=c.unit,
-        y_name=f"residual {name}",
+        y_name=name,
         y_unit=unit,
     )
     titles = [

@@ -66,7 +66,7 @@ def scaled_unit(value: float, unit: str) -> tuple[float, str]:
 
 def pretty(unit: str) -> str:
     """A unit in print: m², s⁻¹; nothing for pure numbers."""
-    return "" if unit == "1" else re.sub(r"\^(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), unit)
+    return "" if unit in ("1", "-") else re.sub(r"\^(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), unit)
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -287,6 +287,13 @@ def test_actions_say_what_they_leave_and_what_looks_like_them():
     text = " ".join(Read(page(d, GEOMETRY)).words)
     assert "; like a force across panel <2>" in text
     assert "force across panel <2>, moment on panel <2>" in text and "moment at fold1 (0.87)" in text and "1.31" in text
+    assert "If only a" not in text
+    d.acting[0].unit = "N"
+    d.acting[0].curves = [
+        Curve(name, "s", [0.1, 0.2], [4e-3, -4e-3], [1e-4, 1e-4], [9, 9]) for name in ("time", "angle")
+    ]
+    text = " ".join(Read(page(d, GEOMETRY)).words)
+    assert "If only a force across panel <2>" in text and "4 mN" in text and "against angle" in text
 
 
 def test_chosen_rows_stand_out():
@@ -350,6 +357,7 @@ def test_numbers_are_rounded_to_their_uncertainty():
     assert plus_minus(-0.01234, 0.0011, "m") == "−12.3 ± 1.1 mm"
     assert amount(3.2e-6, "kg m^2") == "3.2×10⁻⁶ kg m²"
     assert amount(NAN, "N") == "–"
+    assert amount(1.02, "-", 3) == "1.02"
     assert [percent(p) for p in (0.9996, 0.968, 0.001, NAN)] == ["> 99 %", "97 %", "< 1 %", "–"]
     assert ticks(-0.9, 1.1) == pytest.approx([-0.5, 0.0, 0.5, 1.0])
     assert element("a", "<&>", href='"x"') == '<a href="&quot;x&quot;">&lt;&amp;&gt;</a>'

@@ -160,6 +160,24 @@ def test_a_force_on_a_panel_is_told_from_moments_at_creases(panel):
     assert found[0].left < 0.8 * best
 
 
+@pytest.mark.parametrize("site", [("force across", "panel 2"), ("moment on", "panel 3"), ("moment at", "crease 1")])
+def test_the_size_of_an_action_is_recovered_with_its_error(site):
+    """An action of a known size is added to what a swing without anything missing leaves."""
+    forward = arranged(subject(), prepared([record()], 200.0), Options())
+    (m,) = motions_of(forward, nominal_fits(forward)[1])
+    known = {"force across": 2e-3, "moment on": 5e-5, "moment at": 2e-5}[site[0]] * np.tanh(m.q[1] / 0.2)
+    found = acting(
+        forward.articulation, [replace(m, missing=m.missing + _actions(forward.articulation, m)[site] * known)]
+    )
+    a = next(a for a in found if (a.what, a.site) == site)
+    assert a is found[0] and a.left < 1.2 and a.unit == ("N" if site[0] == "force across" else "N m")
+    size, error = np.array(a.curves[0].mean), np.array(a.curves[0].error)
+    truth = np.interp(a.curves[0].x, m.mean(m.times), m.mean(known))
+    assert np.sqrt(np.mean(((size - truth) / error) ** 2)) < 1.5
+    assert np.sqrt(np.mean((size - truth) ** 2)) < 0.3 * np.sqrt(np.mean(truth**2))
+    assert {c.against for c in a.curves} == {"time", "angle", "rate", REVERSAL}
+
+
 def test_the_missing_power_is_that_of_the_friction_block_by_block(rubbing):
     """Dry friction takes M |rate|; crease 0 misses next to nothing."""
     forward, _, base, *_ = rubbing
