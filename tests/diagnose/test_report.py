@@ -293,7 +293,7 @@ def test_actions_say_what_they_leave_and_what_looks_like_them():
         Curve(name, "s", [0.1, 0.2], [4e-3, -4e-3], [1e-4, 1e-4], [9, 9]) for name in ("time", "angle")
     ]
     text = " ".join(Read(page(d, GEOMETRY)).words)
-    assert "If only a force across panel <2>" in text and "4 mN" in text and "against angle" in text
+    assert "If only a force across panel <2>" in text and "4.0 mN" in text and "against angle" in text
 
 
 def test_chosen_rows_stand_out():
