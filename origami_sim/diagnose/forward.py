@@ -28,7 +28,7 @@ from origami_sim.diagnose.hypothesis import (
 )
 from origami_sim.diagnose.track import coordinates, placed
 from origami_sim.distort import distorted
-from origami_sim.drive import Drive, Signal, series
+from origami_sim.drive import SAMPLES_PER_SECOND, Drive, Signal, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
@@ -875,11 +875,23 @@ def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> D
     for name, s in drive.signals.items():
         if s.times is None and not np.any(s.amplitude):
             continue
-        local = Signal(offset=s.offset, amplitude=s.amplitude, frequency=s.frequency, phase=s.phase).sampled(duration)
-        if s.times is not None and len(s.times) > 1:
-            fine = float(np.min(np.diff(s.times)))
-            if fine > 1e-3:  # samples of a recording: no finer grid than a quarter of theirs is needed
-                local = np.linspace(0.0, duration, int(np.ceil(4 * duration / fine)) + 1)
+        wave = Signal(offset=s.offset, amplitude=s.amplitude, frequency=s.frequency, phase=s.phase)
+        local = wave.sampled(duration) if np.any(s.amplitude) else np.array([0.0, duration])
+        if s.times is not None:
+            local = np.unique(np.concatenate([local, _knots(s.times, starts, duration)]))
         values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
         changed[name] = series(local, np.tile(values, (1, repeat)))
     return drive.replace(**changed)
+
+
+def _knots(times: np.ndarray, starts: np.ndarray, duration: float) -> np.ndarray:
+    """Where a series bends within a duration from any of the starts; a fine grid if that were many more places."""
+    rate = min(4.0 / float(np.min(np.diff(times))), SAMPLES_PER_SECOND)
+    most = max(64, int(np.ceil(rate * duration)))
+    begins = np.unique(starts)
+    if len(begins) <= most:
+        within = [times[slice(*np.searchsorted(times, (t0, t0 + duration)))] - t0 for t0 in begins]
+        exact = np.unique(np.round(np.concatenate(within), 8))
+        if len(exact) <= most:
+            return exact[(exact > 0.0) & (exact < duration)]
+    return np.linspace(0.0, duration, most + 1)

@@ -192,10 +192,10 @@ def unbent(
         known = {f.hypothesis.label for f in fits}
         new = [s for s in chosen(seen, UNBENT) if s.suspect.label not in known]
         found = [refit(forward, back, s, weights, seen, most=8) for s in new]
-    return nearer(found, fits)
+    return improved(found, fits)
 
 
-def nearer(new: Sequence[Fit], fits: Sequence[Fit]) -> list[Fit]:
+def improved(new: Sequence[Fit], fits: Sequence[Fit]) -> list[Fit]:
     """Those of new fits that end below all of the same hypothesis."""
     return [f for f in new if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label)]
 
@@ -278,7 +278,7 @@ def lookalikes(
         near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
         f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)
         out.append(finished(forward, f, weights) if min(f.cost, f.promise) < best.cost + NEAR else f)
-    return nearer(out, fits)
+    return improved(out, fits)
 
 
 def renewed(fits: Sequence[Fit], new: Sequence[Fit]) -> list[Fit]:

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, experiment, factor
 from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
-from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined
+from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined, shifted
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
 from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
@@ -17,7 +17,7 @@ from origami_sim.diagnose.screen import Screening, Signature, rated, screen, wid
 from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of, structure, white_of
-from origami_sim.drive import Drive, sine
+from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
@@ -311,6 +311,23 @@ def test_what_looks_the_same_as_a_large_effect_is_compared_where_that_is():
     assert same.theta[-1] == pytest.approx(0.2, abs=0.01)
     again = lookalikes(forward, every, nothing, [base, same, best], weights)
     assert all(f.cost < same.cost for f in again if f.hypothesis.suspects == (drive,))
+
+
+def test_a_drive_seen_from_several_starts_keeps_its_bends():
+    """A ramp's end, the steps of a recorded drive, and a wave on a series; at many starts a fine grid is enough."""
+    frames = np.arange(101) * 0.01
+    steps = series(frames, 0.02 * np.sign(np.sin(40.0 * frames)))
+    wave = replace(ramp(0.2, 0.5), amplitude=0.01, frequency=3.0)
+    for signal, error in ((ramp(0.2, 1.0), 1e-12), (steps, 1e-9), (wave, 2e-6)):
+        drive, starts, at = Drive(field=(0, 0, signal)), np.array([0.88, 0.3, 0.41]), np.linspace(0.0, 0.11, 500)
+        seen = shifted(drive, starts, 0.11, 2)["field_z"](at[:, None])
+        assert seen.shape == (500, 6) and np.array_equal(seen[:, :3], seen[:, 3:])
+        truth = np.stack([signal(at + t0) for t0 in starts], axis=1)
+        assert np.abs(seen[:, :3] - truth).max() < error
+    many = np.linspace(0.85, 0.95, 300)
+    drive = Drive(field=(0, 0, ramp(0.2, 1.0)))
+    seen = shifted(drive, many, 0.11, 1)["field_z"](at[:, None])
+    assert np.abs(seen - [[drive["field_z"](t + t0) for t0 in many] for t in at]).max() < 1e-3 * 0.2
 
 
 def test_experiments_hold_a_drive_and_turn_the_set_up_upside_down():
