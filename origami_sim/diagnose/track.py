@@ -94,6 +94,10 @@ def coordinates(forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
     return (found.q, found.noise) if found is not None and np.all(found.told) else None
 
 
+LINE = 0.02
+"""Width over length below which markers lie on a line."""
+
+
 def placed(model: Model, arm: Articulation, recording: Recording, level: np.ndarray) -> Pose:
     """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
 
@@ -113,6 +117,10 @@ def placed(model: Model, arm: Articulation, recording: Recording, level: np.ndar
     if not arm.floating or len(points) < 3:
         return pose
     here, there = np.array(points), np.array(places)
-    turn = Rotation.align_vectors(there - there.mean(0), here - here.mean(0))[0].as_matrix()
+    a, b = there - there.mean(0), here - here.mean(0)
+    _, size, along = np.linalg.svd(b)
+    if size[1] < LINE * size[0]:  # about a line nothing is told: the least turn
+        a, b = (b @ along[0] @ a)[None], along[:1]
+    turn = Rotation.align_vectors(a, b)[0].as_matrix()
     centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
     return Pose(turn[None], centre[None], pose.angles)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.baselines import _samples, baselines
 from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.forward import drive_of
@@ -12,7 +14,7 @@ from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.locate import locate, motion, motions_of, touching
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
-from origami_sim.diagnose.track import track
+from origami_sim.diagnose.track import placed, track
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0
 from origami_sim.pattern import strip
@@ -143,6 +145,23 @@ def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
     assert np.polyfit(rate, missing, 1)[0] == pytest.approx(-9.8e-5, rel=0.1)
     refitted, *others = baselines(forward, base, weights, score(forward, base, weights))
     assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(refitted.rms) for b in others)
+
+
+@pytest.mark.filterwarnings("error")
+def test_markers_on_a_line_turn_a_free_device_as_little_as_they_can():
+    sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1.5e-3, modulus=1.5e6, triangulation="center")
+    model, _ = sheet.crease(stiffness=5e-3).build()
+    arm = Articulation(model)
+    side = [n for n, x in enumerate(model.position) if x[1] == model.position[:, 1].min()]
+    assert len(side) == 3
+    channels = {f"n{n}": Channel(f"n{n}", "marker", np.zeros((2, 3)), "m", 1e-5, {"node": n}) for n in side}
+    recording = Recording("line", np.arange(2.0), channels)
+    for turn in (np.zeros(3), np.array([0.0, 0.4, 0.0]), np.array([0.0, -0.3, 1.2])):
+        turned = Rotation.from_rotvec(turn)
+        level = turned.apply(model.position[side]) + np.array([0.01, -0.02, 0.3])
+        pose = placed(model, arm, recording, level.ravel())
+        assert np.abs(arm.positions(pose)[side, 0] - level).max() < 1e-12
+        assert Rotation.from_matrix(pose.rotation[0]).magnitude() <= turned.magnitude() + 1e-9
 
 
 # --- on feet
