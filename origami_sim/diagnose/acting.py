@@ -14,7 +14,7 @@ import numpy as np
 
 from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import REVERSAL, Acting, Curve
-from origami_sim.diagnose.locate import BINS, Motion, against, way
+from origami_sim.diagnose.locate import Motion, against, bins, way
 
 SAME = 0.999
 """|cos| from which on two actions are one."""
@@ -90,17 +90,17 @@ def _curves(
 ) -> list[Curve]:
     """The size of an action in windows: in time, and in bins of what it may go with at a coordinate."""
     first, size, error = motions[0], np.concatenate(sizes), np.concatenate(errors)
-    weight = 1.0 / error**2
-    seen = error < BLIND * np.median(error)
+    weight, seen = 1.0 / error**2, error < BLIND * np.median(error)
     head = np.flatnonzero(seen[: len(sizes[0])])
+    if not len(head):
+        return []
     times = first.mean(first.times)[head].tolist()
     out = [Curve("time", "s", times, size[head].tolist(), error[head].tolist(), [first.width] * len(head))]
     along = size * np.concatenate([m.middle(way(m.rate[k])) for m in motions])
     for (name, unit), each in against(motions, k).items():
         x = np.concatenate([m.middle(v) for m, v in zip(motions, each, strict=True)])
         y = along if name == REVERSAL else size
-        order = np.argsort(np.where(seen, x, np.nan), kind="stable")[: np.count_nonzero(seen & np.isfinite(x))]
-        parts = [p for p in np.array_split(order, BINS) if len(p)]
+        parts = bins(np.where(seen, x, np.nan))
         out.append(
             Curve(
                 name,

@@ -328,6 +328,12 @@ def against(motions: Sequence[Motion], k: int) -> dict[tuple[str, str], list[np.
     return out
 
 
+def bins(x: np.ndarray) -> list[np.ndarray]:
+    """Indices of the values in each bin of a curve, by size; of those that are numbers."""
+    order = np.argsort(x, kind="stable")[: np.isfinite(x).sum()]  # what is not a number comes last
+    return [p for p in np.array_split(order, BINS) if len(p)]
+
+
 def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     def joined(f):
         return np.concatenate([f(m) for m in motions])
@@ -337,8 +343,7 @@ def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     out = []
     for (name, unit), each in against(motions, k).items():
         x, y = np.concatenate(each), along if name == REVERSAL else missing
-        order = np.argsort(x, kind="stable")[: np.isfinite(x).sum()]  # what is not a number comes last
-        parts = [p for p in np.array_split(order, BINS) if len(p)]
+        parts = bins(x)
         out.append(
             Curve(
                 name,
