@@ -329,7 +329,7 @@ def _refuted(w: _Weighed) -> _Said | None:
         text += f"leaves {left}"
     elif strain > STRAINED:
         text += f"needs {number} {strain:.1f} standard deviations from what is known of it"
-    elif len(w.best.hypothesis.suspects) > 1 and together(w.best) < CANCELLED:
+    elif len(w.best.hypothesis.suspects) > 1 and together(w.best) < CANCELLED and w.before.score >= STRUCTURED:
         text += "are effects that mostly cancel each other, as if both stood for one with another law"
     else:
         return None

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from origami_sim.diagnose import verdict
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
@@ -49,6 +50,23 @@ def test_a_tie_says_what_all_of_its_explanations_contain():
     )
     assert _tied([hypothesis(one), hypothesis(two)], p).endswith("contain angle_offset at one place or another")
     assert "contain" not in _tied([hypothesis(one), hypothesis(tilt)], p)
+
+
+@pytest.mark.parametrize(
+    ("shows", "does", "unknown"),
+    [(9.0, 0.1, True), (9.0, 0.9, False), (2.7, 0.1, False), (verdict.STRUCTURED, 0.1, True)],
+)
+def test_two_that_cancel_are_refuted_where_something_shows_without_them(monkeypatch, shows, does, unknown):
+    monkeypatch.setattr(verdict, "together", lambda f: does)
+    monkeypatch.setattr(verdict, "_say", lambda f: "one and the other")
+    best = SimpleNamespace(
+        free=(), theta=(), hypothesis=SimpleNamespace(free=(), suspects=("one", "other"), label="one + other")
+    )
+    left = {"share": 0.0, "after": SimpleNamespace(repeated=0.0), "leaves": False, "fall": "it falls", "kept": []}
+    found = verdict._refuted(SimpleNamespace(best=best, before=SimpleNamespace(score=shows), **left))  # type: ignore[arg-type]
+    assert (found is not None) == unknown
+    if found is not None:
+        assert found.verdict == "UNKNOWN" and "mostly cancel" in found.sentence
 
 
 def place(law, *, memory=0.0, share=0.9) -> Place:
