@@ -27,7 +27,7 @@ missing then looks like a moment), and with half as much the wrong panel can com
 """
 
 DRAWN = 6
-"""Actions, the best, whose size is given."""
+"""Actions, the best, whose size is given, and which the page lists."""
 
 BLIND = 10.0
 """Times the median error of a size beyond which a window tells nothing of it, as the action has no lever there."""

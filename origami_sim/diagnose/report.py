@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.diagnose.acting import DRAWN
 from origami_sim.diagnose.diagnosis import (
     REVERSAL,
     Acting,
@@ -72,9 +73,6 @@ PLACES, OPEN_PLACES, OPEN_RECORDINGS, OPEN_SUSPECTS = 6, 2, 3, 12
 
 BLOWS = 12
 """Blows that are listed."""
-
-ALONE = 6
-"""Actions that are listed, each of which could alone be the mismatch."""
 
 _DATA = re.compile(r'href="data:application/gzip;base64,([^"]+)"')
 _SECURITY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
@@ -451,7 +449,7 @@ def _alone(d: Diagnosis) -> Html:
             element("td", f"{a.like} ({a.overlap:.2f})" if a.like else ""),
             element("td", amount(_size(a), a.unit) if a.curves else "", class_="n"),
         )
-        for a in d.acting[:ALONE]
+        for a in d.acting[:DRAWN]
     ]
     about = (
         "If one thing alone acted, as strongly as it takes from moment to moment: what would be left of the missing "

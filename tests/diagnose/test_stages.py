@@ -170,11 +170,11 @@ def test_the_size_of_an_action_is_recovered_with_its_error(site):
         forward.articulation, [replace(m, missing=m.missing + _actions(forward.articulation, m)[site] * known)]
     )
     a = next(a for a in found if (a.what, a.site) == site)
-    assert a is found[0] and a.left < 1.2 and a.unit == ("N" if site[0] == "force across" else "N m")
+    assert a is found[0] and a.left < 0.7 and a.unit == ("N" if site[0] == "force across" else "N m")
     size, error = np.array(a.curves[0].mean), np.array(a.curves[0].error)
     truth = np.interp(a.curves[0].x, m.mean(m.times), m.mean(known))
-    assert np.sqrt(np.mean(((size - truth) / error) ** 2)) < 1.5
-    assert np.sqrt(np.mean((size - truth) ** 2)) < 0.3 * np.sqrt(np.mean(truth**2))
+    assert np.sqrt(np.mean(((size - truth) / error) ** 2)) < 0.6
+    assert np.sqrt(np.mean((size - truth) ** 2)) < 0.12 * np.sqrt(np.mean(truth**2))
     assert {c.against for c in a.curves} == {"time", "angle", "rate", REVERSAL}
 
 
@@ -618,10 +618,10 @@ def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_act
     clamped = menu["crease 1 clamped as it is in the reference state"]
     free = menu["repeat the same experiment"]
     nothing = np.zeros((1, len(clamped.blocks), clamped.local))
-    for made, least, most in ((clamped, 0.0, 0.02), (free, 0.2, 2.0)):
+    for made, least, most in ((clamped, 0.0, 0.005), (free, 1.0, 1.2)):
         swings = [v[0] for v in made.predict(base.hypothesis, base.theta[None], nothing)]
         assert least < max(np.ptp(s[:, 1]) for s in swings) < most
-        assert max(np.ptp(s[:, 0]) for s in swings) > 0.2
+        assert max(np.ptp(s[:, 0]) for s in swings) > 1.4
     friction = next(s for s in screening.signatures if s.suspect.label == "crease_friction at crease 1")
     rubs = refit(forward, base, friction, weights, screening)
     rubs = replace(rubs, theta=np.concatenate([base.theta, rubs.theta[len(base.theta) :]]))
@@ -629,7 +629,7 @@ def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_act
         experiment.separation(menu[f"crease {c} clamped as it is in the reference state"], rubs, base, weights)[0]
         for c in range(2)
     ]
-    assert d[1] < 0.1 * d[0]  # what acts at a clamped crease does not show
+    assert d[1] < 0.02 * d[0]  # what acts at a clamped crease does not show
 
 
 @pytest.mark.parametrize(("second", "told", "best"), [(0.5, [0, 2], "c"), (3.5, [0, 1, 2], "b")])
