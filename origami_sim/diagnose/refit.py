@@ -366,6 +366,17 @@ def fit(
         also = {"known": near, "kept": kept if near else 0, "residual": residual, "soft": near is not None}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
+    def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
+        """A point: its cost, its residuals, itself."""
+        predicted = forward.predict(hypothesis, theta[None], local[None], blocks)
+        cost = float(misfits(forward, blocks, predicted, weights).sum())
+        cost += penalty(free, theta) + departures(forward, hypothesis, theta, blocks, local)
+        gaps = [whitened(forward.blocks[b].values - v[0], weights) for b, v in zip(blocks, predicted, strict=True)]
+        return cost, _with_starts(forward, hypothesis, theta, blocks, gaps, local), theta, local
+
+    def too_slow(theta) -> bool:
+        return bool(width and hypothesis.suspects) and forward.step(hypothesis, theta) < slowest
+
     line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
     level = (ALL if exact else STALE) if begin else ALL if known is None else OWN
     best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
@@ -389,22 +400,27 @@ def fit(
             trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
             # (or be of no model at all)
-            if width and hypothesis.suspects and part > trying[-1] and forward.step(hypothesis, trial) < slowest:
+            if part > trying[-1] and too_slow(trial):
                 continue
-            predicted = forward.predict(hypothesis, trial[None], start[None], blocks)
-            cost = float(misfits(forward, blocks, predicted, weights).sum())
-            cost += penalty(free, trial) + departures(forward, hypothesis, trial, blocks, start)
-            if best - cost > gain:
-                found, gain = (trial, start, predicted), best - cost
-            if best - cost > FAITHFUL * whole * part * (2.0 - part):
+            there = at(trial, start)
+            hope = FAITHFUL * whole * part * (2.0 - part)
+            if trying is STEPS and best - hope <= there[0] < np.inf:
+                # valleys are curved: the way is bent by what predictions differ from what the derivatives said
+                # (geodesic acceleration, Transtrum & Sethna 2012)
+                more, turns, _ = _proposed(forward, free, trial, start, blocks, line.at(there[1]))
+                trial = np.clip(trial + (more - (1.0 - part) * change) * scale, lower, upper)
+                if not too_slow(trial):
+                    there = min(there, at(trial, start + turns - (1.0 - part) * moves), key=lambda p: p[0])
+            if best - there[0] > gain:
+                found, gain = there, best - there[0]
+            if best - there[0] > hope:
                 break
         faithful, stuck = gain > FAITHFUL * whole, gain < enough
         if stuck and level == finest:
             break
         if found is not None:
-            (theta, local, predicted), best = found, best - gain
-            gaps = [whitened(forward.blocks[b].values - v[0], weights) for b, v in zip(blocks, predicted, strict=True)]
-            line = line.at(_with_starts(forward, hypothesis, theta, blocks, gaps, local))
+            best, gaps, theta, local = found
+            line = line.at(gaps)
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1

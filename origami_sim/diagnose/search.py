@@ -200,12 +200,17 @@ def improved(new: Sequence[Fit], fits: Sequence[Fit]) -> list[Fit]:
     return [f for f in new if all(g.cost > f.cost for g in fits if g.hypothesis.label == f.hypothesis.label)]
 
 
-TWINS = 5
-"""Suspects that look the same as the best explanation and are fitted beside it, at most."""
+TWINS = 8
+"""Suspects that may be as good as the best explanation and are fitted beside it, at most."""
+
+SEEN = 3.0
+"""Score from which on a suspect is fitted because of what it promises."""
 
 
 def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequence[Fit], weights: Weights) -> list[Fit]:
-    """The single suspects that looked the same as the best of those that were fitted, fitted as well.
+    """The single suspects that may be as good as the best of those that were fitted, fitted as well.
+
+    They looked the same as one of the best, or promise about as much: of effects that hardly show, many do.
 
     Args:
         rough: the screening by which fits were chosen, whose weights may have hidden differences. screening: the same
@@ -217,13 +222,22 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     near = [f for f, e in zip(good, evidence, strict=True) if e > max(evidence) - words.CLOSE]
     done = {f.hypothesis.label for f in fits}
     best = [s for f in near for s in rough.signatures if f.hypothesis.label == s.suspect.label]
-    same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)} - done
-    again = [s for s in distinct(screening.signatures) if s.suspect.label in same]
+    gain = fits[0].cost - min(f.cost for f in good if len(f.hypothesis.suspects) < 2)
+
+    def may_lead(s: Signature) -> bool:
+        return abs(s.score) > SEEN and s.score**2 > gain - 2.0 * words.CLOSE
+
+    also = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)}
+    also |= {s.suspect.label for s in screening.signatures if may_lead(s)}
+    again = [s for s in distinct(screening.signatures) if s.suspect.label in also - done]
     return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
 
 
 LOOKALIKE = 0.9
 """Isolability from which a suspect is fitted as a lookalike."""
+
+ALIKE = 5
+"""Lookalikes that are fitted, at most."""
 
 LINEAR = 0.5
 """Part of a fit's gain that its signature promised, from which on signatures tell what looks the same."""
@@ -273,7 +287,7 @@ def lookalikes(
     for _, s, value in sorted(found, key=lambda f: -f[0]):
         most.setdefault(s.label, (s, value))
     out = []
-    for s, value in list(most.values())[:TWINS]:
+    for s, value in list(most.values())[:ALIKE]:
         begin = np.concatenate([best.theta[:own], [value], [f.start for f in s.free[1:]]])
         near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
         f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ndtr
 
 from origami_sim.errors import InputError
 from origami_sim.prove import DEVELOPMENT, KINDS
@@ -314,6 +315,8 @@ def scores(rows: Sequence[dict]) -> dict:
     out["refitted_floor"] = median("refitted", clear)
     out["recovery"] = median("recovery", clear)
     out["seconds"] = median("wall", rows)
+    near = [r["apart"] for r in clear if r["apart"] is not None]
+    out["ideal"] = {"count": len(near), "expected": float(np.sum(ndtr(np.array(near) / 2.0)))}
     ties = [r for r in rows if r["verdict"] == "TIE"]
     out["ties"] = {"count": len(ties), "with_truth": sum(bool(r["correct"]) for r in ties)}
     out["baselines"] = {
@@ -368,6 +371,16 @@ def _concealed(r: dict) -> str:
     return f"{r['null']} (null)" if r["kind"] == "null" else r["mechanism"]
 
 
+def _ideal(ideal: dict) -> list[str]:
+    """What nobody can do better, where it was asked what is hard to tell from the truth."""
+    if not ideal["count"]:
+        return []
+    return [
+        f"whoever knows that it is the truth or the one effect that is most like it names the truth in "
+        f"{ideal['expected']:.1f} of {ideal['count']} (d' >= {CLEAR:g}, mean; noise decides the rest)"
+    ]
+
+
 def text_of(board: dict) -> str:
     """The scoreboard in words and numbers."""
     run = "SEALED" if board["sealed"] else "DEVELOPMENT (no evidence)"
@@ -401,6 +414,7 @@ def text_of(board: dict) -> str:
         f"{say(board['ece_by_chance'])} is expected of so few even if all are right",
         f"ties: {board['ties']['count']}, with the truth among them {board['ties']['with_truth']}",
         f"seconds per diagnosis (median): {say(board['seconds'])}",
+        *_ideal(board["ideal"]),
         "",
         "verdicts by kind",
     ]

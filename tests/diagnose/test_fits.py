@@ -54,6 +54,37 @@ def test_derivatives_that_are_used_again_lead_to_the_same_fit(stiff):
     assert again.deviations() == pytest.approx(plain.deviations(), rel=0.2)
 
 
+class Valley:
+    """Rosenbrock's valley as something to fit: y = x^2 is told `narrow` times better than where along it."""
+
+    local = 0
+    model = SimpleNamespace(contacts=())
+    blocks = (SimpleNamespace(values=np.zeros((2, 1)), known=np.zeros(0)),)
+    subject = SimpleNamespace(
+        nominals=(Free("valley", "x", "-", start=-1.2, scale=1.0), Free("valley", "y", "-", start=1.0, scale=1.0))
+    )
+
+    def __init__(self, narrow: float) -> None:
+        self.narrow, self.simulated = narrow, 0
+
+    def step(self, hypothesis, theta) -> float:
+        return 1.0
+
+    def predict(self, hypothesis, thetas, locals_, blocks, *, soft=False) -> list[np.ndarray]:
+        self.simulated += 1
+        x, y = thetas.T
+        return [np.stack([self.narrow * (y - x * x), 1.0 - x], axis=1)[:, :, None]]
+
+
+@pytest.mark.parametrize("narrow", [10.0, 100.0])
+def test_a_curved_valley_is_followed_to_its_end(narrow):
+    """Straight steps take 65 and 129 simulations."""
+    valley = Valley(narrow)
+    found = fit(valley, Hypothesis(), Weights(np.ones(1)), most=4)
+    assert found.theta == pytest.approx([1.0, 1.0], abs=1e-5) and found.cost < 1e-7
+    assert valley.simulated <= 8
+
+
 def test_new_weights_are_those_of_a_new_linearisation(stiff):
     forward, base, weights, _ = stiff
     new = Weights(weights.deviation * [0.5, 2.0], 0.3 * weights.part)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from origami_sim.errors import InputError
 from origami_sim.prove import score
@@ -221,6 +222,17 @@ def test_nulls_and_kinds_are_counted_apart():
     assert board["confusion"]["plain (null)"] == {"ADEQUATE": 1, "UNKNOWN": 1}
     text = score.text_of({**board, "sealed": False, "seed": 1, "cases": 4, "failed": 0, "rows": rows})
     assert "false alarms by null" in text and "wrong_parameter" in text
+
+
+def test_what_nobody_can_tell_is_said_beside_what_was_told():
+    row = judge(ANSWER, diagnosis("MECHANISM", ["crease_friction at fold2"], 0.97))
+    rows = [{**row, "apart": apart} for apart in (0.0, 2.0, 40.0, None)]
+    board = score.scores(rows)
+    assert board["ideal"]["count"] == 3
+    assert board["ideal"]["expected"] == pytest.approx(0.5 + norm.cdf(1.0) + 1.0)
+    shown = {"sealed": False, "seed": 1, "cases": 4, "failed": 0, "rows": rows}
+    assert "names the truth in 2.3 of 3" in score.text_of({**board, **shown})
+    assert "names the truth" not in score.text_of({**score.scores(rows[3:]), **shown})
 
 
 def test_the_scoreboard_is_written_and_answers_cannot_be_changed(tmp_path):
