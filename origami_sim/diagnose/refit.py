@@ -17,6 +17,9 @@ CHORD = (1.0, 0.4)
 FAITHFUL = 0.7
 """Part of the promised improvement with which a step must come true for its derivatives to be used again."""
 
+SHORT = 0.2
+"""Part of a step up to which it is too short to be bent."""
+
 SLOWEST = 2.5
 """How many times smaller than at the beginning the solver's step may become at a trial."""
 
@@ -207,25 +210,6 @@ def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
     )
 
 
-def departures(forward, hypothesis: Hypothesis, theta: np.ndarray, blocks, local: np.ndarray) -> float:
-    """Sum of squares of the departures of the starts [B, L] from what the recordings say of them."""
-    if not forward.local:
-        return 0.0
-    away = local - forward.told(hypothesis, theta)
-    return float(sum(np.sum((away[b] / forward.blocks[b].known) ** 2) for b in blocks))
-
-
-def misfits(forward, blocks, predicted: list[np.ndarray], weights: Weights) -> np.ndarray:
-    """[K, B] weighted sums of squares; infinite where a prediction failed where something was measured."""
-    out = []
-    for b, values in zip(blocks, predicted, strict=True):
-        measured = forward.blocks[b].values
-        gap = measured - values
-        lost = np.any(np.isnan(values) & np.isfinite(measured), axis=(-1, -2))
-        out.append(np.where(lost, np.inf, np.sum(whitened(gap, weights) ** 2, axis=-1)))
-    return np.stack(out, axis=-1)
-
-
 def linearise(
     forward,
     hypothesis: Hypothesis,
@@ -345,8 +329,8 @@ def fit(
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
     Minimises the weighted squares of recorded minus predicted plus the squares of the departures from what is known,
-    within physical bounds, by Gauss-Newton steps that are shortened while they do not keep their promise. The starts
-    are eliminated block by block. Derivatives are used again as long as the steps that they give keep theirs.
+    within physical bounds, by Gauss-Newton steps that are bent and shortened while they do not keep their promise. The
+    starts are eliminated block by block. Derivatives are used again as long as the steps that they give keep theirs.
 
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
@@ -368,17 +352,16 @@ def fit(
 
     def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
         """A point: its cost, its residuals, itself."""
-        predicted = forward.predict(hypothesis, theta[None], local[None], blocks)
-        cost = float(misfits(forward, blocks, predicted, weights).sum())
-        cost += penalty(free, theta) + departures(forward, hypothesis, theta, blocks, local)
-        gaps = [whitened(forward.blocks[b].values - v[0], weights) for b, v in zip(blocks, predicted, strict=True)]
-        return cost, _with_starts(forward, hypothesis, theta, blocks, gaps, local), theta, local
+        gaps = residuals(forward, hypothesis, theta, local, blocks, weights)
+        cost = sum(float(r @ r) for r in gaps) + penalty(free, theta)
+        return cost if np.isfinite(cost) else np.inf, gaps, theta, local
 
     def too_slow(theta) -> bool:
-        return bool(width and hypothesis.suspects) and forward.step(hypothesis, theta) < slowest
+        return bool(width) and forward.step(hypothesis, theta) < slowest
 
     line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
-    level = (ALL if exact else STALE) if begin else ALL if known is None else OWN
+    own = 0 < kept < width
+    level = (ALL if exact else STALE) if begin else ALL if known is None else OWN if own else STALE
     best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
@@ -396,26 +379,30 @@ def fit(
             settled = level == ALL or doubts <= 1  # then these derivatives are as good as new
             break
         trying = STEPS if level == ALL or not n else CHORD
+        straight = 0.0
         for part in trying:
             trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
             # (or be of no model at all)
-            if part > trying[-1] and too_slow(trial):
+            if hypothesis.suspects and part > trying[-1] and too_slow(trial):
                 continue
             there = at(trial, start)
-            hope = FAITHFUL * whole * part * (2.0 - part)
-            if trying is STEPS and best - hope <= there[0] < np.inf:
-                # valleys are curved: the way is bent by what predictions differ from what the derivatives said
+            owed = FAITHFUL * whole * part * (2.0 - part)
+            straight = max(straight, best - there[0])
+            if trying is STEPS and part > SHORT and best - owed <= there[0] < np.inf:
+                # a curved valley: the way is bent by what predictions differ from what the derivatives said
                 # (geodesic acceleration, Transtrum & Sethna 2012)
-                more, turns, _ = _proposed(forward, free, trial, start, blocks, line.at(there[1]))
-                trial = np.clip(trial + (more - (1.0 - part) * change) * scale, lower, upper)
-                if not too_slow(trial):
-                    there = min(there, at(trial, start + turns - (1.0 - part) * moves), key=lambda p: p[0])
+                more, moved, reach = _proposed(forward, free, trial, start, blocks, line.at(there[1]))
+                bend = more - (1.0 - part) * change
+                aside = np.clip(trial + bend * scale, lower, upper)
+                longer = np.linalg.norm(bend) > np.linalg.norm(part * change)
+                if reach < min(there[0], best - gain) and not longer and not too_slow(aside):
+                    there = min(there, at(aside, start + moved - (1.0 - part) * moves), key=lambda p: p[0])
             if best - there[0] > gain:
                 found, gain = there, best - there[0]
-            if best - there[0] > hope:
+            if best - there[0] > owed:
                 break
-        faithful, stuck = gain > FAITHFUL * whole, gain < enough
+        faithful, stuck = straight > FAITHFUL * whole, gain < enough
         if stuck and level == finest:
             break
         if found is not None:
@@ -424,7 +411,7 @@ def fit(
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
-            level = OWN if kept and doubts == 1 else finest
+            level = OWN if own and doubts == 1 else finest
             line = derived(theta, local, line if level == OWN else None, line.residual)
     if width and level == STALE:  # the intervals are those of the place where the fit ended
         line = derived(theta, local, line, line.residual)

@@ -222,21 +222,24 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     near = [f for f, e in zip(good, evidence, strict=True) if e > max(evidence) - words.CLOSE]
     done = {f.hypothesis.label for f in fits}
     best = [s for f in near for s in rough.signatures if f.hypothesis.label == s.suspect.label]
-    gain = fits[0].cost - min(f.cost for f in good if len(f.hypothesis.suspects) < 2)
-
-    def may_lead(s: Signature) -> bool:
-        return abs(s.score) > SEEN and s.score**2 > gain - 2.0 * words.CLOSE
-
-    also = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)}
-    also |= {s.suspect.label for s in screening.signatures if may_lead(s)}
-    again = [s for s in distinct(screening.signatures) if s.suspect.label in also - done]
-    return [refit(forward, fits[0], s, weights, screening) for s in again[:TWINS]]
+    same = {s.suspect.label for s in rough.signatures for m in best if s.score and alike(s, m)}
+    single = min((f for f in good if len(f.hypothesis.suspects) < 2), key=lambda f: f.cost)
+    gain = fits[0].only(screening.blocks).misfit - single.only(screening.blocks).misfit
+    least = max(SEEN**2, gain - 2.0 * words.CLOSE)
+    rest = [s for s in distinct(screening.signatures) if s.suspect.label not in done]
+    again = [s for s in rest if s.suspect.label in same]
+    again += [s for s in rest if s not in again and s.score**2 > least]
+    out = []
+    for s in again[:TWINS]:
+        f = roughly(forward, fits[0], s, weights, screening)
+        out.append(finished(forward, f, weights) if min(f.cost, f.promise) < single.cost + NEAR else f)
+    return out
 
 
 LOOKALIKE = 0.9
 """Isolability from which a suspect is fitted as a lookalike."""
 
-ALIKE = 5
+MOST_ALIKE = 5
 """Lookalikes that are fitted, at most."""
 
 LINEAR = 0.5
@@ -287,7 +290,7 @@ def lookalikes(
     for _, s, value in sorted(found, key=lambda f: -f[0]):
         most.setdefault(s.label, (s, value))
     out = []
-    for s, value in list(most.values())[:ALIKE]:
+    for s, value in list(most.values())[:MOST_ALIKE]:
         begin = np.concatenate([best.theta[:own], [value], [f.start for f in s.free[1:]]])
         near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
         f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)
@@ -346,7 +349,7 @@ CONTENDERS = 5
 """Fits that are refined, beside the model without any effect."""
 
 AGAIN = 2
-"""Of these, how many are also fitted anew from the starts that were recorded."""
+"""Of these, how many are also fitted anew from the starts that were recorded; all, if that led one far down."""
 
 
 def settled(
@@ -365,6 +368,7 @@ def settled(
     least = min(f.cost for f in out)
     order = [n for n, f in enumerate(out) if n and not f.failed and f.cost < HOPELESS * least]
     order.sort(key=lambda n: out[n].cost)
+    far = False
     for place, n in enumerate([0, *order[:CONTENDERS]]):
         f = out[n]
         if new is weights and any(fits[n] is r for r in refined):
@@ -372,11 +376,12 @@ def settled(
         if n and f.cost > least + NEAR and promised(forward, f) > least + NEAR:
             continue
         out[n] = carried_on(forward, f, new)
-        if new is not weights and place <= AGAIN and bent(forward, out[n]) and f.cost < HOPELESS * least:
+        if new is not weights and (far or place <= AGAIN) and bent(forward, out[n]) and f.cost < HOPELESS * least:
             # starts that made up for what the model lacked can be far off: those that were recorded are tried as well
             near = {"known": out[n].linear, "kept": len(forward.subject.nominals) if n else 0}
             other = fit(forward, f.hypothesis, new, theta=f.theta, blocks=f.blocks, **near)
             if other.cost < out[n].cost - LITTLE:
+                far |= other.cost < out[n].cost - NEAR
                 out[n] = carried_on(forward, other, new)
     return reweighted(screening, out[0], weights, new), out, new
 
