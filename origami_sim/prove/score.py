@@ -315,8 +315,9 @@ def scores(rows: Sequence[dict]) -> dict:
     out["refitted_floor"] = median("refitted", clear)
     out["recovery"] = median("recovery", clear)
     out["seconds"] = median("wall", rows)
-    near = [r["apart"] for r in clear if r["apart"] is not None]
-    out["ideal"] = {"count": len(near), "expected": float(np.sum(ndtr(np.array(near) / 2.0)))}
+    near = [r for r in clear if r["apart"] is not None]
+    best = float(np.sum(ndtr(np.array([r["apart"] for r in near]) / 2.0)))
+    out["ideal"] = {"count": len(near), "hits": sum(bool(r["top1"]) for r in near), "expected": best}
     ties = [r for r in rows if r["verdict"] == "TIE"]
     out["ties"] = {"count": len(ties), "with_truth": sum(bool(r["correct"]) for r in ties)}
     out["baselines"] = {
@@ -372,12 +373,16 @@ def _concealed(r: dict) -> str:
 
 
 def _ideal(ideal: dict) -> list[str]:
-    """What nobody can do better, where it was asked what is hard to tell from the truth."""
+    """How often the truth could be named first at best, of the cases for which the nearest other effect was looked for.
+
+    By one who knows that it is one of these two, both as likely, and how strong they are: with a chance of
+    Phi(d' / 2), where d' is between the two.
+    """
     if not ideal["count"]:
         return []
     return [
-        f"whoever knows that it is the truth or the one effect that is most like it names the truth in "
-        f"{ideal['expected']:.1f} of {ideal['count']} (d' >= {CLEAR:g}, mean; noise decides the rest)"
+        f"    of {ideal['count']} whose nearest other effect is known, {ideal['hits']} named first; one who had only "
+        f"these two to choose from would name {ideal['expected']:.1f} in the mean"
     ]
 
 
@@ -399,6 +404,7 @@ def text_of(board: dict) -> str:
         met = {None: "", True: "met", False: "MISSED"}[p["met"]]
         wanted = f"   target {_target(p['target'])}  {met}" if p["target"] else ""
         lines.append(f"{p['title']:36s} {_counted(p)}{wanted}")
+    lines += _ideal(board["ideal"])
     say = lambda v, f="{:.3g}": "-" if v is None or v != v else f.format(v)  # noqa: E731
     e = board["elements"]
     lines += [
@@ -414,7 +420,6 @@ def text_of(board: dict) -> str:
         f"{say(board['ece_by_chance'])} is expected of so few even if all are right",
         f"ties: {board['ties']['count']}, with the truth among them {board['ties']['with_truth']}",
         f"seconds per diagnosis (median): {say(board['seconds'])}",
-        *_ideal(board["ideal"]),
         "",
         "verdicts by kind",
     ]

@@ -7,8 +7,20 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from origami_sim.diagnose import Options, Subject, experiment, factor
-from origami_sim.diagnose.compare import SIMPLER, _predictive, nearer, penalty_of, score, together
+from origami_sim.diagnose import Options, Subject, experiment, factor, search
+from origami_sim.diagnose.compare import (
+    SIMPLER,
+    TEMPERATURE,
+    WORTH,
+    Score,
+    _predictive,
+    better,
+    nearer,
+    penalty_of,
+    score,
+    supported,
+    together,
+)
 from origami_sim.diagnose.forward import FINER, NEAR, Forward, local_line, refined, shifted
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
@@ -55,17 +67,19 @@ def test_derivatives_that_are_used_again_lead_to_the_same_fit(stiff):
 
 
 class Valley:
-    """Rosenbrock's valley as something to fit: y = x^2 is told `narrow` times better than where along it."""
+    """Rosenbrock's valley as something to fit: y = x^2 is told `narrow` times better than where along it.
+
+    Where y is below `lowest`, the simulation fails.
+    """
 
     local = 0
     model = SimpleNamespace(contacts=())
     blocks = (SimpleNamespace(values=np.zeros((2, 1)), known=np.zeros(0)),)
-    subject = SimpleNamespace(
-        nominals=(Free("valley", "x", "-", start=-1.2, scale=1.0), Free("valley", "y", "-", start=1.0, scale=1.0))
-    )
 
-    def __init__(self, narrow: float) -> None:
-        self.narrow, self.simulated = narrow, 0
+    def __init__(self, narrow: float, lowest: float = -np.inf, most: float = np.inf) -> None:
+        x = Free("valley", "x", "-", start=-1.2, scale=1.0, upper=most)
+        self.subject = SimpleNamespace(nominals=(x, Free("valley", "y", "-", start=1.0, scale=1.0)))
+        self.narrow, self.lowest, self.simulated = narrow, lowest, 0
 
     def step(self, hypothesis, theta) -> float:
         return 1.0
@@ -73,7 +87,8 @@ class Valley:
     def predict(self, hypothesis, thetas, locals_, blocks, *, soft=False) -> list[np.ndarray]:
         self.simulated += 1
         x, y = thetas.T
-        return [np.stack([self.narrow * (y - x * x), 1.0 - x], axis=1)[:, :, None]]
+        seen = np.stack([self.narrow * (y - x * x), 1.0 - x], axis=1)
+        return [np.where(y[:, None] < self.lowest, np.nan, seen)[:, :, None]]
 
 
 @pytest.mark.parametrize("narrow", [10.0, 100.0])
@@ -82,7 +97,18 @@ def test_a_curved_valley_is_followed_to_its_end(narrow):
     valley = Valley(narrow)
     found = fit(valley, Hypothesis(), Weights(np.ones(1)), most=4)
     assert found.theta == pytest.approx([1.0, 1.0], abs=1e-5) and found.cost < 1e-7
-    assert valley.simulated <= 8
+    assert valley.simulated <= 6
+
+
+def test_a_curved_valley_is_followed_past_what_cannot_be_simulated():
+    """The first straight step ends at y = -3.8."""
+    found = fit(Valley(30.0, lowest=-2.0), Hypothesis(), Weights(np.ones(1)), most=8)
+    assert found.theta == pytest.approx([1.0, 1.0], abs=1e-4)
+
+
+def test_a_curved_valley_is_followed_to_a_bound():
+    found = fit(Valley(30.0, most=0.5), Hypothesis(), Weights(np.ones(1)), most=8)
+    assert found.theta == pytest.approx([0.5, 0.25], abs=1e-4) and found.at_bound.tolist() == [True, False]
 
 
 def test_new_weights_are_those_of_a_new_linearisation(stiff):
@@ -131,6 +157,46 @@ def test_suspects_are_alike_if_the_data_could_not_tell_them_apart(stiff):
 
     assert alike(signature(0.0, 5.0), signature(0.1, 5.0)), "half a unit of log likelihood at most"
     assert not alike(signature(0.0, 20.0), signature(0.1, 20.0))
+
+
+def test_what_promises_as_much_as_the_best_gains_is_fitted_after_what_looks_like_it(stiff, monkeypatch):
+    forward, base, weights, one = stiff
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    named = fit(forward, Hypothesis((one,)), weights, local=base.local)
+    found = screen(forward, [s for s in every if s.effect.startswith("crease_")], base, weights)
+    mine = next(s for s in found.signatures if s.suspect.label == one.label)
+    others = [s for s in found.signatures if s.suspect.label != one.label][:4]
+    gain = base.only(found.blocks).misfit - named.only(found.blocks).misfit
+    assert gain > 30.0
+    apart = np.eye(4, len(mine.shape))
+    scores = [np.sqrt(gain - 11.0), np.sqrt(gain - 13.0), 4.0, 3.0]
+    made = [replace(s, shape=e, score=v) for s, e, v in zip(others, apart, scores, strict=True)]
+    made[3] = replace(made[3], shape=mine.shape)
+    seen = replace(found, signatures=[mine, *made])
+    far, near, tried, carried = replace(base, misfit=1e9), base, [], []
+    monkeypatch.setattr(search, "roughly", lambda forward, base, s, *rest: tried.append(s.suspect.label) or far)
+    monkeypatch.setattr(search, "finished", lambda forward, f, weights: carried.append(f) or f)
+    assert len(search.twins(forward, seen, seen, [base, named], weights)) == 2
+    assert tried == [made[3].suspect.label, made[0].suspect.label] and not carried
+    monkeypatch.setattr(search, "roughly", lambda *given: replace(near, misfit=named.cost))
+    assert len(search.twins(forward, seen, seen, [base, named], weights)) == len(carried) == 2
+
+
+def test_a_further_effect_is_worth_odds_of_twenty():
+    def scored(evidence: float) -> Score:
+        gain = np.full(4, evidence)
+        return Score(gain, np.ones(1), evidence, 10.0 - 0.1 * gain)
+
+    assert np.exp(WORTH / TEMPERATURE) == pytest.approx(20.0, rel=0.01)
+    assert better(scored(9.1), scored(0.0)) and not better(scored(8.9), scored(0.0))
+    nominal, one, two = (
+        SimpleNamespace(hypothesis=SimpleNamespace(suspects=[SimpleNamespace(label=c) for c in n]))
+        for n in ("", "a", "ab")
+    )
+    for ahead, told in ((9.1, True), (8.9, False)):
+        scores = {id(nominal): scored(0.0), id(one): scored(50.0), id(two): scored(50.0 + ahead)}
+        evidence = supported([nominal, one, two], scores)
+        assert (evidence[2] > evidence[1]) == told and evidence[:2] == [0.0, 50.0]
 
 
 def test_a_film_is_the_rollout_frame_by_frame(stiff):

@@ -228,11 +228,12 @@ def test_what_nobody_can_tell_is_said_beside_what_was_told():
     row = judge(ANSWER, diagnosis("MECHANISM", ["crease_friction at fold2"], 0.97))
     rows = [{**row, "apart": apart} for apart in (0.0, 2.0, 40.0, None)]
     board = score.scores(rows)
-    assert board["ideal"]["count"] == 3
+    assert board["ideal"]["count"] == board["ideal"]["hits"] == 3
     assert board["ideal"]["expected"] == pytest.approx(0.5 + norm.cdf(1.0) + 1.0)
     shown = {"sealed": False, "seed": 1, "cases": 4, "failed": 0, "rows": rows}
-    assert "names the truth in 2.3 of 3" in score.text_of({**board, **shown})
-    assert "names the truth" not in score.text_of({**score.scores(rows[3:]), **shown})
+    assert "of 3 whose nearest other effect is known, 3 named first" in score.text_of({**board, **shown})
+    assert "would name 2.3" in score.text_of({**board, **shown})
+    assert "would name" not in score.text_of({**score.scores(rows[3:]), **shown})
 
 
 def test_the_scoreboard_is_written_and_answers_cannot_be_changed(tmp_path):
