@@ -156,6 +156,27 @@ class Articulation:
             out[first + joint, carried] = np.cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
         return out
 
+    def sought(self, shown: np.ndarray) -> np.ndarray:
+        """Projector [..., m, m] on the directions in which a pose is sought, given where the search begins.
+
+        These are all folds, and of shifts and turns those that stand out of noise there: seen from the side, a device
+        cannot be told to roll, but once rolled a little, rolling further would explain any error of its length.
+
+        Args:
+            shown: [..., D, m] what changes of the coordinates by 1 m and 1 rad show, in deviations of noise.
+        """
+        out = np.zeros((*shown.shape[:-2], self.size, self.size)) + np.eye(self.size)
+        rigid = 6 * self.floating
+        if rigid:
+            _, size, along = np.linalg.svd(shown[..., :rigid], full_matrices=False)
+            along = along * (size > 1.0)[..., None]
+            out[..., :rigid, :rigid] = np.swapaxes(along, -1, -2) @ along
+        return out
+
+    def inverse(self, shown: np.ndarray, sought: np.ndarray, rounding: float) -> np.ndarray:
+        """Pseudo-inverse [..., m, D] of `shown` in the directions that are sought, less those of rounding's size."""
+        return sought @ np.linalg.pinv(shown @ sought, rcond=rounding)
+
     def turning(self, x: np.ndarray) -> dict[int, np.ndarray]:
         """Angular velocities of the panels that creases move for unit rates of the coordinates, each [m, W, 3]."""
         out = {child: np.zeros((self.size, *x.shape[1:])) for _, _, child, _ in self._joints}

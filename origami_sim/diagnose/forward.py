@@ -193,18 +193,19 @@ class Forward:
         """From pose to towards of a `Block`, from a local polynomial of the channels."""
         level, slope, error = local_line(recording.times, values, noise, first)
         arm, pose = self.articulation, placed(self.model, self.articulation, recording, level)
+        weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
+        sought = arm.sought(self._channel_tangent(recording, pose, level)[1] * weight[:, None])
         for _ in range(30):
             now, tangent = self._channel_tangent(recording, pose, level)
-            weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
             gap = np.where(np.isfinite(level), level - now, 0.0)
-            by = np.linalg.lstsq(tangent * weight[:, None], gap * weight, rcond=1e-8)[0]
+            by = arm.inverse(tangent * weight[:, None], sought, 1e-8) @ (gap * weight)
             size = np.abs(by).max(initial=0.0)
             pose = arm.moved(pose, (by * min(1.0, 1.0 / (size + 1e-12)))[:, None])
             if size < 1e-10:
                 break
         _, tangent = self._channel_tangent(recording, pose, level)
         weight = np.where(np.isfinite(slope), 1.0 / noise, 0.0)
-        inverse = np.linalg.pinv(tangent * weight[:, None], rcond=1e-8)
+        inverse = arm.inverse(tangent * weight[:, None], sought, 1e-8)
         rates = inverse @ (np.nan_to_num(slope) * weight)
         spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
         told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels

@@ -62,6 +62,7 @@ def track(forward, recording: Recording, values: np.ndarray | None = None) -> Tr
         return change
 
     scaled = inverse = np.zeros((len(values), arm.size, len(noise)))
+    sought = None
     for _ in range(ROUNDS):
         now = channel_values(forward.model, recording, arm.positions(pose)[None], None)[0]
         tangent = np.empty((len(noise), arm.size, len(values)))
@@ -71,7 +72,8 @@ def track(forward, recording: Recording, values: np.ndarray | None = None) -> Tr
             ahead = channel_values(forward.model, recording, arm.positions(arm.moved(pose, by))[None], None)[0]
             tangent[:, k] = wrapped(ahead - now) / 1e-6
         scaled = np.moveaxis(tangent * weight[:, None, None], 2, 0)  # [n, D, m]
-        inverse = np.linalg.pinv(scaled, rcond=1e-6)
+        sought = arm.sought(scaled) if sought is None else sought
+        inverse = arm.inverse(scaled, sought, 1e-6)
         by = np.einsum("nkd,dn->kn", inverse, wrapped(values.T - now) * weight[:, None])
         pose = arm.moved(pose, np.clip(by, -0.7, 0.7))
         if np.abs(by).max() < 1e-9:

@@ -1,5 +1,7 @@
 """What equation error says of a device that nothing holds: its wrench in flight, and the impulses of its blows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -237,3 +239,21 @@ def test_what_stands_starts_from_rest_however_the_tracker_smooths(seed):
     subject = Subject.from_model(model, parameters, Drive(), [])
     assert starting(subject, [recording]) == "rest"
     assert starting(subject, [recording.window(0.3, 0.8)]) == "fit"
+
+
+@pytest.mark.parametrize("shorter", [0.0, 0.02])
+def test_what_is_seen_from_the_side_does_not_roll_to_explain_a_wrong_length(shorter):
+    """Once turned a little out of the picture, turning further would shorten it."""
+    model, parameters = walker()
+    recording = walked(model, parameters, noise=1e-4).window(0.2, 0.8)
+    channels = {n: replace(c, values=(1.0 - shorter) * c.values) for n, c in recording.channels.items()}
+    recording = replace(recording, channels=channels)
+    subject = Subject.from_model(model, parameters, Drive(), [])
+    forward = arranged(subject, [recording], Options(segment=0.1, start="fit"))
+    followed = track(forward, recording)
+    poses = [*(b.pose for b in forward.blocks), followed.pose]
+    turns = np.concatenate([Rotation.from_matrix(p.rotation).as_rotvec() for p in poses])
+    assert len(forward.blocks) > 3 and np.abs(turns[:, [0, 2]]).max() < 1e-4
+    assert np.ptp(turns[:, 1]) > 0.05 and followed.told.tolist() == [True, False, True, False, True, False, True]
+    rates = np.abs([b.rates for b in forward.blocks])
+    assert rates[:, [1, 3, 5]].max() < 0.01 < 1.0 < rates[:, 4].max()
