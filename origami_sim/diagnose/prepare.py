@@ -119,8 +119,9 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
         if standing and len(values) >= 4 * words.WINDOW:  # a tracker that smooths hides its noise from the next frames
             noise = np.maximum(noise, np.sqrt(np.nan_to_num(np.nanmedian(words.scatter(values), axis=0))))
         with np.errstate(invalid="ignore"):
-            away = np.nanmedian(values[head], axis=0) - now
-            drift = np.nanstd(values[head], axis=0)
+            begun = np.nanmedian(values[head], axis=0)
+            away = begun - now
+            drift = 1.4826 * np.nanmedian(np.abs(values[head] - begun), axis=0)  # whatever one frame shows
         scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
         # what does not move at all, such as a marker across the plane of a motion, scatters by its noise
         moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max() if standing else 0.0), 3 * noise)

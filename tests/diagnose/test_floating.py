@@ -239,6 +239,9 @@ def test_what_stands_starts_from_rest_however_the_tracker_smooths(seed):
     subject = Subject.from_model(model, parameters, Drive(), [])
     assert starting(subject, [recording]) == "rest"
     assert starting(subject, [recording.window(0.3, 0.8)]) == "fit"
+    wild = {n: replace(c, values=c.values.copy()) for n, c in recording.channels.items()}
+    wild["edge4"].values[0, 1] += 3e-3  # one frame is no motion
+    assert starting(subject, [replace(recording, channels=wild)]) == "rest"
 
 
 @pytest.mark.parametrize("shorter", [0.0, 0.02])
