@@ -232,11 +232,12 @@ def together(f: Fit) -> float:
     return float(np.sum(each.sum(axis=1) ** 2) / max(np.sum(each**2), 1e-300))
 
 
-WORTH = 9.0
-"""Log evidence by which an explanation with one more effect must be ahead: odds of 20 at the temperature.
+WORTH, BEHIND = 15.0, 5.0
+"""Log evidence by which an explanation with one more effect must be ahead, or else is put behind.
 
-Errors that nobody lists add up to what looks like another effect. In opened sealed cases of a single effect, a second
-one that was not there was ahead by 8 to 11 (18 once); one that was there by 36 or more.
+The first is odds of 150 at the temperature. Errors that nobody lists add up to what looks like another effect. In
+opened sealed cases of a single effect, a second one that was not there was ahead by 8 to 11 (18 once); one that was
+there by 36 or more.
 """
 
 
@@ -255,7 +256,7 @@ def supported(fits: Sequence[Fit], scores: Mapping[int, Score]) -> list[float]:
             inner = {s.label for s in g.hypothesis.suspects}
             if inner and inner < mine:
                 if not better(scores[id(f)], scores[id(g)]):
-                    evidence = min(evidence, scores[id(g)].evidence - 5.0)
+                    evidence = min(evidence, scores[id(g)].evidence - BEHIND)
         out.append(evidence)
     return out
 

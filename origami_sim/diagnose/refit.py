@@ -87,6 +87,11 @@ class Fit:
     def cost(self) -> float:
         return self.misfit + self.penalty
 
+    @property
+    def reach(self) -> float:
+        """The cost that it has, or that a further step promises."""
+        return min(self.cost, self.promise)
+
     def deviations(self) -> np.ndarray:
         """(P,) standard deviations of theta."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)

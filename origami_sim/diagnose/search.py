@@ -146,7 +146,7 @@ def contest(
     enough = base.cost - min(HOPE * gain, gain - NEAR)
     for n, f in enumerate(fits):
         tell(0.5 + 0.5 * n / len(fits))
-        if n and min(f.cost, f.promise) <= enough:
+        if n and f.reach <= enough:
             fits[n] = finished(forward, f, weights)
     return fits
 
@@ -232,7 +232,7 @@ def twins(forward: Forward, rough: Screening, screening: Screening, fits: Sequen
     out = []
     for s in again[:TWINS]:
         f = roughly(forward, fits[0], s, weights, screening)
-        out.append(finished(forward, f, weights) if min(f.cost, f.promise) < single.cost + NEAR else f)
+        out.append(finished(forward, f, weights) if f.reach < single.cost + NEAR else f)
     return out
 
 
@@ -267,7 +267,7 @@ def lookalikes(
     effect = [best.linear.clear(n, t[:, own]) for n, t in enumerate(best.linear.tangent)]
     n = max(range(len(effect)), key=lambda n: effect[n] @ effect[n])
     part = best.only([best.blocks[n]])
-    done = {f.hypothesis.label for f in fits if f is best or min(f.cost, f.promise) < best.cost + words.CLOSE}
+    done = {f.hypothesis.label for f in fits if f is best or f.reach < best.cost + words.CLOSE}
     (mine,) = best.hypothesis.suspects
     rest = [s for s in every if s.label not in done and distinct_sites(s, mine)]
     at_fit = screen(forward, rest, part, weights)
@@ -294,7 +294,7 @@ def lookalikes(
         begin = np.concatenate([best.theta[:own], [value], [f.start for f in s.free[1:]]])
         near = {"theta": begin, "local": best.local, "blocks": best.blocks, "known": best.linear, "kept": own}
         f = fit(forward, base.hypothesis.plus(s), weights, rough=True, **near)
-        out.append(finished(forward, f, weights) if min(f.cost, f.promise) < best.cost + NEAR else f)
+        out.append(finished(forward, f, weights) if f.reach < best.cost + NEAR else f)
     return improved(out, fits)
 
 
@@ -333,7 +333,7 @@ def others(
     for n, s in enumerate(rest):
         tell("other suspects", 0.8 * n / len(rest))
         tried.append(roughly(forward, part, s.only(worst), old, seen_there))
-    good = sorted((f for f in tried if not f.failed), key=lambda f: min(f.cost, f.promise))[:MANY]
+    good = sorted((f for f in tried if not f.failed), key=lambda f: f.reach)[:MANY]
     out = []
     for n, f in enumerate(good):
         tell("other suspects", 0.8 + 0.2 * n / len(good))

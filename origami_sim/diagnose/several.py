@@ -169,8 +169,8 @@ def swaps(forward, base: Fit, best: Fit, fits, scores, screening: Screening, wei
             f = roughly(forward, inner, g, weights, screening)
             theta = np.concatenate([place, f.theta[len(inner.free) :]])
             other = fit(forward, f.hypothesis, weights, theta=theta, local=best.local, rough=True, **near)
-            f = min(f, other, key=lambda f: min(f.cost, f.promise))
-            if min(f.cost, f.promise) < best.cost + NEAR:
+            f = min(f, other, key=lambda f: f.reach)
+            if f.reach < best.cost + NEAR:
                 f = finished(forward, f, weights)
             if not f.failed:
                 scores[id(f)] = score(forward, f, weights)

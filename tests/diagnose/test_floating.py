@@ -162,8 +162,8 @@ def test_markers_on_a_line_turn_a_free_device_as_little_as_they_can():
         turned = Rotation.from_rotvec(turn)
         level = turned.apply(model.position[side]) + np.array([0.01, -0.02, 0.3])
         pose = placed(model, arm, recording, level.ravel())
-        assert np.abs(arm.positions(pose)[side, 0] - level).max() < 1e-12
-        assert Rotation.from_matrix(pose.rotation[0]).magnitude() <= turned.magnitude() + 1e-9
+        assert np.abs(arm.positions(pose)[side, 0] - level).max() < 1e-15
+        assert Rotation.from_matrix(pose.rotation[0]).magnitude() <= turned.magnitude() + 1e-15
 
 
 # --- on feet
