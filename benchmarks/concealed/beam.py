@@ -1,6 +1,6 @@
 """Continuous beams: quasi-static curves of a magnetic cantilever and of a dielectric bender.
 
-The cantilever is an elastica, m' = -couple(theta), theta' = curvature(m), solved by collocation (scipy's solve_bvp).
+The cantilever is an elastica, m' = -couple(theta), theta' = curvature(m), by collocation at Gauss-Legendre points.
 The bender is bent by a voltage alone, so that its curvature is the same along the electrode: that of least enthalpy of
 the section, slice by slice, found by Newton's method on the enthalpy itself. Neither has hinges, cells or tables.
 """
@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from laws import Concealed, Law
-from scipy.integrate import solve_bvp
 
 MU0 = 4e-7 * math.pi
 EPS0 = 8.8541878128e-12
@@ -278,52 +277,64 @@ def reaching(levels: np.ndarray, beam: Beam) -> np.ndarray:
     return np.stack([b * math.sin(beam.tilt) + beam.stray[0], b * math.cos(beam.tilt) + beam.stray[1]], axis=1)
 
 
+NODES = 16
+"""Gauss-Legendre points along the beam."""
+
+
+@functools.cache
+def _quadrature() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points and weights on 0 to 1, and the matrix (points, points) of integrals from 0 up to each point."""
+    at, share = np.polynomial.legendre.leggauss(NODES)
+    wave = np.polynomial.legendre.legvander(at, NODES - 1)
+    summed = [np.polynomial.legendre.legint(one, lbnd=-1) for one in np.eye(NODES)]
+    whole = np.stack([np.polynomial.legendre.legval(at, c) for c in summed], axis=1)
+    return 0.5 * (1 + at), 0.5 * share, 0.5 * np.linalg.solve(wave.T, whole.T).T
+
+
 def cantilever(s: dict, levels: np.ndarray, beam: Beam, cell: float) -> np.ndarray:
-    """Tip (n, 2) in x and z [m] of the elastica at each level, from the solution at the one before."""
-    out, guess, known = [], None, {}
-    for b in reaching(levels, beam):
-        key = tuple(b)
-        if key not in known:
-            known[key] = elastica(s, b, beam, cell, guess)
-        guess = known[key]
-        out.append(guess.y[2:, -1] * s["length"])
-    return np.array(out)
+    """Tip (n, 2) in x and z [m] of the elastica at each level.
 
+    The moment is the sum of the couples beyond, the angle that of the curvatures before: of the angles at the points,
+    Newton's method finds those that agree, at half the load first.
 
-def elastica(s: dict, b: np.ndarray, beam: Beam, cell: float, guess):
-    """Angle, moment, x and z (over the length) against the arc length (over the length); a solution of solve_bvp."""
+    Raises:
+        RuntimeError: it finds none.
+    """
+    at, share, before = _quadrature()
+    beyond = share - before
+    fields, back = np.unique(reaching(levels, beam), axis=0, return_inverse=True)
     length, stiff = s["length"], s["modulus"] * s["width"] * s["thickness"] ** 3 / 12
-    magnet = s["remanence"] / MU0 * s["width"] * s["thickness"]  # moment per length [A m]
-    square = float(b @ b)
-    stiff *= 1 + beam.stiffening * square / (square + BEND_HALF**2)
+    magnet = length * s["remanence"] / MU0 * s["width"] * s["thickness"]  # moment of the whole beam [A m2]
+    square = (fields**2).sum(axis=1, keepdims=True)
+    stiff = stiff * (1 + beam.stiffening * square / (square + BEND_HALF**2)) * (1 + beam.taper * (at - 0.5))
     cubic = beam.cubic * cell**3
-
-    def curvature(at, moment):
-        local = stiff * (1 + beam.taper * (at - 0.5))
-        k = (moment + beam.offset) / local
-        for _ in range(30 if cubic else 0):
-            step = (local * k + cubic * k**3 - moment - beam.offset) / (local + 3 * cubic * k**2)
-            k = k - step
-            if np.abs(step).max() < 1e-12 * (1 + np.abs(k).max()):
+    angle = np.zeros((len(fields), NODES))
+    for part in (0.5, 1.0):
+        bx, bz = (part * fields).T[:, :, None]
+        for _ in range(50):
+            along, across = bx * np.cos(angle) + bz * np.sin(angle), bz * np.cos(angle) - bx * np.sin(angle)
+            couple = magnet * across * (1 - beam.compliance * along)
+            turned = -magnet * (along * (1 - beam.compliance * along) + beam.compliance * across**2)
+            k = curvature(couple @ beyond.T + part * beam.offset, stiff, cubic)
+            gap = angle - beam.clamp * (couple @ share)[:, None] - length * k @ before.T
+            softness = 1 / (stiff + 3 * cubic * k**2)
+            by = beam.clamp * share + length * before @ (softness[:, :, None] * beyond)
+            step = np.linalg.solve(np.eye(NODES) - by * turned[:, None, :], gap[:, :, None])[:, :, 0]
+            angle = angle - np.clip(step, -0.5, 0.5)
+            if np.abs(step).max() < 1e-10:
                 break
-        return k
+        else:
+            raise RuntimeError(f"no elastica in {np.abs(levels).max():g} T")
+    tip = length * np.stack([np.cos(angle) @ share, np.sin(angle) @ share], axis=1)
+    return tip[back.ravel()]
 
-    def slope(at, y):
-        angle, moment = y[:2]
-        along = b[0] * np.cos(angle) + b[1] * np.sin(angle)
-        across = b[1] * np.cos(angle) - b[0] * np.sin(angle)
-        couple = magnet * across * (1 - beam.compliance * along)
-        return np.stack([length * curvature(at, moment), -length * couple, np.cos(angle), np.sin(angle)])
 
-    def ends(root, tip):
-        return np.array([root[0] - beam.clamp * root[1], tip[1] / stiff * length, root[2], root[3]])
-
-    at = np.linspace(0.0, 1.0, 41)
-    start = np.stack([0 * at, 0 * at, at, 0 * at]) if guess is None else guess.sol(at)
-    found = solve_bvp(slope, ends, at, start, tol=1e-7, max_nodes=20000)
-    if not found.success:
-        raise RuntimeError(f"no elastica in {b} T: {found.message}")
-    return found
+def curvature(moment: np.ndarray, stiff: np.ndarray, cubic: float) -> np.ndarray:
+    """Curvature k [1/m] of stiff k + cubic k^3 = moment: the one real root (cubic is not negative)."""
+    if cubic == 0.0:
+        return moment / stiff
+    r = np.sqrt(3 * cubic / stiff)
+    return 2 / r * np.sinh(np.arcsinh(1.5 * moment / stiff * r) / 3)
 
 
 # --- the dielectric bender

@@ -29,7 +29,7 @@ class Foot:
         Args:
             told: of the object. arm: from the centre of mass to the tip, in the panel's axes [m].
         """
-        self.name, self.panel, self.arm, self.friction = told["name"], told["panel"], arm, friction
+        self.name, self.panel, self.arm, self.friction = told["name"], told["panel"], arm.tolist(), friction
         self._hertz = told["load"] / told["give"] ** 1.5
         self._shear = told["friction"] * told["load"] / told["give"]
         self.rest()
@@ -37,16 +37,15 @@ class Foot:
     def rest(self) -> None:
         """Forgets."""
         self.pull = self.height = self.speed = 0.0
-        self.lever = np.zeros(3)
+        self.lever = (0.0, 0.0, 0.0)
 
     def press(self, world, dt: float) -> None:
         """Adds the force of the ground to the panel's wrench."""
-        turn, spin, velocity = world.moving(self.panel)
-        self.lever = turn @ self.arm
-        x, z = float(self.lever[0]), float(self.lever[2])
-        self.height = float(world.data.xipos[world.body[self.panel]][2]) + z
-        self.speed = float(velocity[0] + spin[1] * z)
-        rise = float(velocity[2] - spin[1] * x)
+        turn, (sx, sy, sz), (vx, _, vz), height = world.moving(self.panel)
+        ax, ay, az = self.arm
+        x, y, z = (turn[i] * ax + turn[i + 1] * ay + turn[i + 2] * az for i in (0, 3, 6))
+        self.lever, self.height = (x, y, z), height + z
+        self.speed, rise = vx + sy * z - sz * y, vz + sx * y - sy * x
         push = 0.0
         if self.height < 0.0:
             push = max(0.0, self._hertz * (-self.height) ** 1.5 * (1.0 - LOSS * rise))

@@ -104,6 +104,8 @@ class World:
         moment = {m["panel"]: np.array(m["poling"]) * m["moment"] for m in o["magnets"]}
         self.magnets = {p: (m * self.numbers.remanence[p]).tolist() for p, m in moment.items()}
         self.body = {p: self.model.body(f"p{p}").id for p in range(len(o["faces"]))}
+        d, root = self.data, self.model.body_rootid
+        self._views = {p: (d.xmat[b], d.cvel[b], d.xipos[b], d.subtree_com[root[b]]) for p, b in self.body.items()}
 
     def _xml(self) -> str:
         o, x = self.o, np.array(self.o["vertices"])
@@ -161,8 +163,8 @@ class World:
         """The motion from angles q0 and rates w0 at time `start` of the recording."""
         m, d = self.model, self.data
         mujoco.mj_resetData(m, d)
-        order = [m.joint(n).qposadr[0] for n in self.joints]
-        dofs = [m.joint(n).dofadr[0] for n in self.joints]
+        order = np.array([m.joint(n).qposadr[0] for n in self.joints])
+        dofs = np.array([m.joint(n).dofadr[0] for n in self.joints])
         hinges = dofs[: self.count]
         d.qpos[order] = q0
         d.qvel[dofs] = 0.0 if w0 is None else w0
@@ -176,36 +178,39 @@ class World:
         for foot in self.feet:
             foot.rest()
         out, rates = np.empty((2, frames, len(order)))
-        bodies = [self.body[p] for p in range(len(self.o["faces"]))]
-        magnets = [(p, self.body[p], m) for p, m in self.magnets.items()]
+        bodies = np.array([self.body[p] for p in range(len(self.o["faces"]))])
+        # plain numbers and kept views: arrays as short as these, and looking them up, take longer than the step itself
+        magnets = [(self.wrench[p, 3:], d.xmat[self.body[p]], m) for p, m in self.magnets.items()]
+        angles, speeds, moments, wrenches = d.qpos, d.qvel, d.qfrc_applied, d.xfrc_applied
         acting = [law for law in self.laws if type(law).act is not Law.act]
         fielding = [law for law in self.laws if type(law).field is not Law.field]
+        pushed = bool(acting or self.feet)
         for n in range(frames):
-            out[n], rates[n] = d.qpos[order], d.qvel[dofs]
+            out[n], rates[n] = angles[order], speeds[dofs]
             for k in range(every):
                 t = start + (n * every + k) * dt
-                if acting or drive or self.feet:
-                    self.torque[:] = 0.0
-                    self.wrench[:] = 0.0
+                if pushed or drive:
+                    self.wrench.fill(0.0)
                     mujoco.mj_kinematics(m, d)
                 if drive:
                     b = axis * wave(drive, t)
                     for law in fielding:
                         b = law.field(b, dt)
                     bx, by, bz = b.tolist()
-                    for p, body, (x, y, z) in magnets:  # in plain numbers: arrays as short as these take longer
-                        turn = d.xmat[body].tolist()
-                        mx, my, mz = (turn[i] * x + turn[i + 1] * y + turn[i + 2] * z for i in (0, 3, 6))
-                        self.wrench[p, 3:] = my * bz - mz * by, mz * bx - mx * bz, mx * by - my * bx
-                if acting:
-                    q, w = d.qpos[order].tolist(), d.qvel[dofs].tolist()
+                    for couple, turn, (x, y, z) in magnets:
+                        a, e, h, f, g, i, o, u, v = turn.tolist()
+                        mx, my, mz = a * x + e * y + h * z, f * x + g * y + i * z, o * x + u * y + v * z
+                        couple[:] = my * bz - mz * by, mz * bx - mx * bz, mx * by - my * bx
+                if pushed:
+                    self.torque.fill(0.0)
+                    q, w = angles[order].tolist(), speeds[dofs].tolist()
                     for law in acting:
                         law.act(self, t, q, w, dt)
-                for foot in self.feet:
-                    foot.press(self, dt)
-                if acting or drive or self.feet:
-                    d.qfrc_applied[hinges] = self.torque
-                    d.xfrc_applied[bodies] = self.wrench
+                    for foot in self.feet:
+                        foot.press(self, dt)
+                    moments[hinges] = self.torque
+                if pushed or drive:
+                    wrenches[bodies] = self.wrench
                 mujoco.mj_step(m, d)
         return Motion(start + np.arange(frames) / FINE, out, rates)
 
@@ -231,12 +236,13 @@ class World:
         order = [m.joint(f"j{n}").qposadr[0] for n in range(self.count)]
         return q[order]
 
-    def moving(self, panel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotation, angular velocity and velocity of the centre of mass of a panel."""
-        d, b = self.data, self.body[panel]
-        spin, velocity = d.cvel[b, :3], d.cvel[b, 3:]  # at the centre of mass of the whole tree
-        arm = d.xipos[b] - d.subtree_com[self.model.body_rootid[b]]
-        return d.xmat[b].reshape(3, 3), spin, velocity + cross(spin, arm)
+    def moving(self, panel: int) -> tuple[list[float], list[float], tuple[float, float, float], float]:
+        """Rotation (nine, by rows), spin, velocity of the centre of mass of a panel, and its height; plain numbers."""
+        turn, speed, at, whole = self._views[panel]
+        *spin, vx, vy, vz = speed.tolist()  # at the centre of mass of the whole tree
+        (x, y, z), (cx, cy, cz), (sx, sy, sz) = at.tolist(), whole.tolist(), spin
+        x, y, up = x - cx, y - cy, z - cz
+        return turn.tolist(), spin, (vx + sy * up - sz * y, vy + sz * x - sx * up, vz + sx * y - sy * x), z
 
 
 def wave(drive: dict, t: float) -> float:

@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp
 
 from origami_sim.diagnose.hypothesis import Hypothesis
 from origami_sim.diagnose.prescribed import curves
@@ -208,6 +209,37 @@ def test_elastica_of_the_reference(truth):
     s = scene_settings(cantilever).as_dict()
     x = truth["beam"].cantilever(s, s["field"] * cantilever.SHARES, truth["beam"].Beam(), 1.0) / s["length"]
     assert np.hypot(1 - x[:, 0], x[:, 1]) == pytest.approx(cantilever.REFERENCE, rel=1e-4)
+
+
+def test_elastica_with_all_effects_by_other_means(truth):
+    """SciPy's solve_bvp, level after level, and the cubic by Newton's method."""
+    beam = truth["beam"]
+    made = beam.BeamCase(beam.draw("mae_cantilever", np.random.default_rng(0)), {})
+    s, cell, stiff = made.settings, made.cell, made.scale(0) / beam.CELLS
+    b = beam.Beam(cubic=8 * stiff, offset=0.3 * stiff, compliance=2.0, stiffening=0.3, tilt=0.2, stray=(1e-3, 2e-3),
+                  loop=2e-3, saturation=5.0, taper=0.5, clamp=0.01 / stiff)  # fmt: skip
+    levels = np.array(made.o["recordings"][0]["levels"])[[0, 3, 6, 8, 12, 20, 24]]
+    length, bending = s["length"], s["modulus"] * s["width"] * s["thickness"] ** 3 / 12
+    magnet = s["remanence"] / beam.MU0 * s["width"] * s["thickness"]
+    found = beam.cantilever(s, levels, b, cell)
+    for (bx, bz), tip in zip(beam.reaching(levels, b), found, strict=True):
+        square = bx * bx + bz * bz
+        local = bending * (1 + b.stiffening * square / (square + beam.BEND_HALF**2))
+
+        def slope(at, y, bx=bx, bz=bz, local=local):
+            k, root = y[1] * 0.0, local * (1 + b.taper * (at - 0.5))
+            for _ in range(50):
+                k -= (root * k + b.cubic * cell**3 * k**3 - y[1] - b.offset) / (root + 3 * b.cubic * cell**3 * k**2)
+            along, across = bx * np.cos(y[0]) + bz * np.sin(y[0]), bz * np.cos(y[0]) - bx * np.sin(y[0])
+            turning = -magnet * across * (1 - b.compliance * along)
+            return length * np.stack([k, turning, np.cos(y[0]), np.sin(y[0])])
+
+        def ends(root, far):
+            return np.array([root[0] - b.clamp * root[1], far[1], root[2], root[3]])
+
+        at = np.linspace(0.0, 1.0, 41)
+        other = solve_bvp(slope, ends, at, np.stack([0 * at, 0 * at, length * at, 0 * at]), tol=1e-8)
+        assert other.success and np.abs(other.y[2:, -1] - tip).max() < 1e-9 * length
 
 
 def test_bender_of_the_reference(truth):
