@@ -552,27 +552,24 @@ class Forward:
         step = float(np.median(np.diff(times)))
         held = replace(model, free=np.zeros_like(model.free))
 
-        def at(frame: int, memory: np.ndarray | None) -> Batch:
-            """The worlds held as they were at a frame, driven as from there on; without a memory they have rested."""
+        def rested(frame: int) -> Batch:
+            """The worlds held as they were at a frame, where they have rested, driven as from there on."""
             span = float(times[-1] - times[frame]) + step
             drive = distorted(model, parameters, shifted(self._drives[r], times[[frame]], span, len(worlds)), span)
             state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
-            if memory is None:
-                batch = self._batch(held, parameters, drive.held(0.0), state)
-                batch.carry(path[[frame, frame], :, None], LEAD * step)
-                memory = batch.state().memory
-            return self._batch(held, parameters, drive, replace(state, memory=memory))
+            batch = self._batch(held, parameters, drive.held(0.0), state)
+            batch.carry(path[[frame, frame], :, None], LEAD * step)
+            return self._batch(held, parameters, drive, replace(state, memory=batch.state().memory))
 
         out: dict[int, np.ndarray] = {}
-        last, memory = -LEAD - 1, None
+        last, batch = -LEAD - 1, None
         for first in map(int, every[every <= max(b.first for b in blocks)]):
-            if first - last > LEAD:
-                last, memory = max(first - LEAD, 0), None
-            batch = at(last, memory)
+            if batch is None or first - last > LEAD:
+                last = max(first - LEAD, 0)
+                batch = rested(last)
             if first > last:
                 batch.carry(path[last : first + 1, :, None], step)
-            last, memory = first, batch.state().memory
-            out[first] = memory
+            last, out[first] = first, batch.state().memory
         return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State) -> Batch:

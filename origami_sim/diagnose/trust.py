@@ -1,8 +1,8 @@
 """How often explanations that are as well supported as this one were right where the truth was known.
 
 Probabilities of candidates are shares among those that were fitted. That the truth is among them is another matter: two
-effects may look like one, and not all physics is in the catalogue. How often that happened on a development battery
-(see `docs/proof.md`) is a logistic curve in the held-out gain, stored with the battery that it comes from.
+effects may look like one, and not all physics is in the catalogue. How often that happened in sealed runs that were
+opened (see `docs/proof.md`) is a logistic curve in the held-out gain, stored with the runs that it comes from.
 """
 
 import json

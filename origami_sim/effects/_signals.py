@@ -57,8 +57,8 @@ def lagging(times: np.ndarray, values: np.ndarray, lag: np.ndarray) -> np.ndarra
     lag = np.maximum(lag, 1e-9)
     out = np.empty(np.broadcast_shapes(values.shape, (1, len(lag))))
     out[0] = values[0]
-    for n, h in enumerate(np.diff(times)):
-        decay = np.exp(-h / lag)
-        slope = (values[n + 1] - values[n]) / h
-        out[n + 1] = values[n + 1] - slope * lag + (out[n] - values[n] + slope * lag) * decay
+    h = np.diff(times)[:, None]
+    decay, behind = np.exp(-h / lag), np.diff(values, axis=0) / h * lag  # of what falls behind a ramp
+    for n, (left, begun, ended) in enumerate(zip(decay, values[:-1] - behind, values[1:] - behind, strict=True)):
+        out[n + 1] = ended + (out[n] - begun) * left
     return out

@@ -11,8 +11,8 @@ def play(values: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Play operator of samples [n, W]: the output follows once it is `width` [W] behind."""
     out = np.empty(np.broadcast_shapes(values.shape, (1, len(width))))
     last = np.zeros(out.shape[1])
-    for n, value in enumerate(values):
-        out[n] = last = np.clip(last, value - width, value + width)
+    for now, low, high in zip(out, values - width, values + width, strict=True):
+        last = np.minimum(np.maximum(last, low), high, out=now)
     return out
 
 

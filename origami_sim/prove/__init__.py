@@ -30,7 +30,7 @@ STRUCTURES = (*RIGID, "mae_cantilever", "de_bender", "crease_coupon")
 
 def register(parser: argparse.ArgumentParser) -> None:
     """Arguments of `origami-sim prove`."""
-    parser.add_argument("--cases", type=int, default=12, help="cases to draw (default 12; 480 are the full battery)")
+    parser.add_argument("--cases", type=int, help="cases to draw (default 12; 480 are the full battery)")
     parser.add_argument("--seed", type=int, default=1, help=f"from {DEVELOPMENT} on: a sealed run (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time on this machine (default 1)")
     parser.add_argument("--cluster", metavar="WHERE", help="dask: local, local:WORKERS, or a scheduler's address")
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from origami_sim.prove import battery, score
 
     for name in ("cases", "jobs"):
-        if getattr(args, name) < 1:
+        if getattr(args, name) is not None and getattr(args, name) < 1:
             raise InputError("must be positive", field=f"--{name}", value=getattr(args, name), allowed=">= 1")
     if args.seed < 0:
         raise InputError("must not be negative", field="--seed", value=args.seed, allowed=">= 0")
@@ -66,11 +66,11 @@ def run(args: argparse.Namespace) -> int:
     if args.score:
         if not (out / battery.RUN).exists():
             raise InputError("there is no proof in this folder", field="--out", value=str(out))
-        board = score.report(out, args.cases, say)
+        board = score.report(out, args.cases or len(list((out / "cases").glob("*"))), say)
     else:
         board = battery.prove(
             out,
-            cases=args.cases,
+            cases=args.cases or 12,
             seed=args.seed,
             jobs=args.jobs,
             cluster=args.cluster,

@@ -45,7 +45,12 @@ def digest(files: Iterable[Path]) -> str:
     return out.hexdigest()
 
 
-def thresholds() -> dict[str, dict[str, float]]:
+def _numbers(value) -> bool:
+    """Whether it is a number, or a tuple of them."""
+    return isinstance(value, (int, float)) or (isinstance(value, tuple) and all(map(_numbers, value)))
+
+
+def thresholds() -> dict[str, dict]:
     """The numbers in capitals of every module of the diagnosis, and its default options."""
     import origami_sim.diagnose as package
     from origami_sim.diagnose import Options
@@ -53,9 +58,9 @@ def thresholds() -> dict[str, dict[str, float]]:
     out: dict = {"options": asdict(Options())}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
-        mine = {n: v for n, v in vars(module).items() if n.isupper() and isinstance(v, (int, float))}
+        mine = {n: v for n, v in vars(module).items() if n.isupper() and _numbers(v)}
         out |= {info.name: mine} if mine else {}
-    return out
+    return json.loads(json.dumps(out))  # as it is stored
 
 
 def freeze(out: Path, truth: Path, *, sealed: bool, drawing: bool = False) -> dict:

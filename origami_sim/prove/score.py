@@ -124,7 +124,8 @@ def _named(explanations: list, names: set[str]) -> bool:
 
 
 _CONCEALED = ("case", "kind", "null", "structure", "mechanism", "site", "d_wanted", "d")
-_OUTCOMES = ("top1", "inside", "wrong", "alarm", "found_site", "covered", "unknown", "correct", "double", "said")
+_OUTCOMES = ("top1", "inside", "wrong", "blamed", "alarm", "found_site", "covered", "unknown", "correct")
+_OUTCOMES += ("double", "said")
 _NUMBERS = (
     "removed",
     "recovery",
@@ -148,7 +149,8 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
             `separating` experiment or the `suggested` one.
 
     Returns: a row with `verdict`, `top` (named mechanism or verdict), and True, False or None (does not apply) for
-        `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently), `alarm`, `found_site`, `covered`,
+        `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently), `blamed` (one explanation is named, and
+        it is not the truth), `alarm`, `found_site`, `covered`,
         `unknown`, `double`, `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
         is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
@@ -198,6 +200,7 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         row["unknown"] = verdict == "UNKNOWN"
         right = contains
     row["wrong"] = bool(explanations) and probability >= SURE and not right and not nothing
+    row["blamed"] = not right if len(explanations) == 1 else None
     row["correct"] = bool(right) if explanations else None
     row["where"] = explanations[0][0][1] if explanations else ""
     _errors(row, found)
@@ -260,6 +263,7 @@ TARGETS: dict[str, tuple[str, tuple[float, float] | None]] = {
     "told": ("top-1, no other within d' 5", None),
     "inside": ("truth in the stated set, d' >= 5", (0.95, 1.0)),
     "wrong": ("confidently wrong, any d'", (0.0, 0.02)),
+    "blamed": ("wrong where one explanation is named", None),
     "alarm": ("false alarms on nulls", (0.0, 0.05)),
     "found_site": ("site, where named, d' >= 5", (0.95, 1.0)),
     "onset": (f"onset within {SOON:g} frames", (0.90, 1.0)),
@@ -286,6 +290,7 @@ def scores(rows: Sequence[dict]) -> dict:
         "told": told("top1", [r for r in clear if r["apart"] is not None and r["apart"] >= TOLD]),
         "inside": told("inside", clear),
         "wrong": [bool(r["wrong"]) for r in rows],
+        "blamed": told("blamed", rows),
         "alarm": told("alarm", rows),
         "found_site": told("found_site", clear),
         "onset": [abs(r["onset"]) <= SOON for r in rows if r["onset"] is not None],

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from origami_sim.effects import CONTACTS, HINGES, get
+from origami_sim.effects import CONTACTS, HINGES, Effect, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 
@@ -95,24 +95,18 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     first = dict(zip(families, np.cumsum([0, *(len(nodes) for nodes, _ in families.values())]), strict=False))
     total = sum(len(nodes) for nodes, _ in families.values())
     slopes = {kind: np.zeros((total, worlds)) for kind in ("stiffness", "damping")}  # of all elements
-    largest, cause = np.zeros((n, worlds)), np.full((n, worlds), "", dtype=object)
+    stiffest: list[tuple[Effect, np.ndarray]] = []
     for effect in laws:
-        nodes, norms = families[effect.family]
+        nodes, _ = families[effect.family]
         own = {"mass": parameters["inertia", "mass"]} if effect.family == "node" else {}
         for kind, sums in slopes.items():
             slope = getattr(effect, kind)
             if slope is None:
                 continue
-            k = np.asarray(slope({**own, **parameters.of(effect.name)}))
-            k = np.broadcast_to(k, (len(nodes), worlds))
+            k = np.broadcast_to(slope({**own, **parameters.of(effect.name)}), (len(nodes), worlds))
             sums[first[effect.family] : first[effect.family] + len(nodes)] += k
-            for c in range(nodes.shape[1] if kind == "stiffness" else 0):
-                row = k * (norms[:, c] * norms.sum(1))[:, None]
-                for e in np.flatnonzero((row > largest[nodes[:, c]]).any(1)):
-                    at = nodes[e, c]
-                    more = row[e] > largest[at]
-                    largest[at][more] = row[e][more]
-                    cause[at][more] = f"{model.name(effect.family, int(e))} ({effect.name})"
+            if kind == "stiffness":
+                stiffest.append((effect, k))
     entries = [
         (norms.ravel(), nodes.ravel(), np.repeat(first[f] + np.arange(len(nodes)), nodes.shape[1]))
         for f, (nodes, norms) in families.items()
@@ -142,4 +136,10 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     assert plain is not None
     w = int(np.argmin(limit))
     i = int(np.argmin(plain[:, w]))
-    return TimeStep(limit=float(limit[w]), dt=SAFETY * float(limit[w]), node=i, cause=str(cause[i, w]) or "damping")
+    largest, cause = 0.0, "damping"
+    for effect, k in stiffest:
+        nodes, norms = families[effect.family]
+        row = np.where(nodes == i, k[:, [w]] * norms * norms.sum(axis=1, keepdims=True), 0.0).max(axis=1, initial=0.0)
+        if row.max(initial=0.0) > largest:
+            largest, cause = row.max(), f"{model.name(effect.family, int(np.argmax(row)))} ({effect.name})"
+    return TimeStep(limit=float(limit[w]), dt=SAFETY * float(limit[w]), node=i, cause=cause)

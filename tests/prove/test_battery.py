@@ -67,6 +67,7 @@ def test_a_sealed_run_goes_on_with_the_diagnosis_that_it_began_with(tmp_path):
     first = freeze.freeze(tmp_path, truth, sealed=True)
     assert freeze.freeze(tmp_path, truth, sealed=True) == first
     assert first["thresholds"]["options"]["finalists"] > 0 and "STRUCTURED" in first["thresholds"]["verdict"]
+    assert len(first["thresholds"]["forward"]["SOFTER"]) == 3  # several numbers of one name
     stored = tmp_path / freeze.FROZEN
     stored.write_text(json.dumps({**first, "diagnosis": "0" * 64}))
     assert freeze.freeze(tmp_path, truth, sealed=False)["diagnosis"] == "0" * 64

@@ -59,6 +59,7 @@ def test_few_probabilities_that_are_right_have_a_calibration_error_by_chance():
 def test_a_right_answer():
     row = judge(ANSWER, diagnosis("MECHANISM", ["crease_friction at fold2"], 0.97))
     assert row["top1"] and row["inside"] and row["found_site"] and row["covered"] and not row["wrong"]
+    assert row["blamed"] is False
     assert row["recovery"] == pytest.approx(0.05) and row["elements"] == [1, 0, 0]
     assert (row["strength"], row["value"], row["low"], row["high"]) == (2e-5, 2.1e-5, 1.9e-5, 2.3e-5)
     assert row["removed"] == pytest.approx(1.0)
@@ -70,19 +71,20 @@ def test_a_tie_holds_the_truth_without_naming_it_first():
 
 
 @pytest.mark.parametrize(
-    ("verdict", "chosen", "probability", "wrong"),
+    ("verdict", "chosen", "probability", "wrong", "blamed"),
     [
-        ("MECHANISM", ["tether at the body"], 0.95, True),
-        ("MECHANISM", ["tether at the body"], 0.7, False),
-        ("SEVERAL", ["crease_friction at fold2", "air_drag at all panels"], 0.95, True),
-        ("TIE", ["tether at the body", "air_drag at all panels"], 0.95, True),
-        ("ADEQUATE", [], 0.99, False),
-        ("UNKNOWN", ["tether at the body"], 0.99, False),
+        ("MECHANISM", ["tether at the body"], 0.95, True, True),
+        ("MECHANISM", ["tether at the body"], 0.7, False, True),
+        ("SEVERAL", ["crease_friction at fold2", "air_drag at all panels"], 0.95, True, True),
+        ("TIE", ["tether at the body", "air_drag at all panels"], 0.95, True, None),
+        ("ADEQUATE", [], 0.99, False, None),
+        ("UNKNOWN", ["tether at the body"], 0.99, False, None),
     ],
 )
-def test_confidently_wrong(verdict, chosen, probability, wrong):
+def test_confidently_wrong(verdict, chosen, probability, wrong, blamed):
+    """Only what is named alone is blamed, however sure that is."""
     row = judge(ANSWER, diagnosis(verdict, chosen, probability))
-    assert row["wrong"] == wrong and not row["top1"]
+    assert row["wrong"] == wrong and row["blamed"] == blamed and not row["top1"]
 
 
 @pytest.mark.parametrize(
