@@ -127,6 +127,7 @@ _CONCEALED = ("case", "kind", "null", "structure", "mechanism", "site", "d_wante
 _OUTCOMES = ("top1", "inside", "wrong", "blamed", "alarm", "found_site", "covered", "unknown", "correct")
 _OUTCOMES += ("double", "said")
 _NUMBERS = (
+    "seen",
     "removed",
     "recovery",
     "floor",
@@ -155,6 +156,7 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
         wrongly, missed); concealed `strength`, recovered `value` with `low` and `high`, `recovery` (relative error);
+        `seen` (score of the truth in the screening over d');
         `onset` (frames late); `removed`, `floor`, `refitted`, `probability`, `correct`. `apart` (d' from the nearest
         other effect) is left to `report`.
     """
@@ -199,6 +201,7 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         row["top1"], row["inside"] = bool(explanations) and alone(explanations[0], names), contains
         row["unknown"] = verdict == "UNKNOWN"
         right = contains
+        row["seen"] = _seen(answer, found)
     row["wrong"] = bool(explanations) and probability >= SURE and not right and not nothing
     row["blamed"] = not right if len(explanations) == 1 else None
     row["correct"] = bool(right) if explanations else None
@@ -225,6 +228,13 @@ def _place(row: dict, answer: dict, explanations: list) -> None:
     truth = {s for s in (answer["site"], (answer.get("second") or {}).get("site", "")) if s}
     named = elements(explanations[0]) if explanations and NOTHING not in explanations else set()
     row["elements"] = [len(truth & named), len(named - truth), len(truth - named)]
+
+
+def _seen(answer: dict, found: dict) -> float | None:
+    """Score of the truth in the screening over its d'; where its site was no suspect, of the effect anywhere."""
+    scores = [(s["site"], abs(s["z"])) for s in found.get("screening", []) if s["effect"] in answer["names"] and s["z"]]
+    here = [z for site, z in scores if site == answer["site"]] or [z for _, z in scores]
+    return max(here) / answer["d"] if here else None
 
 
 def _errors(row: dict, found: dict) -> None:
@@ -319,6 +329,7 @@ def scores(rows: Sequence[dict]) -> dict:
     out["floor"] = median("floor", clear)
     out["refitted_floor"] = median("refitted", clear)
     out["recovery"] = median("recovery", clear)
+    out["seen"] = median("seen", clear)
     out["seconds"] = median("wall", rows)
     near = [r for r in clear if r["apart"] is not None]
     best = float(np.sum(ndtr(np.array([r["apart"] for r in near]) / 2.0)))
@@ -420,6 +431,7 @@ def text_of(board: dict) -> str:
         f"error over noise, held out (median, d' >= 5): {say(board['floor'])} (target <= 1.2); "
         f"refitted without the effect {say(board['refitted_floor'])}",
         *(f"    beside it, {n}: {v:.3g}" for n, v in board["baselines"].items()),
+        f"score of the truth in the screening over its d' (median, d' >= 5): {say(board['seen'])}",
         f"error of the strength (median): {say(board['recovery'], '{:.1%}')} (target <= 5 %)",
         f"calibration error of the stated probabilities: {say(board['ece'])} (target <= 0.05); "
         f"{say(board['ece_by_chance'])} is expected of so few even if all are right",

@@ -65,6 +65,16 @@ def test_a_right_answer():
     assert row["removed"] == pytest.approx(1.0)
 
 
+def test_what_the_screening_sees_of_an_effect_is_its_score_over_what_was_concealed():
+    seen = [("crease_friction", "fold2", -8.1), ("crease_friction", "all creases", 9.0), ("air_drag", "fold2", 20.0)]
+    screening = [dict(zip(("effect", "site", "z"), s, strict=True)) for s in seen]
+    row = judge(ANSWER, diagnosis("ADEQUATE", [], 0.9, screening=screening))
+    assert row["seen"] == pytest.approx(8.1 / 10.2)
+    assert judge(ANSWER, diagnosis("ADEQUATE", [], 0.9, screening=screening[1:]))["seen"] == pytest.approx(9.0 / 10.2)
+    assert judge(ANSWER, diagnosis("ADEQUATE", [], 0.9, screening=screening[2:]))["seen"] is None
+    assert score.scores([row])["seen"] == row["seen"]
+
+
 def test_a_tie_holds_the_truth_without_naming_it_first():
     row = judge(ANSWER, diagnosis("TIE", ["crease_hysteresis at fold2", "crease_friction at fold2"], 0.97))
     assert not row["top1"] and row["inside"] and row["correct"] and not row["wrong"]
