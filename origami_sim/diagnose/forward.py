@@ -120,9 +120,10 @@ class Forward:
     Attributes:
         blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
         components: names of the D components. softness: of panels where only derivatives are asked for.
+        separate: whether a segment is predicted without those before it, so that few of them take less time.
     """
 
-    softness = 1.0
+    softness, separate = 1.0, True
 
     def __init__(
         self,

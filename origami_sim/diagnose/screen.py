@@ -144,10 +144,10 @@ def screen(
     simulated.
 
     Args:
-        most: use at most so many blocks, evenly spread.
+        most: use at most so many blocks, evenly spread, if that saves time.
     """
     blocks = list(base.blocks)
-    if most is not None and len(blocks) > most:
+    if most is not None and len(blocks) > most and forward.separate:
         blocks = [blocks[i] for i in np.round(np.linspace(0, len(blocks) - 1, most)).astype(int)]
     single = [s for s in suspects if not _together(s, suspects)]
     groups: list[list[Suspect]] = []

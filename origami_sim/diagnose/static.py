@@ -66,8 +66,10 @@ class CurveForward(Forward, ABC):
         subject: how to build the model. recordings: of one object. pieces: blocks of each curve.
 
     Attributes:
-        blocks, components, local (0), start ("rest"): as in `Forward`.
+        blocks, components, local (0), start ("rest"), separate (False): as in `Forward`.
     """
+
+    separate = False
 
     def __init__(
         self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None

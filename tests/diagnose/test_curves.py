@@ -8,7 +8,9 @@ from scipy.optimize import brentq
 
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.hypothesis import Hypothesis
+from origami_sim.diagnose.prepare import nominal_fits
 from origami_sim.diagnose.prescribed import Prescribed, curves
+from origami_sim.diagnose.screen import screen
 from origami_sim.diagnose.static import Static, clocked, sign_changes
 from origami_sim.errors import InputError
 from origami_sim.materials import MU0
@@ -189,6 +191,17 @@ def test_a_measurement_at_one_channel_acts_there_only():
     plain = predicted()
     for site, moved in (("the measurement", [1, 1]), ("channel left", [1, 0]), ("channel right", [0, 1])):
         np.testing.assert_allclose(predicted(site) - plain, np.outer(np.ones(28), 0.03 * np.array(moved)), atol=1e-12)
+
+
+def test_curves_are_screened_whole():
+    """A part takes as long as the whole, and shows less: of a cubic crease, two of six pieces 0.46 of its score."""
+    forward = curves(coupon(), [torque(lambda q: K * (q - REST) + 0.02 * K * (q - REST) ** 3)])
+    _, base, weights = nominal_fits(forward)
+    every = [s for s in forward.admitted(suspected(forward)) if s.effect == "crease_stiffening"]
+    few, whole = (screen(forward, every, base, weights, most=most).signatures[0] for most in (2, None))
+    assert len(few.parts) == len(forward.blocks) and few.score == whole.score
+    part = screen(forward, every, base.only([base.blocks[0], base.blocks[-1]]), weights).signatures[0]
+    assert part.score / whole.score == pytest.approx(0.46, abs=0.02)
 
 
 def test_memory_follows_the_path():
