@@ -180,7 +180,7 @@ class World:
         out, rates = np.empty((2, frames, len(order)))
         bodies = np.array([self.body[p] for p in range(len(self.o["faces"]))])
         # plain numbers and kept views: arrays as short as these, and looking them up, take longer than the step itself
-        magnets = [(self.wrench[p, 3:], d.xmat[self.body[p]], m) for p, m in self.magnets.items()]
+        magnets = [(self.wrench[p, 3:], self._views[p][0], m) for p, m in self.magnets.items()]
         angles, speeds, moments, wrenches = d.qpos, d.qvel, d.qfrc_applied, d.xfrc_applied
         acting = [law for law in self.laws if type(law).act is not Law.act]
         fielding = [law for law in self.laws if type(law).field is not Law.field]

@@ -201,7 +201,7 @@ def test_curves_are_screened_whole():
     few, whole = (screen(forward, every, base, weights, most=most).signatures[0] for most in (2, None))
     assert len(few.parts) == len(forward.blocks) and few.score == whole.score
     part = screen(forward, every, base.only([base.blocks[0], base.blocks[-1]]), weights).signatures[0]
-    assert part.score / whole.score == pytest.approx(0.46, abs=0.02)
+    assert part.score / whole.score == pytest.approx(0.46, abs=0.005)
 
 
 def test_memory_follows_the_path():
