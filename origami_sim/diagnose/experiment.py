@@ -41,9 +41,9 @@ def propose(
     apart = np.zeros((len(menu), len(rivals)))
     for n, (_, changed) in enumerate(menu):
         known = None
-        for k, rival in enumerate(rivals):
+        for k, rival in enumerate(rivals if recorded(changed, judged.best) else ()):
             try:
-                apart[n, k], known = separation(changed, judged.best, rival, weights, known)
+                apart[n, k], known = separation(changed, rival, weights, known)
             except (FloatingPointError, np.linalg.LinAlgError):
                 apart[n, k] = 0.0
         if progress:
@@ -65,27 +65,35 @@ def rivals_of(judged, most: int = 4) -> list[Fit]:
     return tied[:most] if tied else judged.others[:1]
 
 
+def recorded(forward: Forward, f: Fit) -> bool:
+    """Puts what a fitted explanation predicts in the place of what was recorded; False where it goes unstable."""
+    blocks = range(len(forward.blocks))
+    local = np.zeros((1, len(blocks), forward.local))
+    truth = [v[0] for v in forward.predict(f.hypothesis, f.theta[None], local, blocks, soft=True)]
+    forward.blocks = [replace(b, values=v) for b, v in zip(forward.blocks, truth, strict=True)]
+    return all(np.all(np.isfinite(v)) for v in truth)
+
+
 def separation(
-    forward: Forward, a: Fit, b: Fit, weights: Weights, known: Linearisation | None = None
+    forward: Forward, rival: Fit, weights: Weights, known: Linearisation | None = None
 ) -> tuple[float, Linearisation | None]:
-    """Expected separation d' of two fitted explanations in an experiment, and the derivatives under b.
+    """Expected separation d' of a fitted explanation from what was recorded, and the derivatives under it.
 
     Args:
         known: derivatives under another explanation, of which those by nominal numbers and starts hold here too.
     """
     blocks = list(range(len(forward.blocks)))
     local = np.zeros((len(blocks), forward.local))
-    truth = forward.predict(a.hypothesis, a.theta[None], local[None], soft=True)
-    for n, v in enumerate(truth):
-        if not np.all(np.isfinite(v[0])):
-            return 0.0, known
-        forward.blocks[n] = replace(forward.blocks[n], values=v[0])
-    own = len(b.free) - len(b.hypothesis.free)
-    line = linearise(forward, b.hypothesis, b.free, b.theta, local, blocks, weights, known=known, kept=own, soft=True)
+    own = len(rival.free) - len(rival.hypothesis.free)
+    line = linearise(
+        forward, rival.hypothesis, rival.free, rival.theta, local, blocks, weights, known=known, kept=own, soft=True
+    )
     rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
-    scale = np.array([f.scale for f in b.free])
-    value, vector = np.linalg.eigh(b.covariance / np.outer(scale, scale))  # a number on its bound has next to no spread
+    scale = np.array([f.scale for f in rival.free])
+    value, vector = np.linalg.eigh(
+        rival.covariance / np.outer(scale, scale)
+    )  # a number on its bound has next to no spread
     learnt = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
     stacked = np.concatenate([rows, learnt])
     target = np.concatenate([gap, np.zeros(len(learnt))])

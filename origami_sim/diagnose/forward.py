@@ -24,6 +24,7 @@ from origami_sim.diagnose.hypothesis import (
     along_every_axis,
     apply,
     at_several_times,
+    suspects,
     told_apart,
 )
 from origami_sim.diagnose.track import coordinates, placed
@@ -59,6 +60,7 @@ ALIKE = 0.05
 """Part of the motion by which softer panels may change it."""
 
 STIFFNESS = {"bars": "stiffness", "panel_bending": "stiffness"}
+CALMING = {"bar_viscosity": "bars", "panel_viscosity": "panel_bending"}
 VISCOSITY = {"bar_viscosity": "viscosity", "panel_viscosity": "viscosity"}
 """What keeps panels in shape, and what calms them."""
 
@@ -121,6 +123,7 @@ class Forward:
         blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
         components: names of the D components. softness: of panels where only derivatives are asked for.
         separate: whether a segment is predicted without those before it, so that few of them take less time.
+        shared: effects of the program that all hypotheses share: compiling one for each took longer than running them.
     """
 
     softness, separate = 1.0, True
@@ -139,6 +142,7 @@ class Forward:
         self.values = {f.name: f.start for f in subject.nominals}
         self.model, self.parameters, self.drive = subject.build(self.values)
         self.articulation = Articulation(self.model)
+        self.shared = shared(self.model, self.recordings, self.drive, self.parameters)
         self._drives = [drive_of(r, self.drive) for r in self.recordings]
         self._given = np.array([f.start for f in subject.nominals])
         self._settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
@@ -284,23 +288,21 @@ class Forward:
         blocks: Sequence[int] | None = None,
         *,
         soft: bool = False,
-        among: Sequence[str] = (),
     ) -> list[np.ndarray]:
         """Predicted channels of each block: a list of [K, n, D].
 
         Args:
-            hypothesis: one for all K, or one for each (they then share one program with the effects of all).
+            hypothesis: one for all K, or one for each.
             theta: K times the nominals, then the hypothesis' numbers [SI].
             local: [K, B, L] start coordinates (as a shift from the block's own) and rates, for all blocks.
             blocks: which to predict (default all).
             soft: with softer panels (see `soften`), for derivatives; not if a hypothesis is about panels' stiffness.
-            among: effects that the program has anyway, so that other hypotheses can share it.
 
         A world that goes unstable, or of whose numbers no model can be built, gives nan.
         """
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
-        effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
         softness = self._softness(soft, effects)
         worlds, impossible = self._worlds(each, theta, effects)
         out: dict[int, np.ndarray] = {}
@@ -574,7 +576,7 @@ class Forward:
         return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State) -> Batch:
-        return Batch(model, parameters, drive, state, threads=self.threads)
+        return Batch(model, parameters, drive, state, threads=self.threads, among=self.shared)
 
     def _path(self, r: int) -> np.ndarray | None:
         """Positions [F, N, 3] of the recorded motion, smoothed; None if the channels do not give them."""
@@ -645,9 +647,15 @@ def distinct_motions(
     return first, np.array(of)
 
 
+def shared(model: Model, recordings: Sequence[Recording], drive: Drive, parameters: Parameters) -> tuple[str, ...]:
+    """The effects of a model, all that may be suspected, and those that calm panels."""
+    every = suspects(model, recordings, drive, parameters)
+    return tuple(dict.fromkeys([*model.effects, *(s.effect for s in every), *CALMING]))
+
+
 def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     """The same model with damped panels; folding is not damped."""
-    added = [e for e, of in (("bar_viscosity", "bars"), ("panel_viscosity", "panel_bending")) if of in model.effects]
+    added = [e for e, of in CALMING.items() if of in model.effects]
     quiet = model.with_effects(*added)
     out = parameters.for_model(quiet)
     with np.errstate(divide="ignore"):
@@ -737,7 +745,10 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
     curve = spline(grid, values)
 
     def at(times: np.ndarray) -> np.ndarray:
-        columns, inverse = np.unique(times - shown, axis=1, return_inverse=True)
+        since = times - shown
+        alike = bool(np.all(since == since[:, :1]))
+        columns, inverse = np.unique(since[:, :1] if alike else since, axis=1, return_inverse=True)
+        inverse = np.zeros(since.shape[1], int) if alike else inverse
         out = np.empty((len(times), values.shape[1], values.shape[2]))
         for c in range(columns.shape[1]):
             mine = np.flatnonzero(inverse.ravel() == c)

@@ -60,18 +60,17 @@ class Keep:
             blocks: Sequence[int] | None = None,
             *,
             soft: bool = False,
-            among: Sequence[str] = (),
         ) -> list[np.ndarray]:
             assert self.folder is not None
             wanted = list(range(len(forward.blocks)) if blocks is None else blocks)
-            file = self.folder / f"{digest(forward, hypothesis, theta, local, wanted, (soft, *among))}.npz"
+            file = self.folder / f"{digest(forward, hypothesis, theta, local, wanted, soft)}.npz"
             stored = _read(file, len(wanted))
             if stored is not None:
                 self.found += 1
                 return stored
             began = clock.perf_counter()
             # in the order of memory that a file has: sums depend on it in their last digit
-            made = kind.predict(forward, hypothesis, theta, local, blocks, soft=soft, among=among)
+            made = kind.predict(forward, hypothesis, theta, local, blocks, soft=soft)
             out = [np.ascontiguousarray(v) for v in made]
             self.computed += 1
             if clock.perf_counter() - began > WORTH:
@@ -86,13 +85,13 @@ class Keep:
             shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int], options: tuple) -> str:
+def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int], soft: bool) -> str:
     """Digest of all that a prediction depends on."""
     each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
     effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
     sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
     numbers = [f.name for f in forward.subject.nominals]
-    kind = (type(forward).__name__, forward.start, forward.softness, numbers, options)
+    kind = (type(forward).__name__, forward.start, forward.softness, numbers, soft)
     h = hashlib.sha256(repr((_sources(), kind, effects, sites, wanted)).encode())
     nominal = np.array([f.start for f in forward.subject.nominals])
     model, parameters = forward._world(Hypothesis(), nominal, ())

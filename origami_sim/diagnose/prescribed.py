@@ -84,7 +84,7 @@ class Prescribed(CurveForward):
         drive = distorted(model, parameters, self._drives[r], float(times[-1]))
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
-        batch = Batch(still, parameters, drive, state, threads=self.threads)
+        batch = Batch(still, parameters, drive, state, threads=self.threads, among=self.shared)
         moments = np.empty((len(q), frames, count))
         for k in range(frames):
             if k:

@@ -319,7 +319,6 @@ def _changes(forward, group, size, base: Fit, blocks) -> list[np.ndarray]:
         values[0] += z
     thetas = [np.concatenate([base.theta, v]) for v in rest]
     hypotheses = [base.hypothesis.plus(s) for s in group]
-    among = tuple(dict.fromkeys(e for h in hypotheses for e in h.effects))
     steps = np.array([forward.step(h, t, soft=True) for h, t in zip(hypotheses, thetas, strict=True)])
     pace = np.round(np.log2(np.maximum(steps, 1e-12) / max(steps.max(), 1e-12)))
     out = [np.full((len(group), *forward.blocks[b].values.shape), np.nan) for b in blocks]
@@ -331,7 +330,6 @@ def _changes(forward, group, size, base: Fit, blocks) -> list[np.ndarray]:
             np.repeat(base.local[None], 1 + len(mine), axis=0),
             blocks,
             soft=True,
-            among=among,
         )
         for n, v in enumerate(predicted):
             seen = np.isfinite(forward.blocks[blocks[n]].values)

@@ -20,6 +20,7 @@ from origami_sim.diagnose.forward import (
     continuous,
     distinct_motions,
     drive_of,
+    shared,
     stacked,
 )
 from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
@@ -34,7 +35,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import NULL_SHIFT, _Factor, _System, equilibrium
+from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
 
 PIECES = 6
 """Blocks that a curve is cut into: contiguous stretches, each of which is held out in its turn."""
@@ -54,9 +55,6 @@ FAR = 0.1
 ROUNDS = 12
 ITERATIONS = 12
 """Tangents of a load step, and Broyden's steps with each."""
-
-THREADED = 20000
-"""Nodes of all worlds together below which starting a thread takes as long as the forces."""
 
 
 class CurveForward(Forward, ABC):
@@ -84,6 +82,7 @@ class CurveForward(Forward, ABC):
                     "curves do not tell how panels turn under a marker", field=e, allowed="recordings of a motion"
                 )
         self.articulation = Articulation(self.model)
+        self.shared = shared(self.model, self.recordings, self.drive, self.parameters)
         silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
         self._drives = [drive_of(self._driven(r), silent) for r in self.recordings]
         self._built: dict[tuple, tuple[Model, Parameters]] = {}
@@ -111,7 +110,6 @@ class CurveForward(Forward, ABC):
         blocks: Sequence[int] | None = None,
         *,
         soft: bool = False,
-        among: Sequence[str] = (),
     ) -> list[np.ndarray]:
         """Predicted channels of each block, a list of [K, n, D]; nan from where a world has no equilibrium.
 
@@ -119,7 +117,7 @@ class CurveForward(Forward, ABC):
         """
         wanted = range(len(self.blocks)) if blocks is None else blocks
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
-        effects = tuple(dict.fromkeys([*among, *(e for h in each for e in h.effects)]))
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
         worlds, impossible = self._worlds(each, theta, effects)
         moves, of = distinct_motions(worlds)
         curves = {}
@@ -267,7 +265,7 @@ class Static(CurveForward):
         xs, all_angles, found = [], [], []
         before = model.position
         drives = self._resting(r, model, Parameters.join([p for _, p in worlds]))
-        search = _Search(self._system(model, worlds), worlds, drives[0], state, self.threads)
+        search = _Search(self, self._system(model, worlds), worlds, drives[0], state)
         for k in range(steps):
             guess = state.x.copy()
             if path is not None:
@@ -317,7 +315,7 @@ class Static(CurveForward):
         pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
         x = arm.positions(pose)
         state = State.at_rest(model, q.shape[1], position=x)
-        force = Batch(model, parameters, drive, state, threads=self.threads).total_force(0.0)
+        force = Batch(model, parameters, drive, state, threads=self.threads, among=self.shared).total_force(0.0)
         return -np.einsum("mnwa,nwa->mw", arm.jacobian(pose, x), force)
 
 
@@ -325,11 +323,12 @@ class _Search:
     """Equilibria of all worlds, load step after load step.
 
     Args:
-        drive: of the first load step, held, as it reaches the device. state: in which all begin.
+        forward: whose worlds they are. drive: of the first load step, held, as it reaches the device. state: in which
+            all begin.
     """
 
-    def __init__(self, system: _System, worlds, drive: Drive, state: State, threads: int | None):
-        self.system, self.worlds, self.threads = system, worlds, threads
+    def __init__(self, forward: Static, system: _System, worlds, drive: Drive, state: State):
+        self.system, self.worlds, self.threads, self.shared = system, worlds, forward.threads, forward.shared
         self.model = worlds[0][0]
         self.remembers = any(get(e).memory for e in self.model.laws)
         self.drive, self.state = drive, state
@@ -337,7 +336,8 @@ class _Search:
         still = replace(self.model, free=np.zeros_like(self.model.free))
         every = drive.replace(**{n: s.offset + np.zeros(state.worlds) for n, s in drive.signals.items()})
         parameters = Parameters.join([p for _, p in worlds])
-        self.batch = Batch(still, parameters, every, state, threads=1 if state.worlds < 64 else threads)
+        threads = 1 if state.worlds < 64 else self.threads
+        self.batch = Batch(still, parameters, every, state, threads=threads, among=self.shared)
         self.free = system.free
         self._moved: dict[int, Batch] = {}
 
@@ -437,10 +437,10 @@ class _Search:
         out[self.free] = s
         return np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
 
-    def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[_Factor | None], np.ndarray]:
+    def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[_Cholesky | _Factor | None], np.ndarray]:
         """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
         y = self.system
-        out: list[_Factor | None] = [None] * x.shape[1]
+        out: list[_Cholesky | _Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(alive):
             batch, copies = self._copies(int(w)), np.full(y.moves.shape[1], w)
@@ -461,7 +461,7 @@ class _Search:
             drive = self.drive.replace(**dict(zip(self.drive.signals, self.levels[:, w], strict=True)))
             threads = 1 if count * len(self.model.position) < THREADED else self.threads
             state = self.state.select(np.full(count, w))
-            self._moved[w] = Batch(self.model, self.worlds[w][1], drive, state, threads=threads)
+            self._moved[w] = Batch(self.model, self.worlds[w][1], drive, state, threads=threads, among=self.shared)
         self._moved[w].hold(self.levels[:, [w]])
         return self._moved[w]
 

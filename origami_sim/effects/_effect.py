@@ -105,6 +105,8 @@ class Effect:
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
         stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
+        needs: parameters of which one has to differ from zero for the law to give anything (empty: the strength, and
+            what is fitted with it and has its unit); elsewhere the law is not called.
         magnet: dipole moment of a triangle [A m^2] and its place [m], for a law that asks for the stray field. That is
             multiplied by the effect's strength, the mean of both triangles', so that action equals reaction.
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
@@ -131,6 +133,7 @@ class Effect:
     on_body: bool = False
     fitted: tuple[str, ...] = ()
     stated: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
     conservative: bool = False
     memory: tuple[Memory, ...] = ()
     stiffness: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
@@ -168,6 +171,14 @@ class Effect:
         """Arguments of its "force", "energy" or "magnet"."""
         law = getattr(self, which)
         return tuple(inspect.signature(law.func).parameters) if law is not None else ()
+
+    @property
+    def strengths(self) -> tuple[Parameter, ...]:
+        """The parameters without which the law gives nothing; none for what acts at its default, as gravity does."""
+        fitted = [self.parameter(n) for n in self.fitted]
+        names = self.needs or [p.name for p in fitted if p.unit == fitted[0].unit]
+        alike = tuple(map(self.parameter, names))
+        return () if any(p.default for p in alike) else alike
 
     @property
     def drives(self) -> tuple[str, ...]:

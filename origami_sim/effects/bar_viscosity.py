@@ -17,6 +17,7 @@ EFFECT = Effect(
     family="bar",
     force=tension,
     parameters=(Parameter("viscosity", "c", "N s/m", 0.0, (0.0, math.inf), "dashpot constant, 2 zeta sqrt(k m)"),),
+    needs=("viscosity",),
     damping=lambda p: p["viscosity"],
     formula="T = c dL/dt",
     source="Kelvin-Voigt element; c is given as a ratio of critical for each bar",

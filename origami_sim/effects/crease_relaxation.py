@@ -52,6 +52,7 @@ EFFECT = Effect(
         )
     ),
     fitted=("stiffness_1", "time_1"),
+    needs=("stiffness_1", "stiffness_2", "stiffness_3"),
     stiffness=lambda p: p["stiffness_1"] + p["stiffness_2"] + p["stiffness_3"],
     formula="M = -sum q_i,  dq_i/dt = K_i dtheta/dt - q_i / tau_i",
     source="standard linear solid / Prony series; exact exponential update (Simo & Hughes 1998, ch. 10)",

@@ -29,6 +29,7 @@ EFFECT = Effect(
         Parameter("tilt_z", "ez", "-", 0.0, (-3.0, 3.0), "share of the weight that is borne", typical=0.0),
     ),
     fitted=("tilt_x", "tilt_y"),
+    needs=("tilt_x", "tilt_y", "tilt_z"),
     formula="f = m g0 (ex, ey, ez), beside gravity along -z",
     source="small angles; Archimedes for ez",
     matters="1 degree acts as 0.017 of friction coefficient: drift in a direction fixed to the room; folds that lean",

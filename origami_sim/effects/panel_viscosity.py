@@ -17,6 +17,7 @@ EFFECT = Effect(
     family="bend",
     force=moment,
     parameters=(Parameter("viscosity", "c", "N m s/rad", 0.0, (0.0, math.inf), "dashpot constant, 2 zeta sqrt(K I)"),),
+    needs=("viscosity",),
     damping=lambda p: p["viscosity"],
     formula="M = -c dtheta/dt",
     source="Kelvin-Voigt plate on the bending lines of a panel",

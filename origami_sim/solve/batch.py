@@ -1,6 +1,7 @@
 """A batch of worlds on a device: the arrays behind the kernels, and the three things asked of them."""
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -8,10 +9,10 @@ import numpy as np
 import warp as wp
 
 from origami_sim.drive import Drive
-from origami_sim.effects import CONTACTS
+from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets
-from origami_sim.solve.compose import compose
+from origami_sim.solve.compose import BITS, compose
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Batch:
         model, parameters, drive, state: what to simulate; the state's worlds give W.
         device: warp device, "cpu" or "cuda:0".
         threads: on the CPU, how many threads share the worlds (default: all cores). Results do not depend on it.
+        among: effects that the program has anyway, so that models with few of them share it; those that the model
+            lacks do nothing.
 
     Raises:
         InputError: parameters or drive for another number of worlds, too few electrode groups, no such device.
@@ -59,13 +62,15 @@ class Batch:
         *,
         device: str = "cpu",
         threads: int | None = None,
+        among: Sequence[str] = (),
     ):
         try:
             self.device = wp.get_device(device)
         except (ValueError, RuntimeError):
             known = ", ".join(d.alias for d in wp.get_devices())
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
-        self.model, self.program = model, compose(model.effects)
+        off = [n for n in among if get(n).strengths or n in model.effects]
+        self.model, self.program = model, compose(tuple(dict.fromkeys([*off, *model.effects])))
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         # rows a multiple of 4 KiB apart would all fall into one cache set
@@ -85,7 +90,8 @@ class Batch:
                 value=groups,
                 allowed=f">= {int(model.electrodes.max()) + 1}",
             )
-        uses_gradient = any("gradient" in e.drives for e in self.program.effects)
+        laws = [get(n) for n in model.laws]
+        uses_gradient = any("gradient" in e.drives for e in laws)
         gradients = [s for n, s in drive.signals.items() if n.startswith("gradient")]
         if not uses_gradient and not all(s.is_zero for s in gradients):
             raise InputError(
@@ -93,14 +99,17 @@ class Batch:
                 field="gradient",
                 allowed="switch on field_gradient",
             )
-        interacting = next((e.name for e in self.program.effects if e.interacts), None)
+        interacting = next((e.name for e in laws if e.interacts), None)
         none = np.full(len(model.triangles), -1, np.int32)
         self.magnets = none if interacting is None else magnets(model, parameters, interacting)
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()
-        sizes = [(e, m) for e in self.program.effects for m in e.memory]
+        sizes = [(e, m) for e in laws for m in e.memory]
         rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
+        first = {(e.name, m.name): row for (e, m), row in zip(sizes, rows, strict=False)}
+        kept = [(e.name, m.name) for e in self.program.effects for m in e.memory]
+        self._places = [self.program.effects.index(e) for e in laws]
         self._buffer = constant(buffer, wp.float64)
         levels = self.program.slots.index(("drive", "offset"))
         self._levels = int(layout[levels, 0]), int(layout[levels + 1, 0] - layout[levels, 0])
@@ -120,29 +129,45 @@ class Batch:
             constant(layout, wp.int32),
             constant(times, wp.float64),
             constant(values, wp.float64),
-            constant(rows[:-1] if len(sizes) else [0], wp.int32),
+            constant([first.get(k, 0) for k in kept] or [0], wp.int32),
+            self._upload(self._acting(parameters), wp.int64),
         ]
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = wp.zeros_like(self._x)
-        self._angles, self._memory, self._work, self._power = (
-            self._upload(s, wp.float64) for s in (state.angles, state.memory, state.work, state.power)
-        )
+        self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))
+        self._work, self._power = (self._upload(self._spread(s), wp.float64) for s in (state.work, state.power))
         self._status = self._upload(state.status, wp.int32)
         self._nothing = wp.zeros((0, 1, 1), dtype=wp.vec3d, device=self.device)
         self._no_angles = wp.zeros((0, 1, 1), dtype=wp.float64, device=self.device)
         self._mass = parameters["inertia", "mass"]
 
+    def _acting(self, parameters: Parameters) -> np.ndarray:
+        """[words, W] bits of the program's effects that have a strength anywhere in a world."""
+        effects = self.program.effects
+        out = np.zeros((len(effects) // BITS + 1, self.worlds), np.int64)
+        for i in self._places:
+            for p in effects[i].strengths:
+                strong = np.any(parameters[effects[i].name, p.name] != 0.0, axis=0)
+                out[i // BITS] |= strong.astype(np.int64) << (i % BITS)
+        return out
+
     def _pack(self, parameters: Parameters, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
         """All parameters in one buffer, and per slot its offset and its strides over entities and over worlds."""
         waves = drive.slots()
-        blocks, layout, offset = [], [], 0
-        for owner, name in self.program.slots:
+        absent = {e.name for e in self.program.effects} - set(self.model.effects)
+        defaults, begins = self.program.defaults
+        blocks, layout, offset = [defaults], [], len(defaults)
+        for (owner, name), default in zip(self.program.slots, begins, strict=True):
+            if owner in absent:  # one value for all of its entities
+                layout.append((default, 0, 0))
+                continue
             a = waves[name] if owner == "drive" else parameters[owner, name]
             if (owner, name) == ("plane", "reach"):  # no contact law may be cut off
                 reaches = [
                     parameters[e.name, "reach"].max()
                     for e in self.program.effects
                     if e.family in CONTACTS
+                    and e.name not in absent
                     and "reach" in {p.name for p in e.parameters}
                     and parameters[e.name, "reach"].size
                 ]
@@ -159,6 +184,12 @@ class Batch:
             layout.append((offset, worlds * knots, knots if worlds > 1 else 0))
             offset += a.size
         return np.concatenate(blocks), np.array(layout, np.int32)
+
+    def _spread(self, a: np.ndarray) -> np.ndarray:
+        """Rows [E, W] of the model's laws in the places that these have in the program."""
+        out = np.zeros((len(self.program.effects), a.shape[1]))
+        out[self._places] = a
+        return out
 
     def _upload(self, a: np.ndarray, dtype) -> wp.array:
         tail = a.shape[2:]
@@ -259,8 +290,8 @@ class Batch:
         f, v = forces.numpy()[:, :, : self.worlds], self._download(self._v, n)
         e = self._download(energies, len(effects))
         return Evaluation(
-            forces={effect.name: f[i] for i, effect in enumerate(effects)},
-            energies={effect.name: e[i] for i, effect in enumerate(effects) if effect.energy is not None},
+            forces={effects[i].name: f[i] for i in self._places},
+            energies={effects[i].name: e[i] for i in self._places if effects[i].energy is not None},
             # summed node by node, because the order in which sum() adds depends on the number of worlds
             kinetic=0.5 * np.cumsum(self._mass * (v**2).sum(-1), axis=0)[-1],
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
@@ -306,15 +337,15 @@ class Batch:
     def state(self) -> State:
         """The present state, copied to the host."""
         m = self.model
-        n, rows = len(m.position), sum(d.size * m.count(e.family) for e in self.program.effects for d in e.memory)
+        n, rows = len(m.position), sum(d.size * m.count(get(e).family) for e in m.laws for d in get(e).memory)
         return State(
             x=self._download(self._x, n),
             v=self._download(self._v, n),
             a=self._download(self._a, n),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
             memory=self._download(self._memory, rows),
-            work=self._download(self._work, len(self.program.effects)),
-            power=self._download(self._power, len(self.program.effects)),
+            work=self._download(self._work, len(self.program.effects))[self._places],
+            power=self._download(self._power, len(self.program.effects))[self._places],
             step=self.step,
             status=self._download(self._status, 2),
         )

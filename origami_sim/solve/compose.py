@@ -8,8 +8,10 @@ by hand. The source is composed as text (see `Program.sources`), compiled once p
 import functools
 import hashlib
 import linecache
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from origami_sim import kinematics, magnetostatics
@@ -36,6 +38,9 @@ FIXED_SLOTS = (
 NATURAL = wp.constant(0x7FFFFFFF)
 """Masked with this, an index is seen to be no negative one, and every access to an array is spared that test."""
 
+BITS = 62
+"""Effects of which one integer tells whether they act in a world."""
+
 CPU_FLAGS = "-fno-slp-vectorize -ffp-contract=fast"
 """Two numbers of a vector stored by halves and loaded whole wait for the store; without packing they do not.
 
@@ -51,7 +56,7 @@ _ARGUMENTS = """
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
     series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32),
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
 """
@@ -158,6 +163,14 @@ class _Text:
     def __call__(self, line: str = "", shift: int = 0):
         self.lines.append("    " * (self.depth + shift) + line if line else "")
 
+    @contextmanager
+    def block(self, head: str):
+        """Lines that belong to a head such as an `if`."""
+        self(head)
+        self.depth += 1
+        yield
+        self.depth -= 1
+
     def __str__(self):
         return "\n".join(self.lines)
 
@@ -175,6 +188,13 @@ class Program:
     effects: tuple[Effect, ...]
     slots: tuple[tuple[str, str], ...]
     sources: dict[str, str]
+
+    @functools.cached_property
+    def defaults(self) -> tuple[np.ndarray, list[int]]:
+        """The default of every parameter slot, one after the other, and where each begins."""
+        own = {(e.name, p.name): np.full(p.knots, p.default) for e in self.effects for p in e.parameters}
+        each = [own.get(slot, np.zeros(1)) for slot in self.slots]
+        return np.concatenate(each), [0, *np.cumsum([len(a) for a in each])[:-1].tolist()]
 
     @functools.cached_property
     def rollout(self) -> wp.Kernel:
@@ -253,6 +273,8 @@ class _Composer:
             t(f"up = kinematics.plane_normal({tilt}, {azimuth})")
             t(f"plane_height = {self.value('plane', 'height', '0')}")
             t(f"reach = {self.value('plane', 'reach', '0')}")
+        for word in range(-(-len(self.effects) // BITS)):
+            t(f"on{word} = active[{word}, w]")
         return str(t)
 
     def channel(self, k: str) -> str:
@@ -278,6 +300,13 @@ class _Composer:
             else:
                 given.append(renamed.get(name, name))
         return f"{effect.name}_{which}({', '.join(given)})"
+
+    def acting(self, t: _Text, effect: Effect):
+        """Begins a block that worlds in which an effect has no strength pass over, so that it costs next to nothing."""
+        if not effect.strengths:
+            return nullcontext()
+        word, bit = divmod(self.number(effect), BITS)
+        return t.block(f"if (on{word} & wp.int64({1 << bit})) != wp.int64(0):")
 
     def apply_law(self, t: _Text, effect: Effect, entity: str, mode: str, result: str):
         """Calls a force law with its memory read before and, in a rollout, written after."""
@@ -334,8 +363,9 @@ class _Composer:
         self._contacts(t, mode)
         for i, e in enumerate(self.effects):
             if mode == "rollout" and e.exchanges_work:
-                t(f"work[{i}, w] = work[{i}, w] + half * (power[{i}, w] + power_{e.name})")
-                t(f"power[{i}, w] = power_{e.name}")
+                with self.acting(t, e):
+                    t(f"work[{i}, w] = work[{i}, w] + half * (power[{i}, w] + power_{e.name})")
+                    t(f"power[{i}, w] = power_{e.name}")
         return str(t)
 
     def _nodes(self, t: _Text, mode: str):
@@ -350,10 +380,11 @@ class _Composer:
         t("v = V[n, w]")
         for e in effects:
             i = self.number(e)
-            self.apply_law(t, e, "n", mode, f"F{i}")
-            self.add_energy(t, e, "n", mode)
-            self.scatter(t, e, "n", f"F{i}", mode)
-            self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
+            with self.acting(t, e):
+                self.apply_law(t, e, "n", mode, f"F{i}")
+                self.add_energy(t, e, "n", mode)
+                self.scatter(t, e, "n", f"F{i}", mode)
+                self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
         t.depth -= 1
 
     def _bars(self, t: _Text, mode: str):
@@ -374,14 +405,15 @@ class _Composer:
             t("tension = scalar(0.0)")
         for e in effects:
             i = self.number(e)
-            self.apply_law(t, e, "b", mode, f"T{i}")
-            self.add_energy(t, e, "b", mode)
-            self.add_work(t, e, f"-T{i} * rate", mode)
-            if mode == "evaluate":
-                self.scatter(t, e, "p", f"T{i} * along", mode)
-                self.scatter(t, e, "q", f"-T{i} * along", mode)
-            else:
-                t(f"tension += T{i}")
+            with self.acting(t, e):
+                self.apply_law(t, e, "b", mode, f"T{i}")
+                self.add_energy(t, e, "b", mode)
+                self.add_work(t, e, f"-T{i} * rate", mode)
+                if mode == "evaluate":
+                    self.scatter(t, e, "p", f"T{i} * along", mode)
+                    self.scatter(t, e, "q", f"-T{i} * along", mode)
+                else:
+                    t(f"tension += T{i}")
         if mode != "evaluate":
             t("pull = tension * along")
             t("F[p, w] = F[p, w] + pull")
@@ -424,14 +456,15 @@ class _Composer:
             t("moment = scalar(0.0)")
         for e in effects:
             i = self.number(e)
-            self.apply_law(t, e, "c", mode, f"M{i}")
-            self.add_energy(t, e, "c", mode)
-            self.add_work(t, e, f"M{i} * rate", mode)
-            if mode == "evaluate":
-                for node in "ijkl":
-                    self.scatter(t, e, node, f"M{i} * g.g{node}", mode)
-            else:
-                t(f"moment += M{i}")
+            with self.acting(t, e):
+                self.apply_law(t, e, "c", mode, f"M{i}")
+                self.add_energy(t, e, "c", mode)
+                self.add_work(t, e, f"M{i} * rate", mode)
+                if mode == "evaluate":
+                    for node in "ijkl":
+                        self.scatter(t, e, node, f"M{i} * g.g{node}", mode)
+                else:
+                    t(f"moment += M{i}")
         if mode != "evaluate":
             for node in "ijkl":
                 t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
@@ -460,15 +493,16 @@ class _Composer:
             t(f"field = {local}")
         for e in effects:
             i = self.number(e)
-            if e.interacts:
-                self._stray(t, e)
-            self.apply_law(t, e, "c", mode, f"R{i}")
-            self.add_energy(t, e, "c", mode)
-            for k in (1, 2, 3):
-                self.scatter(t, e, f"n{k}", f"kinematics.corner(R{i}, {k - 1})", mode)
-            if e.exchanges_work:
-                corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
-                self.add_work(t, e, " + ".join(corners), mode)
+            with self.acting(t, e):
+                if e.interacts:
+                    self._stray(t, e)
+                self.apply_law(t, e, "c", mode, f"R{i}")
+                self.add_energy(t, e, "c", mode)
+                for k in (1, 2, 3):
+                    self.scatter(t, e, f"n{k}", f"kinematics.corner(R{i}, {k - 1})", mode)
+                if e.exchanges_work:
+                    corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
+                    self.add_work(t, e, " + ".join(corners), mode)
         t.depth -= 1
 
     def _stray(self, t: _Text, effect: Effect):
@@ -521,11 +555,12 @@ class _Composer:
         t("push = vec3(scalar(0.0), scalar(0.0), scalar(0.0))")
         for e in self.family("contact"):
             i = self.number(e)
-            self.apply_law(t, e, "c", mode, f"N{i}")
-            self.add_energy(t, e, "c", mode)
-            t(f"normal_load += wp.max(N{i}, scalar(0.0))")
-            self.add_work(t, e, f"N{i} * rate", mode)
-            self._contact_force(t, e, f"N{i} * up", mode)
+            with self.acting(t, e):
+                self.apply_law(t, e, "c", mode, f"N{i}")
+                self.add_energy(t, e, "c", mode)
+                t(f"normal_load += wp.max(N{i}, scalar(0.0))")
+                self.add_work(t, e, f"N{i} * rate", mode)
+                self._contact_force(t, e, f"N{i} * up", mode)
         tangents = self.family("tangent")
         if tangents:
             # the coefficient may depend on the direction in which the foot slides or is about to slide
@@ -549,8 +584,9 @@ class _Composer:
             t("coefficient = scalar(0.0)")
             for e in self.family("coefficient"):
                 i = self.number(e)
-                self.apply_law(t, e, "c", mode, f"C{i}")
-                t(f"coefficient += C{i}")
+                with self.acting(t, e):
+                    self.apply_law(t, e, "c", mode, f"C{i}")
+                    t(f"coefficient += C{i}")
             for e in tangents:
                 i = self.number(e)
                 self.apply_law(t, e, "c", mode, f"S{i}")

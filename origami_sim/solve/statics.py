@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
@@ -41,6 +42,15 @@ NULL_SHIFT = 1e-11
 
 DENSE = 600
 """Up to so many degrees of freedom eigenvalues are found densely."""
+
+COMPACT = 150
+"""Up to so many degrees of freedom factors are found densely: sparse ones take three times as long."""
+
+THREADED = 20000
+"""Nodes of all worlds together below which starting a thread takes as long as the forces."""
+
+SKEW = 1e-8
+"""Share of the largest stiffness up to which a tangent counts as symmetric."""
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""
@@ -318,6 +328,28 @@ class _Factor:
         return self._lu.solve(right)
 
 
+class _Cholesky:
+    """The same of a small symmetric tangent, stored densely."""
+
+    singular = False
+
+    def __init__(self, k: np.ndarray, shift: float):
+        self._lower, info = dpotrf(k + shift * np.eye(len(k)), lower=1, clean=0)
+        self.definite = info == 0
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        return dpotrs(self._lower, right, lower=1)[0]
+
+
+def _factoring(k: sp.csc_array, largest: float) -> Callable[[float], "_Factor | _Cholesky"]:
+    """Factors of k + shift for any shift."""
+    if k.shape[0] <= COMPACT:
+        full = k.toarray()
+        if np.abs(full - full.T).max(initial=0.0) <= SKEW * largest:
+            return lambda shift: _Cholesky(full, shift)
+    return lambda shift: _Factor(_shifted(k, shift))
+
+
 class _System:
     """Forces and tangents of one world as functions of its positions.
 
@@ -341,7 +373,7 @@ class _System:
         self._colours = self._colour(n)
         worlds = 3 * (self._colours.max(initial=0) + 1) * len(STENCIL)
         tiled = self.state.select(np.zeros(worlds, int))
-        self._many = Batch(model, parameters, drive, tiled)
+        self._many = Batch(model, parameters, drive, tiled, threads=1 if worlds * n < THREADED else None)
         self._shape = (n, worlds // 3 // len(STENCIL), 3, len(STENCIL), 3)
         moved, moves = np.flatnonzero(self._colours >= 0), np.zeros(self._shape)
         for axis in range(3):
@@ -442,7 +474,7 @@ class _System:
         k = sp.csc_array(self.tangent(x, angles, time)[self.free][:, self.free])
         largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
         skew = abs(sp.csc_array(k - k.T))
-        symmetric = float(skew.max()) <= 1e-8 * largest
+        symmetric = float(skew.max()) <= SKEW * largest
         return sp.csc_array(0.5 * (k + k.T)) if symmetric else k, largest, symmetric
 
     def spectrum(
@@ -464,17 +496,18 @@ class _System:
         return np.real(values)[order], (mode / (peak or 1.0)).reshape(-1, 3)
 
     @staticmethod
-    def definite(k: sp.csc_array, largest: float, least: float) -> tuple[_Factor, float]:
+    def definite(k: sp.csc_array, largest: float, least: float) -> tuple["_Factor | _Cholesky", float]:
         """Factors of k + shift, with the shift raised from `least` until they are positive definite."""
         shift = max(least, NULL_SHIFT * largest)
-        factor = _Factor(_shifted(k, shift))
+        factors = _factoring(k, largest)
+        factor = factors(shift)
         raised = False
         while not factor.definite:
             raised, shift = True, 4.0 * shift
-            factor = _Factor(_shifted(k, shift))
+            factor = factors(shift)
         if raised:  # away from the edge, so that the weakest direction does not take the whole step
             shift *= 2.0
-            factor = _Factor(_shifted(k, shift))
+            factor = factors(shift)
         return factor, shift
 
     # --- equilibrium

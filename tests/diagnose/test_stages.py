@@ -13,6 +13,7 @@ from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnosis import REVERSAL
+from origami_sim.diagnose.forward import calmed
 from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
@@ -22,7 +23,7 @@ from origami_sim.diagnose.subject import alignments
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
-from origami_sim.model import dihedral_angles
+from origami_sim.model import State, dihedral_angles
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from tests.diagnose.strips import hanging, record, subject
@@ -65,6 +66,22 @@ def rubbing():
     given, base, weights = nominal_fits(forward)
     every = [s for s in suspects(forward.model, recordings, forward.drive) if s.effect in LOOPS]
     return forward, given, base, weights, screen(forward, every, base, weights)
+
+
+def test_all_suspects_share_a_program(rubbing):
+    """Compiling one for each would take longer than running it."""
+    forward = rubbing[0]
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive, forward.parameters))
+    programs, felt = set(), set()
+    for s in every:
+        hypothesis = Hypothesis((s,))
+        theta = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
+        world = forward._world(hypothesis, theta, hypothesis.effects)
+        for model, parameters in (world, calmed(*world)):
+            batch = forward._batch(model, parameters, forward.drive, State.at_rest(model))
+            programs.add(id(batch.program))
+            felt |= set(model.laws)
+    assert len(felt) > 20 and len(programs) == 1
 
 
 def test_the_nominal_refit_is_no_worse_than_the_model_as_given(rubbing):
@@ -606,9 +623,11 @@ def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
     forward, _, base, weights, screening = rubbing
     best, rival = (refit(forward, base, s, weights, screening) for s in chosen(screening, 2))
     for n, (what, _) in enumerate(experiment._menu(forward)[:3]):
-        fresh, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights)
-        _, known = experiment.separation(experiment._menu(forward)[n][1], best, base, weights)
-        again, _ = experiment.separation(experiment._menu(forward)[n][1], best, rival, weights, known)
+        made = experiment._menu(forward)[n][1]
+        assert experiment.recorded(made, best)
+        fresh, _ = experiment.separation(made, rival, weights)
+        _, known = experiment.separation(made, base, weights)
+        again, _ = experiment.separation(made, rival, weights, known)
         assert again == pytest.approx(fresh, abs=0.26), what  # measured: 0.01, 0.25, 0.18 of 1.1, 0.4, 0.7
 
 
@@ -625,10 +644,11 @@ def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_act
     friction = next(s for s in screening.signatures if s.suspect.label == "crease_friction at crease 1")
     rubs = refit(forward, base, friction, weights, screening)
     rubs = replace(rubs, theta=np.concatenate([base.theta, rubs.theta[len(base.theta) :]]))
-    d = [
-        experiment.separation(menu[f"crease {c} clamped as it is in the reference state"], rubs, base, weights)[0]
-        for c in range(2)
-    ]
+    d = []
+    for c in range(2):
+        made = menu[f"crease {c} clamped as it is in the reference state"]
+        assert experiment.recorded(made, rubs)
+        d.append(experiment.separation(made, base, weights)[0])
     assert d[1] < 0.02 * d[0]  # what acts at a clamped crease does not show
 
 
@@ -637,7 +657,8 @@ def test_the_next_experiment_is_for_rivals_that_can_be_told(monkeypatch, second,
     """The nearest rival counts, but for one that nothing in the menu would tell apart."""
     apart = {"a": (6.0, 0.5, 3.0), "b": (9.0, second, 2.0), "c": (4.0, 0.1, 4.0)}
     monkeypatch.setattr(experiment, "_menu", lambda forward: [(w, w) for w in apart])
-    monkeypatch.setattr(experiment, "separation", lambda what, one, rival, *_: (apart[what][rival.number], None))
+    monkeypatch.setattr(experiment, "recorded", lambda what, f: True)
+    monkeypatch.setattr(experiment, "separation", lambda what, rival, *_: (apart[what][rival.number], None))
 
     def explanation(number):
         return SimpleNamespace(number=number, hypothesis=SimpleNamespace(label=f"rival {number}"))

@@ -225,8 +225,14 @@ def test_forces_turn_with_the_device_and_its_surroundings(name):
     assert largest > 0
 
 
+@pytest.fixture
+def nothing_skipped(monkeypatch):
+    """Laws are called whether they have a strength or not."""
+    monkeypatch.setattr(Batch, "_acting", lambda self, parameters: np.full((8, self.worlds), -1))
+
+
 @pytest.mark.parametrize("name", ALL)
-def test_does_nothing_at_its_default_parameters(name):
+def test_does_nothing_at_its_default_parameters(name, nothing_skipped):
     rng = np.random.default_rng(5)
     model, state = configuration("random", rng)
     parameters = quiet(model)
@@ -243,8 +249,25 @@ def test_does_nothing_at_its_default_parameters(name):
     assert not np.any(forces["friction"])
 
 
+@pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].strengths])
+def test_is_passed_over_only_where_it_would_give_nothing(name, request):
+    model, parameters, state, rng = setting(name, seed=1)
+    state, drive = moved(state, rng), the_drive()
+    worlds = [parameters.copy() for _ in range(len(CATALOGUE[name].strengths) + 1)]
+    for k, w in enumerate(worlds):  # the last one has no strength at all
+        for n, p in enumerate(CATALOGUE[name].strengths):
+            w.set(name, p.name, parameters[name, p.name] if k == n else 0.0)
+    state = state.select(np.zeros(len(worlds), int))
+    skipping = Batch(model, Parameters.join(worlds), drive, state).evaluate(NOW).forces[responsible(name)]
+    request.getfixturevalue("nothing_skipped")
+    every = Batch(model, Parameters.join(worlds), drive, state).evaluate(NOW).forces[responsible(name)]
+    assert np.array_equal(skipping[:, :-1], every[:, :-1])
+    if not CATALOGUE[name].memory:  # which was made up
+        assert np.array_equal(skipping, every)
+
+
 @pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].fitted])
-def test_a_suspect_is_silent_at_zero_strength_and_heard_at_its_typical_values(name):
+def test_a_suspect_is_silent_at_zero_strength_and_heard_at_its_typical_values(name, nothing_skipped):
     """The diagnosis compares a model with and without it by its strength alone."""
     effect, heard = CATALOGUE[name], False
     for seed in (1, 3, 5, 7):

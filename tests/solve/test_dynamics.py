@@ -1,6 +1,7 @@
 """Rollouts against closed forms, orders of convergence, and the promises made to a batch of worlds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from scipy.integrate import quad
 
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
+from origami_sim.model import State
+from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
 
@@ -634,3 +637,26 @@ def test_gpu_follows_the_cpu(cuda):
     assert np.abs(a.x - b.x).max() <= 1e-9 * size
     assert np.abs(a.angles - b.angles).max() <= 1e-9 * np.abs(a.angles).max()
     same(b, simulate(model, p, drive, **options, device=cuda))
+
+
+def test_models_that_share_a_program_move_as_with_their_own():
+    """Laws that a model lacks do nothing there, wherever they stand; its memory and its work stay its own."""
+    model, p, _ = ringing_sheet()
+    few = replace(model, effects=("bars", "crease", "panel_bending", "crease_friction", "mass_damping"))
+    p = p.for_model(few).set("crease_friction", "friction_moment", 0.02).set("mass_damping", "decay_rate", 0.3)
+    s = State.at_rest(few)
+    s.v[:] = 0.1 * np.random.default_rng(4).normal(size=s.v.shape)
+    among = ("crease_relaxation", "mass_damping", "adhesion", "dipole_interaction", *few.effects[:4], "gravity")
+    own, shared = Batch(few, p, Drive(), s), Batch(few, p, Drive(), s, among=among)
+    names = [e.name for e in shared.program.effects]
+    assert names == [*among[:-1]], "gravity acts at its default, and is left to models that have it"
+    for batch in (own, shared):
+        batch.advance(2000, 1e-4, np.inf)
+    a, b = own.state(), shared.state()
+    assert a.memory.shape == b.memory.shape and np.any(a.memory) and np.all(a.work[-2:] < 0.0)
+    for name in ("x", "v", "memory", "work", "angles"):
+        assert getattr(b, name) == pytest.approx(getattr(a, name), rel=1e-9, abs=1e-12), name
+    f, g = own.evaluate(0.2), shared.evaluate(0.2)
+    assert list(f.forces) == list(g.forces) == list(few.effects) and list(f.energies) == list(g.energies)
+    other = replace(few, effects=few.effects[:3])
+    assert Batch(other, p.for_model(other), Drive(), State.at_rest(other), among=among).program is shared.program
