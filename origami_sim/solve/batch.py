@@ -70,7 +70,7 @@ class Batch:
             known = ", ".join(d.alias for d in wp.get_devices())
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
         off = [n for n in among if get(n).strengths or n in model.effects]
-        self.model, self.program = model, compose(tuple(dict.fromkeys([*off, *model.effects])))
+        self.model, self.program = model, compose(tuple(dict.fromkeys([*off, *model.effects])), bool(among))
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         # rows a multiple of 4 KiB apart would all fall into one cache set

@@ -243,8 +243,8 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
 
 
 class _Composer:
-    def __init__(self, effects: tuple[Effect, ...]):
-        self.effects = effects
+    def __init__(self, effects: tuple[Effect, ...], shared: bool = False):
+        self.effects, self.shared = effects, shared
         self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
         self.index = {s: i for i, s in enumerate(self.slots)}
         self.drives = {d for e in effects for d in e.drives}
@@ -273,7 +273,7 @@ class _Composer:
             t(f"up = kinematics.plane_normal({tilt}, {azimuth})")
             t(f"plane_height = {self.value('plane', 'height', '0')}")
             t(f"reach = {self.value('plane', 'reach', '0')}")
-        for word in range(-(-len(self.effects) // BITS)):
+        for word in range(-(-len(self.effects) // BITS) if self.shared else 0):
             t(f"on{word} = active[{word}, w]")
         return str(t)
 
@@ -303,7 +303,7 @@ class _Composer:
 
     def acting(self, t: _Text, effect: Effect):
         """Begins a block that worlds in which an effect has no strength pass over, so that it costs next to nothing."""
-        if not effect.strengths:
+        if not (self.shared and effect.strengths):
             return nullcontext()
         word, bit = divmod(self.number(effect), BITS)
         return t.block(f"if (on{word} & wp.int64({1 << bit})) != wp.int64(0):")
@@ -625,8 +625,12 @@ class _Composer:
 
 
 @functools.cache
-def compose(names: tuple[str, ...]) -> Program:
-    """The program of these effects. Raises InputError for an unknown effect."""
+def compose(names: tuple[str, ...], shared: bool = False) -> Program:
+    """The program of these effects. Raises InputError for an unknown effect.
+
+    Args:
+        shared: by models of which some lack effects; laws are then passed over in worlds where they have no strength.
+    """
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
-    composer = _Composer(effects)
+    composer = _Composer(effects, shared)
     return Program(effects, composer.slots, composer.sources())

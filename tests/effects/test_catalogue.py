@@ -225,14 +225,8 @@ def test_forces_turn_with_the_device_and_its_surroundings(name):
     assert largest > 0
 
 
-@pytest.fixture
-def nothing_skipped(monkeypatch):
-    """Laws are called whether they have a strength or not."""
-    monkeypatch.setattr(Batch, "_acting", lambda self, parameters: np.full((8, self.worlds), -1))
-
-
 @pytest.mark.parametrize("name", ALL)
-def test_does_nothing_at_its_default_parameters(name, nothing_skipped):
+def test_does_nothing_at_its_default_parameters(name):
     rng = np.random.default_rng(5)
     model, state = configuration("random", rng)
     parameters = quiet(model)
@@ -250,7 +244,7 @@ def test_does_nothing_at_its_default_parameters(name, nothing_skipped):
 
 
 @pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].strengths])
-def test_is_passed_over_only_where_it_would_give_nothing(name, request):
+def test_is_passed_over_only_where_it_would_give_nothing(name):
     model, parameters, state, rng = setting(name, seed=1)
     state, drive = moved(state, rng), the_drive()
     worlds = [parameters.copy() for _ in range(len(CATALOGUE[name].strengths) + 1)]
@@ -258,16 +252,17 @@ def test_is_passed_over_only_where_it_would_give_nothing(name, request):
         for n, p in enumerate(CATALOGUE[name].strengths):
             w.set(name, p.name, parameters[name, p.name] if k == n else 0.0)
     state = state.select(np.zeros(len(worlds), int))
-    skipping = Batch(model, Parameters.join(worlds), drive, state).evaluate(NOW).forces[responsible(name)]
-    request.getfixturevalue("nothing_skipped")
-    every = Batch(model, Parameters.join(worlds), drive, state).evaluate(NOW).forces[responsible(name)]
+    every, skipping = (
+        Batch(model, Parameters.join(worlds), drive, state, among=among).evaluate(NOW).forces[responsible(name)]
+        for among in ((), model.effects)
+    )
     assert np.array_equal(skipping[:, :-1], every[:, :-1])
     if not CATALOGUE[name].memory:  # which was made up
         assert np.array_equal(skipping, every)
 
 
 @pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].fitted])
-def test_a_suspect_is_silent_at_zero_strength_and_heard_at_its_typical_values(name, nothing_skipped):
+def test_a_suspect_is_silent_at_zero_strength_and_heard_at_its_typical_values(name):
     """The diagnosis compares a model with and without it by its strength alone."""
     effect, heard = CATALOGUE[name], False
     for seed in (1, 3, 5, 7):
