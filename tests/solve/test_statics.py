@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.integrate import solve_bvp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import fsolve
@@ -359,3 +360,18 @@ def test_path_can_be_stopped_and_continued_from_its_states():
     )
     assert again.x[0, 2, 2] == pytest.approx(path.x[-1, 2, 2], abs=1e-9)
     assert not again.reached and "3 points" in again.message
+
+
+@pytest.mark.parametrize("lowest", [1.0, 0.0, -0.3])
+def test_small_tangents_are_factored_densely_with_the_same_outcome(monkeypatch, lowest):
+    rng = np.random.default_rng(3)
+    q, _ = np.linalg.qr(rng.normal(size=(40, 40)))
+    k = q @ np.diag(np.linspace(lowest, 5.0, 40)) @ q.T
+    k, right, out = sp.csc_array(0.5 * (k + k.T)), rng.normal(size=40), []
+    for most in (0, statics.COMPACT):
+        monkeypatch.setattr(statics, "COMPACT", most)
+        factor, shift = statics._System.definite(k, 5.0, 0.0)
+        assert isinstance(factor, statics._Cholesky) == (most > 0)
+        out.append((shift, factor.solve(right)))
+    assert out[0][0] == out[1][0] and (out[0][0] > 0.3) == (lowest < 0)
+    assert out[1][1] == pytest.approx(out[0][1], rel=1e-5 if lowest == 0 else 1e-10)
