@@ -91,9 +91,8 @@ def separation(
     rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
     gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
     scale = np.array([f.scale for f in rival.free])
-    value, vector = np.linalg.eigh(
-        rival.covariance / np.outer(scale, scale)
-    )  # a number on its bound has next to no spread
+    # a number on its bound has next to no spread
+    value, vector = np.linalg.eigh(rival.covariance / np.outer(scale, scale))
     learnt = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
     stacked = np.concatenate([rows, learnt])
     target = np.concatenate([gap, np.zeros(len(learnt))])

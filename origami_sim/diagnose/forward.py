@@ -746,9 +746,9 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
 
     def at(times: np.ndarray) -> np.ndarray:
         since = times - shown
-        alike = bool(np.all(since == since[:, :1]))
-        columns, inverse = np.unique(since[:, :1] if alike else since, axis=1, return_inverse=True)
-        inverse = np.zeros(since.shape[1], int) if alike else inverse
+        columns, inverse = since[:, :1], np.zeros(since.shape[1], int)
+        if np.any(since != columns):
+            columns, inverse = np.unique(since, axis=1, return_inverse=True)
         out = np.empty((len(times), values.shape[1], values.shape[2]))
         for c in range(columns.shape[1]):
             mine = np.flatnonzero(inverse.ravel() == c)

@@ -17,7 +17,7 @@ from origami_sim.diagnose.refit import SLOWEST, Fit, Weights, whitened
 from origami_sim.effects import get
 
 CHUNK = 6
-"""Effects that share a program while screening: more compile longer, fewer compile more often."""
+"""Effects of which the suspects are simulated together."""
 
 SILENT = 0.3
 """Norm of a signature [standard deviations] below which a suspect at its largest admissible strength is not excited."""

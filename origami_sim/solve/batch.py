@@ -69,8 +69,8 @@ class Batch:
         except (ValueError, RuntimeError):
             known = ", ".join(d.alias for d in wp.get_devices())
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
-        off = [n for n in among if get(n).strengths or n in model.effects]
-        self.model, self.program = model, compose(tuple(dict.fromkeys([*off, *model.effects])), bool(among))
+        every = [*(n for n in among if get(n).strengths or n in model.effects), *model.effects]
+        self.model, self.program = model, compose(tuple(dict.fromkeys(every)), bool(among))
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         # rows a multiple of 4 KiB apart would all fall into one cache set
@@ -130,7 +130,7 @@ class Batch:
             constant(times, wp.float64),
             constant(values, wp.float64),
             constant([first.get(k, 0) for k in kept] or [0], wp.int32),
-            self._upload(self._acting(parameters), wp.int64),
+            self._upload(self._acting(parameters) if among else np.zeros((1, self.worlds), np.int64), wp.int64),
         ]
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = wp.zeros_like(self._x)

@@ -44,7 +44,7 @@ DENSE = 600
 """Up to so many degrees of freedom eigenvalues are found densely."""
 
 COMPACT = 150
-"""Up to so many degrees of freedom factors are found densely: sparse ones take three times as long."""
+"""Up to so many degrees of freedom factors are found densely: sparse ones take 2 to 10 times as long."""
 
 THREADED = 20000
 """Nodes of all worlds together below which starting a thread takes as long as the forces."""
