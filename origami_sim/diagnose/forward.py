@@ -38,17 +38,26 @@ from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import gradient_norms, stable_step
 
 CALM = 0.04
-"""Time at the start of a segment in which panels are damped [s].
+"""Time at the start of a segment in which panels are damped, at most [s].
 
 A segment starts with flat panels, because markers do not show how they bend. Real panels bend under their load; without
 the damping they would begin to ring. What is measured in that time is not compared.
 """
 
+SHORTER = (0.0, 1 / 8, 1 / 4, 1 / 2)
+"""Parts of that time of which the first is taken that does not change what follows."""
+
+UNSEEN = 0.5
+"""Norm of a change of all predictions, in standard deviations, that does not matter."""
+
 RATIO = 0.3
 """Damping of panels in that time, as a ratio of critical for each bar and bending line."""
 
-CAREFUL, TRUSTED = 3.0, 0.05
+CAREFUL, TRUSTED = 6.0, 0.05
 """A rate that was read from a recording is known within so many of its standard deviations, and such a part of it."""
+
+POSSIBLE = 2.0
+"""Standard deviations within which a rate that a window tells is possible."""
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
@@ -136,6 +145,7 @@ class Forward:
         segment: float | None = None,
         start: str = "fit",
         most: int | None = None,
+        calm: float = CALM,
         threads: int | None = None,
     ):
         self.subject, self.recordings, self.start, self.threads = subject, list(recordings), start, threads
@@ -146,7 +156,9 @@ class Forward:
         self._drives = [drive_of(r, self.drive) for r in self.recordings]
         self._given = np.array([f.start for f in subject.nominals])
         self._settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
+        self.calm = calm if self._settles else 0.0
         self._calm: dict[int, int] = {}
+        self._softly: dict[int, int] = {}  # softer panels ring for longer; what is compared does not change
         self._paths: dict[int, np.ndarray | None] = {}
         self._built: dict[tuple, tuple[Model, Parameters]] = {}
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
@@ -162,7 +174,8 @@ class Forward:
         values, noise = stacked(recording)
         step = float(np.median(np.diff(recording.times)))
         frames = len(recording.times) if segment is None else max(8, round(segment / step) + 1)
-        calm = self._calm[index] = min(int(np.ceil(CALM / step)), frames // 4) if self._settles else 0
+        calm = self._calm[index] = min(int(np.ceil(self.calm / step)), frames // 4)
+        self._softly[index] = min(int(np.ceil((CALM if self._settles else 0.0) / step)), frames // 4)
         firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1 - calm))
         if most is not None and len(firsts) > most:
             firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
@@ -324,6 +337,24 @@ class Forward:
         every = along_every_axis(told_apart(every, len(self.components)))
         return at_several_times(every, FASTEST * frame, longest)
 
+    def calming(self) -> float:
+        """The time for which panels must be damped so that longer makes no difference to what follows [s]."""
+        longest, theta = dict(self._calm), self._given[None]
+        starts = np.zeros((1, len(self.blocks), self.local))
+        if not self.calm:
+            return 0.0
+        damped = self.predict(Hypothesis(), theta, starts)
+        found = self.calm
+        for part in SHORTER:
+            self._calm = {r: int(np.ceil(part * frames)) for r, frames in longest.items()}
+            less = self.predict(Hypothesis(), theta, starts)
+            gap = [(a[0] - b[0])[longest[k.recording] + 1 :] for a, b, k in zip(damped, less, self.blocks, strict=True)]
+            if np.sum((np.concatenate(gap) / self.blocks[0].noise) ** 2) < UNSEEN**2:
+                found = part * self.calm
+                break
+        self._calm = longest
+        return found
+
     def soften(self) -> None:
         """Finds how much softer panels may be for derivatives: at most so much that the motion stays the same.
 
@@ -461,7 +492,7 @@ class Forward:
         chosen = stable_step(model, parameters)
         substeps = max(1, int(np.ceil(step / chosen.dt * (1 - 1e-12))))
         raw: list[np.ndarray] = []
-        calm = min(self._calm[r], frames - 1)
+        calm = min((self._calm if softness == 1.0 else self._softly)[r], frames - 1)
         if calm:
             quiet, damped = calmed(model, parameters)
             finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
@@ -806,29 +837,35 @@ def continuous(channels: np.ndarray, turning: np.ndarray, first: np.ndarray) -> 
 def local_line(
     times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window that grows while it fits."""
+    """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window.
+
+    The window grows while its cubic fits, and its rate is within what each smaller one left possible: what a cubic
+    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997).
+    """
     level, slope, error = np.full((3, values.shape[1]), np.nan)
     for d in range(values.shape[1]):
-        half = 4
-        while True:
+        half, low, high = 4, -np.inf, np.inf
+        while half <= 64 and half <= len(times):
             lo, hi = max(0, first - half), min(len(times), first + half + 1)
             if hi - lo < 2 * half and lo == 0:
                 hi = min(len(times), lo + 2 * half)
-            good = np.flatnonzero(np.isfinite(values[lo:hi, d])) + lo
-            if len(good) >= 6:
-                t = times[good] - times[first]
-                span = np.abs(t).max() or 1.0
-                design = np.vander(t / span, 4, increasing=True)
-                fit, *_ = np.linalg.lstsq(design, values[good, d], rcond=None)
-                scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
-                if np.isfinite(level[d]) and scatter > 1.5 * noise[d]:
-                    break
-                level[d], slope[d] = fit[0], fit[1] / span
-                error[d] = max(scatter, noise[d]) * np.linalg.norm(np.linalg.pinv(design)[1]) / span
-                if scatter > 1.5 * noise[d]:
-                    break
             half *= 2
-            if half > 64 or half > len(times):
+            good = np.flatnonzero(np.isfinite(values[lo:hi, d])) + lo
+            if len(good) < 6:
+                continue
+            t = times[good] - times[first]
+            span = np.abs(t).max() or 1.0
+            design = np.vander(t / span, 4, increasing=True)
+            fit, *_ = np.linalg.lstsq(design, values[good, d], rcond=None)
+            scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
+            doubt = max(scatter, noise[d]) * np.linalg.norm(np.linalg.pinv(design)[1]) / span
+            rate = fit[1] / span
+            bent = scatter > 1.5 * noise[d]
+            low, high = max(low, rate - POSSIBLE * doubt), min(high, rate + POSSIBLE * doubt)
+            if np.isfinite(level[d]) and (bent or low > high):
+                break
+            level[d], slope[d], error[d] = fit[0], rate, doubt
+            if bent:
                 break
     return level, slope, error
 

@@ -50,7 +50,8 @@ class Suspect:
     Attributes:
         effect: name in the catalogue. site: where, in words. kind: crease, panel, body, ground, drive or measurement.
         free: numbers to fit, the strength first.
-        entities: entities of the family; None for all. sites: at how many sites the effect is suspected in all.
+        entities: entities of the family; None for all. sites: of how many sites, equally likely, it is at
+            one.
         more: whether the model has the effect, and more or less of it is suspected.
     """
 
@@ -291,8 +292,16 @@ def suspects(
                 sites = sites[1:]
         for site, kind, entities in sites:
             free = tuple(_free(name, p, entities) for p in effect.fitted)
-            found.append(Suspect(name, site, kind, free, entities, len(sites)))
+            found.append(Suspect(name, site, kind, free, entities, _among(effect.family, sites, entities)))
     return found
+
+
+def _among(family: str, sites, entities) -> int:
+    """Of how many equally likely sites it is one. A recorder is as likely to be wrong as any of its channels is."""
+    single = sum(e is not None for *_, e in sites)
+    if family != "measurement" or not 0 < single < len(sites):
+        return len(sites)
+    return 2 if entities is None else 2 * single
 
 
 def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Suspect]:

@@ -20,6 +20,9 @@ from origami_sim.solve.timestep import stable_step
 GROWTH = 30.0
 """Growth of a difference in the start beyond which a segment is cut: below the time in which chaos takes over."""
 
+STEADY = 10.0
+"""The same for what begins at rest, beyond which it is cut at all: small errors of any model grow as much."""
+
 FRAMES = 400
 """Frames of a recording that are compared at least, if it has as many."""
 
@@ -93,6 +96,8 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
             "a segment needs frames to be compared", field="segment", value=o.segment, allowed=f">= {shortest:.3g} s"
         )
     start = o.start or ("fit" if o.segment is not None else starting(subject, recordings))
+    if start == "rest" and o.start is None and not steady(subject, recordings, whole, o.threads):
+        start = "fit"
     if start == "rest":  # later segments would not begin there
         return Forward(subject, recordings, start="rest", threads=o.threads)
     step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
@@ -103,7 +108,10 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forwa
         length = min(whole / count, max(o.steps * step / FEWEST, whole / 100))
         length = min(length, predictable(Forward(subject, recordings, segment=length, most=4, threads=o.threads)))
     most = max(FEWEST, int(o.steps * step / length)) // len(recordings)
-    return Forward(subject, recordings, segment=length, start="fit", most=max(1, most), threads=o.threads)
+    kept = {"segment": length, "start": "fit", "most": max(1, most), "threads": o.threads}
+    forward = Forward(subject, recordings, **kept)
+    calm = forward.calming()
+    return forward if calm == forward.calm else Forward(subject, recordings, calm=calm, **kept)
 
 
 def starting(subject: Subject, recordings: list[Recording]) -> str:
@@ -140,8 +148,16 @@ def _just_begun(times: np.ndarray, values: np.ndarray, noise: np.ndarray, refere
     return bool(np.all(calm & (error < 0.5 * fast)))
 
 
-def predictable(forward: Forward) -> float:
-    """Time over which a difference in the start grows less than GROWTH times [s]."""
+def steady(subject: Subject, recordings: list[Recording], whole: float, threads: int | None) -> bool:
+    """Whether a difference in the start hardly grows in a whole recording; where feet stand, that is not asked."""
+    forward = Forward(subject, recordings, segment=whole, threads=threads)
+    if forward.articulation.floating or not forward.articulation.size:
+        return True
+    return predictable(forward, STEADY) >= whole
+
+
+def predictable(forward: Forward, growth: float = GROWTH) -> float:
+    """Time over which a difference in the start grows less than so many times [s]."""
     m = forward.local
     local = np.zeros((m + 1, len(forward.blocks), m))
     for k in range(m):
@@ -153,7 +169,7 @@ def predictable(forward: Forward) -> float:
         moved = np.linalg.norm(np.nan_to_num(values[1:] - values[0], nan=np.inf), axis=2)  # [m, n]
         early = np.maximum.accumulate(moved, axis=1)
         first = np.maximum(early[:, max(2, len(block.times) // 20)], 1e-9)
-        beyond = np.any(moved > GROWTH * first[:, None], axis=0)
+        beyond = np.any(moved > growth * first[:, None], axis=0)
         shortest = min(shortest, block.times[np.argmax(beyond)] if np.any(beyond) else block.times[-1] + 1e-9)
     return max(float(shortest), 8 * float(np.median(np.diff(forward.recordings[0].times))))
 

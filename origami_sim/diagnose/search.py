@@ -151,7 +151,7 @@ def contest(
     return fits
 
 
-FAR = 4.0
+FAR = 2.0
 """Standard deviations from what was recorded beyond which a fitted start makes up for what the model lacks."""
 
 UNBENT = 3

@@ -1,6 +1,7 @@
 """Explanations by several effects: pairs that hide each other, further effects, and exchanges among them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -111,7 +112,7 @@ def further(
         return [], None
     top, found = left.signatures[0], distinct(left.signatures)
     structured = words.structure(best, best).repeated >= words.STRUCTURED
-    inexact = top.score**2 < words.INEXACT * (base.cost - best.cost)
+    inexact = top.score**2 < words.INEXACT * (base.cost - best.cost) and shares(best, top.suspect)
     told = look_elsewhere(left, o.draws, o.seed, small=words.SMALL) <= o.level and not inexact
     if told:  # at other sites, too
         found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
@@ -132,13 +133,26 @@ def further(
     return new, f if told else None
 
 
+def shares(best: Fit, s: Suspect) -> bool:
+    """Whether a further effect may be what inexact laws of an explanation leave.
+
+    What a law of a crease leaves acts at that crease. A recorder's errors have exact laws.
+    """
+    mechanisms = [t for t in best.hypothesis.suspects if t.kind != "measurement"]
+    apart = {"crease", "panel"}
+    return any(
+        s.kind != t.kind or s.kind not in apart or not distinct_sites(t, replace(s, effect=t.effect))
+        for t in mechanisms
+    )
+
+
 def stands_out(
     forward: Forward, base: Fit, best: Fit, f: Fit, screening: Screening, weights: Weights, o: Options
 ) -> bool:
     """Whether a further effect is told by the weights of the fit with it; in others, what it explains is noise."""
     new = weights_from(forward, [f])
     none, less, all_ = (g.reweighted(weights, new) for g in (base, best, f))
-    if less.cost - all_.cost < words.INEXACT * (none.cost - less.cost):
+    if less.cost - all_.cost < words.INEXACT * (none.cost - less.cost) and shares(best, f.hypothesis.suspects[-1]):
         return False
     left = again(reweighted(screening, none, weights, new), less)
     if not left.signatures or look_elsewhere(left, o.draws, o.seed, small=words.SMALL) > o.level:

@@ -33,7 +33,7 @@ EFFECT = Effect(
     memory=(Memory("z"),),
     parameters=(
         Parameter("hysteresis_moment", "Mh", "N m", 0.0, (0.0, math.inf), "half height of the loop", typical=1e-4),
-        Parameter("yield_angle", "s0", "rad", 0.1, (1e-3, 3.0), "moment over slope after a reversal", typical=0.1),
+        Parameter("yield_angle", "s0", "rad", 0.1, (0.03, 3.0), "moment over slope; below: dry friction", typical=0.1),
         Parameter("sharpness", "n", "-", 1.0, (1.0, 20.0), "1 round; large: the corners of dry friction", typical=1.0),
     ),
     fitted=("hysteresis_moment", "yield_angle"),

@@ -15,8 +15,8 @@ from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import read_recording
 from origami_sim.scene import scene_module, scene_settings
 
-RIGIDITY = 6e4
-"""Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.01 mm."""
+RIGIDITY = 2e5
+"""Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.003 mm."""
 
 LOSS = 0.1
 """Part of critical damping of a foot on the ground."""

@@ -14,7 +14,7 @@ from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnosis import REVERSAL
 from origami_sim.diagnose.forward import calmed
-from origami_sim.diagnose.hypothesis import Hypothesis, distinct_sites, suspects
+from origami_sim.diagnose.hypothesis import Hypothesis, Suspect, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, again, screen
@@ -522,6 +522,33 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
     for drives in ([driven, Drive()], [Drive(), driven]):  # whichever recording has it
         turned = SimpleNamespace(_drives=drives, recordings=2 * forward.recordings)
         assert varying_drive(turned) == ("field_z", "drive field_z")
+
+
+def test_a_recorder_is_as_likely_to_be_wrong_as_any_of_its_channels_is(rubbing):
+    forward = rubbing[0]
+    counts = {
+        s.site: s.sites for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "angle_scale"
+    }
+    channels = len(counts) - 1
+    assert channels > 1 and counts.pop("the measurement") == 2 and set(counts.values()) == {2 * channels}
+
+
+@pytest.mark.parametrize(
+    ("there", "further", "may"),
+    [
+        (("crease", (0,)), ("crease", (0,)), True),
+        (("crease", (0,)), ("crease", (1,)), False),
+        (("crease", (0,)), ("crease", None), True),
+        (("crease", (0,)), ("panel", (1,)), True),
+        (("crease", (0,)), ("drive", None), True),
+        (("drive", None), ("crease", (1,)), True),
+        (("measurement", None), ("crease", (1,)), False),
+        (("measurement", (0,)), ("measurement", None), False),
+    ],
+)
+def test_what_an_inexact_law_leaves_acts_where_it_does(there, further, may):
+    one, two = (Suspect("x", "somewhere", kind, (), entities) for kind, entities in (there, further))
+    assert several.shares(SimpleNamespace(hypothesis=Hypothesis((one,))), replace(two, effect="y")) == may
 
 
 def test_one_number_cannot_have_two_values():

@@ -58,12 +58,12 @@ def loss(angles, moment):
 
 
 def test_dry_friction_sticks_slides_and_loses_the_area_of_its_loop():
-    mf, s0, a = 0.3, 0.05, 0.6
-    angles = path(0.0, a, -a, a, step=0.01)
+    mf, s0, a = 0.3, 0.03, 0.36
+    angles = path(0.0, a, -a, a, step=0.006)
     m = moments(["crease_friction"], under("crease_friction", friction_moment=mf, yield_angle=s0), angles)
     assert m[:6] == pytest.approx(-mf * angles[:6] / s0, abs=1e-13)
     assert m[6:61] == pytest.approx(-mf, abs=1e-13)
-    assert m[61:72] == pytest.approx(-mf + mf * np.arange(1, 12).clip(max=10) * 0.01 / s0, abs=1e-12)
+    assert m[61:72] == pytest.approx(-mf + mf * np.arange(1, 12).clip(max=10) * 0.006 / s0, abs=1e-12)
     cycle = slice(60, None)
     assert loss(angles[cycle], m[cycle]) == pytest.approx(4 * mf * (a - s0), rel=1e-12)
 
@@ -123,9 +123,9 @@ def test_round_hysteresis_follows_its_closed_form_with_second_order():
 
 def test_sharp_hysteresis_is_dry_friction_and_every_loop_loses_energy():
     angles = path(0.0, 0.5, -0.3, 0.4, -0.5, 0.5, step=0.002)
-    values = under("crease_hysteresis", hysteresis_moment=0.3, yield_angle=0.05, sharpness=20.0)
+    values = under("crease_hysteresis", hysteresis_moment=0.3, yield_angle=0.03, sharpness=20.0)
     m = moments(["crease_hysteresis"], values, angles)
-    dry = moments(["crease_friction"], under("crease_friction", friction_moment=0.3, yield_angle=0.05), angles)
+    dry = moments(["crease_friction"], under("crease_friction", friction_moment=0.3, yield_angle=0.03), angles)
     assert np.abs(m - dry).max() < 0.1 * 0.3  # rounded within a tenth at the corner
     assert loss(angles, m) == pytest.approx(loss(angles, dry), rel=0.02)
     for sharpness in (1.0, 2.0, 5.0):

@@ -3,7 +3,7 @@
 import json
 import sys
 from importlib import import_module
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -56,6 +56,20 @@ def test_period_of_a_flap(truth):
     motion = truth["world"].World(o).run({}, [0.2], duration=2.0)
     expected = 2 * np.pi * np.sqrt(inertia(o) / o["creases"][0]["stiffness"])
     assert np.diff(crossings(motion)).mean() == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_strip_in_a_field_is_of_second_order_in_the_step(truth, monkeypatch):
+    world = truth["world"]
+    o = truth["objects"].draw("magnetic_strip", np.random.default_rng(2))
+    for c in o["creases"]:
+        c["viscosity"] = 2e-6
+    field = {"field": {"amplitude": 0.02, "frequency": 3.0, "axis": [1.0, 0.0, 0.0]}}
+    found = []
+    for every in (4, 8, 16):
+        monkeypatch.setattr(world, "STEP", 1.0 / world.FINE / every)
+        found.append(world.World(o).run(field, [0.5, -0.4, 0.3], duration=0.5).angles)
+    a, b = (np.abs(x - y).max() for x, y in pairwise(found))
+    assert np.log2(a / b) == pytest.approx(2.0, abs=0.1)
 
 
 def test_dry_friction_takes_the_same_angle_from_every_swing(truth):
