@@ -131,11 +131,12 @@ class Forward:
     Attributes:
         blocks: the segments. local: number of local numbers of each segment (start coordinates, then rates).
         components: names of the D components. softness: of panels where only derivatives are asked for.
+        calm: time for which panels are damped at the start of a segment [s].
         separate: whether a segment is predicted without those before it, so that few of them take less time.
         shared: effects of the program that all hypotheses share: compiling one for each took longer than running them.
     """
 
-    softness, separate = 1.0, True
+    softness, calm, separate = 1.0, 0.0, True
 
     def __init__(
         self,

@@ -91,7 +91,7 @@ def digest(forward: Forward, hypothesis, theta, local, wanted: Sequence[int], so
     effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
     sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
     numbers = [f.name for f in forward.subject.nominals]
-    kind = (type(forward).__name__, forward.start, forward.softness, numbers, soft)
+    kind = (type(forward).__name__, forward.start, forward.softness, forward.calm, numbers, soft)
     h = hashlib.sha256(repr((_sources(), kind, effects, sites, wanted)).encode())
     nominal = np.array([f.start for f in forward.subject.nominals])
     model, parameters = forward._world(Hypothesis(), nominal, ())

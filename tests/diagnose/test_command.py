@@ -259,7 +259,7 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded):
         (Hypothesis(), theta, local),
         (Hypothesis(), theta * 2, local),
         (Hypothesis(), theta, local + 1e-3),
-        (Hypothesis((friction,)), np.array([[2e-4, 1e-3]]), local),
+        (Hypothesis((friction,)), np.array([[2e-4, 1e-3, 0.01]]), local),
     ]
     import origami_sim.diagnose.keep as module_
 
@@ -274,6 +274,10 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded):
             file.write_bytes(file.read_bytes()[:100])
         remembered.predict(*asked[0])
         assert keep.computed == len(asked) + 1
+        brief = Forward(subject, [recording], segment=0.5, calm=0.01)
+        keep.follow(brief)
+        brief.predict(*asked[0])
+        assert keep.computed == len(asked) + 2
     finally:
         module_.WORTH = worth
 
