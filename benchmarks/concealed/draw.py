@@ -30,6 +30,7 @@ from rigid import RigidCase, entry
 from rivals import ALIKE, APART, PAIRS, TIED, Pair, apart, changed, overlap, proposed
 from scipy.optimize import lsq_linear
 from strata import PROPORTIONS, stratum
+from world import Unstable
 
 LEVELS = (2.0, 5.0, 10.0, 20.0, 50.0)
 STRUCTURES = (*objects.STRUCTURES, *beam.STRUCTURES, *coupon.STRUCTURES)
@@ -353,7 +354,7 @@ def drawn(kind: str, cell: tuple, rng: np.random.Generator) -> tuple[Case, dict,
             if kind == "double":
                 return doubled(*cell, rng)
             return null(*cell, rng) if kind == "null" else single(*cell, rng, outside=kind == "outside")
-        except Unsuited as error:
+        except (Unsuited, Unstable) as error:
             why = error
     raise Unsuited(f"{kind} {cell}: {why}")
 

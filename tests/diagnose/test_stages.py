@@ -655,7 +655,7 @@ def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
         fresh, _ = experiment.separation(made, rival, weights)
         _, known = experiment.separation(made, base, weights)
         again, _ = experiment.separation(made, rival, weights, known)
-        assert again == pytest.approx(fresh, abs=0.26), what  # measured: 0.01, 0.25, 0.18 of 1.1, 0.4, 0.7
+        assert 0.7 < again / fresh < 1.5, what  # they are those under another explanation
 
 
 def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_acts(rubbing):

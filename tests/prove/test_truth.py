@@ -72,6 +72,13 @@ def test_a_strip_in_a_field_is_of_second_order_in_the_step(truth, monkeypatch):
     assert np.log2(a / b) == pytest.approx(2.0, abs=0.1)
 
 
+def test_a_truth_that_flies_off_is_not_recorded(truth, monkeypatch):
+    monkeypatch.setattr(truth["world"], "FASTEST", 1.0)
+    monkeypatch.setattr(truth["draw"], "ATTEMPTS", 2)
+    with pytest.raises(truth["draw"].Unsuited, match="rates of"):
+        truth["draw"].drawn("single", (5.0, "eccentric_weight", "crawler"), np.random.default_rng(0))
+
+
 def test_dry_friction_takes_the_same_angle_from_every_swing(truth):
     # Coulomb: the amplitude falls by 4 M / K per period
     o, moment = flap(truth), 4e-7
