@@ -100,7 +100,7 @@ def draw(structure: str, rng: np.random.Generator) -> dict:
         "magnets": [],
         "priors": {"crease.stiffness": 0.05, "crease_viscosity.viscosity": 0.3, "inertia.mass": 0.02},
         "duration": 4.0,
-        "rate": int(rng.choice([120, 240])),
+        "rate": int(rng.choice([120, 240, 1000])),
         "noise": float(np.exp(rng.uniform(np.log(3e-3), np.log(8e-3)))),
     }
     if structure == "crawler":

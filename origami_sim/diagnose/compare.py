@@ -14,9 +14,13 @@ from scipy.optimize import lsq_linear
 
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Hypothesis
 from origami_sim.diagnose.refit import Fit, Weights
+from origami_sim.recording import Recording
 
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
+
+LEVEL = 0.02
+"""Relative difference up to which two drives are of one level."""
 
 SIMPLER = 1.0
 """Log evidence that a number beside an effect's strength costs at least."""
@@ -82,12 +86,34 @@ def effective_samples(forward, fit: Fit, weights: Weights) -> float:
 
 
 def folds(forward, blocks: Sequence[int]) -> list[list[int]]:
-    """Positions (within `blocks`) of each fold: whole recordings, or contiguous stretches of a single one."""
+    """Positions (within `blocks`) of each fold: whole recordings, or contiguous stretches of a single one.
+
+    Recordings of one drive level are left out together, if there are others: repeats tell what they are to predict.
+    """
     recordings = [forward.blocks[b].recording for b in blocks]
     distinct = sorted(set(recordings))
-    if len(distinct) > 1:
-        return [[n for n, r in enumerate(recordings) if r == d] for d in distinct]
-    return stretches(forward, blocks)
+    if len(distinct) == 1:
+        return stretches(forward, blocks)
+    levels: list[list[int]] = []
+    for d in distinct:
+        own = forward.recordings[d]
+        near = next((e for e in levels if same_level(forward.recordings[e[0]], own)), None)
+        if near is None:
+            levels.append([d])
+        else:
+            near.append(d)
+    apart = levels if len(levels) > 1 else [[d] for d in distinct]
+    return [[n for n, r in enumerate(recordings) if r in level] for level in apart]
+
+
+def same_level(a: Recording, b: Recording) -> bool:
+    """Whether two recordings have the same drives, each as strong (within `LEVEL`); without a drive, never."""
+
+    def size(r: Recording) -> dict[str, float]:
+        return {n: float(np.abs(c.values).max(initial=0.0)) for n, c in r.drive.items()}
+
+    one, other = size(a), size(b)
+    return bool(one) and one.keys() == other.keys() and all(np.isclose(one[n], other[n], LEVEL, 0.0) for n in one)
 
 
 def stretches(forward, blocks: Sequence[int]) -> list[list[int]]:

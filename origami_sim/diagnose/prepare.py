@@ -1,6 +1,7 @@
 """What is compared: recordings thinned and cut into segments, and the model without any effect fitted to them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import Fit, Weights, carried_on, fit
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.recording import Recording
+from origami_sim.recording import Channel, Recording
+from origami_sim.recording.wild import wild_frames
 from origami_sim.solve.timestep import stable_step
 
 GROWTH = 30.0
@@ -22,6 +24,9 @@ GROWTH = 30.0
 
 STEADY = 10.0
 """The same for what begins at rest, beyond which it is cut at all: small errors of any model grow as much."""
+
+EVEN = 1.5
+"""Factor between a time step and the median one up to which frames are averaged over it."""
 
 FRAMES = 400
 """Frames of a recording that are compared at least, if it has as many."""
@@ -49,7 +54,7 @@ def among(every: Sequence[Suspect], catalogue: Sequence[str]) -> list[Suspect]:
 
 
 def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
-    """The recordings, thinned to about `rate` frames per second, but to no fewer than FRAMES frames.
+    """The recordings without wild frames, thinned to about `rate` frames per second, but to no less than FRAMES frames.
 
     Raises:
         InputError: none, different channels, too few frames.
@@ -75,13 +80,70 @@ def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
                 allowed=f"at least {fewest}",
             )
         every = int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6)
-        out.append(thinned(r, max(1, min(every, len(r.times) // FRAMES))))
+        out.append(thinned(tamed(r), max(1, min(every, len(r.times) // FRAMES))))
     return out
 
 
+def tamed(recording: Recording) -> Recording:
+    """The recording without wild frames, of which a note tells; load steps have no course to be far off from."""
+    channels, notes = dict(recording.channels), []
+    for name, c in recording.channels.items() if not recording.by_step else ():
+        wild = wild_frames(recording.times, c.values, c.noise)
+        if not wild.any():
+            continue
+        values = np.where(wild if c.values.ndim == 1 else wild[:, None], np.nan, c.values)
+        channels[name] = replace(c, values=values)
+        when, count = f"at t = {recording.times[np.argmax(wild)]:.6g} s", np.count_nonzero(wild)
+        notes.append(f"{recording.name}: a wild frame of channel '{name}' is left out, {when}.")
+        if count > 1:
+            notes[-1] = f"{recording.name}: {count} wild frames of channel '{name}' are left out, the first {when}."
+    if not notes:
+        return recording
+    known = recording.metadata.get("notes", ())
+    return replace(recording, channels=channels, metadata={**recording.metadata, "notes": [*known, *notes]})
+
+
 def thinned(recording: Recording, every: int) -> Recording:
-    """One frame of so many."""
-    return recording if every <= 1 else recording.only(slice(None, None, every))
+    """One frame of so many, each the mean of those around it, as far as half way to the next."""
+    if every <= 1:
+        return recording
+    out = recording.only(slice(None, None, every))
+    steps = np.diff(recording.times)
+    even = (steps < EVEN * np.median(steps)) & (steps > np.median(steps) / EVEN)
+    return replace(out, channels={n: averaged(c, every, even) for n, c in recording.channels.items()})
+
+
+def averaged(channel: Channel, every: int, even: np.ndarray) -> Channel:
+    """A channel thinned by means over frames, with its noise.
+
+    A mean over a bend is off by its second derivative times (w^2 - 1) / 24 for w frames, which the means beside it
+    tell. What lies at a gap, and the first and last frame, stays as it was read.
+
+    Args:
+        even: (n - 1,) which steps in time are as usual.
+    """
+    n, half = len(channel.values), (every - 1) // 2
+    width, at = 2 * half + 1, np.arange(0, n, every)
+    if half == 0 or len(at) < 3:
+        return replace(channel, values=channel.values[::every])
+    values = channel.values.reshape(n, -1)
+    around = at[1:-1, None] + np.arange(-half, half + 1)
+    means = np.concatenate([values[:1], values[np.minimum(around, n - 1)].mean(axis=1), values[at[-1:]]])
+    bend = (width**2 - 1) / (24.0 * every**2)
+    inner = means[1:-1] - bend * (means[2:] - 2.0 * means[1:-1] + means[:-2])
+    odd = np.concatenate([[0], np.cumsum(~even)])  # odd steps before each frame
+    first, last = np.maximum(at[:-2] - half, 0), np.minimum(at[2:] + half, n - 1)
+    whole = (odd[first] == odd[last])[:, None] & np.isfinite(inner)
+    out = values[at]
+    out[1:-1] = np.where(whole, inner, out[1:-1])
+    report = channel.noise_report
+    alike = float(np.clip(np.nan_to_num(report.lag_1), 0.0, 1.0)) if report is not None else 0.0
+    part = np.hypot(1.0 + 2.0 * bend, np.sqrt(2.0) * bend) * np.sqrt((1.0 + 2.0 * alike * (1.0 - 1.0 / width)) / width)
+    count = report.quantum / np.sqrt(12.0) if report is not None else 0.0
+    noise = min(channel.noise, max(channel.noise * part, count))
+    if report is not None and channel.noise == report.level:  # it was read from the data, and still is
+        report = replace(report, level=noise)
+    return replace(channel, values=out.reshape(len(at), *channel.values.shape[1:]), noise=noise, noise_report=report)
 
 
 def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forward:

@@ -14,6 +14,7 @@ from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted
 from origami_sim.diagnose.search import NEAR, contest, distinct, finished, leader, look_elsewhere, refit, roughly
+from origami_sim.effects import get
 
 MORE = 4.0
 """Times as much as a signature promises that a fit is thought to gain, at most."""
@@ -79,6 +80,9 @@ def _counterpart(screening: Screening, found: Signature) -> Signature:
 RIVALS = 3
 """Further effects that are tried at a time."""
 
+SAME, OTHER = 0.7, 0.5
+"""Parts of the best further suspect's squared score from which on the same effect at other sites, and others, count."""
+
 
 def combine(forward, fits, scores, screening: Screening, weights, o: Options, tell) -> list[Fit]:
     """Adds effects to the best explanation while held-out data ask for it, and exchanges each of several."""
@@ -114,36 +118,47 @@ def further(
     structured = words.structure(best, best).repeated >= words.STRUCTURED
     inexact = top.score**2 < words.INEXACT * (base.cost - best.cost) and shares(best, top.suspect)
     told = look_elsewhere(left, o.draws, o.seed, small=words.SMALL) <= o.level and not inexact
-    if told:  # at other sites, too
-        found = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > 0.7 * top.score**2]
-    elif not structured:
+    if not (told or structured):
         return [], None
-    made = {g.suspect.label: _made(fits, (*best.hypothesis.suspects, g.suspect)) for g in found[:RIVALS]}
-    new = contest(forward, best, [g for g in found[:RIVALS] if not made[g.suspect.label]], screening, weights)[1:]
-    new = [f for f in new if not f.failed]
-    tried = [*new, *(f for f in made.values() if f is not None and not f.failed)]
-    if not tried:
-        return [], None
-    scores |= {id(f): score(forward, f, weights) for f in new}
-    f = max(tried, key=lambda f: scores[id(f)].evidence)
-    if told:
-        told = better(scores[id(f)], scores[id(best)])
-    else:
-        told = stands_out(forward, base, best, f, screening, weights, o)
-    return new, f if told else None
+    turns = [found]
+    if told:  # the best one at other sites, too; if none of them will do, what scores nearly as much
+        same = [g for g in found if g.suspect.effect == top.suspect.effect and g.score**2 > SAME * top.score**2]
+        turns = [same, [g for g in found if g not in same and g.score**2 > OTHER * top.score**2]]
+    new: list[Fit] = []
+    for turn in turns:
+        made = {g.suspect.label: _made(fits, (*best.hypothesis.suspects, g.suspect)) for g in turn[:RIVALS]}
+        fresh = contest(forward, best, [g for g in turn[:RIVALS] if not made[g.suspect.label]], screening, weights)[1:]
+        fresh = [f for f in fresh if not f.failed]
+        tried = [*fresh, *(f for f in made.values() if f is not None and not f.failed)]
+        new += fresh
+        if not tried:
+            continue
+        scores |= {id(f): score(forward, f, weights) for f in fresh}
+        f = max(tried, key=lambda f: scores[id(f)].evidence)
+        if told:
+            asked = better(scores[id(f)], scores[id(best)])
+        else:
+            asked = stands_out(forward, base, best, f, screening, weights, o)
+        if asked:
+            return new, f
+    return new, None
 
 
 def shares(best: Fit, s: Suspect) -> bool:
     """Whether a further effect may be what inexact laws of an explanation leave.
 
-    What a law of a crease leaves acts at that crease. A recorder's errors have exact laws.
+    What a law of a crease leaves acts at that crease, and what a law that keeps the energy leaves keeps it. A
+    recorder's errors have exact laws.
     """
     mechanisms = [t for t in best.hypothesis.suspects if t.kind != "measurement"]
     apart = {"crease", "panel"}
-    return any(
-        s.kind != t.kind or s.kind not in apart or not distinct_sites(t, replace(s, effect=t.effect))
-        for t in mechanisms
-    )
+
+    def beside(t: Suspect) -> bool:
+        elsewhere = s.kind == t.kind and s.kind in apart and distinct_sites(t, replace(s, effect=t.effect))
+        a, b = get(s.effect), get(t.effect)
+        return elsewhere or (a.conservative and b.dissipates) or (a.dissipates and b.conservative)
+
+    return any(not beside(t) for t in mechanisms)
 
 
 def stands_out(

@@ -29,7 +29,7 @@ from origami_sim.recording.units import quantity
 FLOOR = 1.3
 """Residual over the noise up to which a fit counts as down to the noise (a noise estimate is good to some 20 %)."""
 
-STRUCTURED = 3.0
+STRUCTURED = 2.5
 """Slow structure of a residual, in standard deviations of what noise gives, from which on something is missing."""
 
 INEXACT = 0.06

@@ -186,6 +186,11 @@ class Effect:
         return tuple(d for d in DRIVES if d in self.arguments or d in self.energy_arguments)
 
     @property
+    def dissipates(self) -> bool:
+        """Whether it is a loss in a crease or in the air that goes with the rate and remembers nothing."""
+        return not (self.conservative or self.memory or self.drives or self.family in (*CONTACTS, *DISTORTIONS))
+
+    @property
     def interacts(self) -> bool:
         """Whether its entities act on each other."""
         return bool({"stray", "stray_gradient"} & {*self.arguments, *self.energy_arguments})

@@ -125,7 +125,7 @@ def _named(explanations: list, names: set[str]) -> bool:
 
 _CONCEALED = ("case", "kind", "null", "structure", "mechanism", "site", "d_wanted", "d")
 _OUTCOMES = ("top1", "inside", "wrong", "blamed", "alarm", "found_site", "covered", "unknown", "correct")
-_OUTCOMES += ("double", "said")
+_OUTCOMES += ("double", "said", "placed")
 _NUMBERS = (
     "seen",
     "removed",
@@ -150,8 +150,9 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
             `separating` experiment or the `suggested` one.
 
     Returns: a row with `verdict`, `top` (named mechanism or verdict), and True, False or None (does not apply) for
-        `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently), `blamed` (one explanation is named, and
-        it is not the truth), `alarm`, `found_site`, `covered`,
+        `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently, also of what says that nothing is
+        missing), `blamed` (one explanation is named, and it is not the truth), `alarm`, `found_site` (where the effect
+        is right), `placed` (the same, right or not), `covered`,
         `unknown`, `double`, `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
         is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
@@ -202,15 +203,17 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         row["unknown"] = verdict == "UNKNOWN"
         right = contains
         row["seen"] = _seen(answer, found)
-    row["wrong"] = bool(explanations) and probability >= SURE and not right and not nothing
+    row["wrong"] = verdict != "UNKNOWN" and probability >= SURE and not right and not nothing
     row["blamed"] = not right if len(explanations) == 1 else None
     row["correct"] = bool(right) if explanations else None
     row["where"] = explanations[0][0][1] if explanations else ""
     _errors(row, found)
     if answer.get("onset") is not None and found.get("onset") is not None and "rate" in found:
         row["onset"] = (found["onset"] - answer["onset"]) * found["rate"]
+    if kind == "single" and answer["site"]:
+        row["placed"] = row["where"] == answer["site"]
+        row["found_site"] = row["placed"] if row["top1"] else None
     if kind == "single" and row["top1"]:
-        row["found_site"] = row["where"] == answer["site"] if answer["site"] else None
         _strength(row, answer, found)
     return row
 
@@ -276,6 +279,7 @@ TARGETS: dict[str, tuple[str, tuple[float, float] | None]] = {
     "blamed": ("wrong where one explanation is named", None),
     "alarm": ("false alarms on nulls", (0.0, 0.05)),
     "found_site": ("site, where named, d' >= 5", (0.95, 1.0)),
+    "placed": ("site, named or not, d' >= 5", (0.95, 1.0)),
     "onset": (f"onset within {SOON:g} frames", (0.90, 1.0)),
     "covered": ("95 % intervals that cover", (0.90, 0.98)),
     "unknown": ("UNKNOWN recall outside", (0.85, 1.0)),
@@ -303,6 +307,7 @@ def scores(rows: Sequence[dict]) -> dict:
         "blamed": told("blamed", rows),
         "alarm": told("alarm", rows),
         "found_site": told("found_site", clear),
+        "placed": told("placed", clear),
         "onset": [abs(r["onset"]) <= SOON for r in rows if r["onset"] is not None],
         "covered": told("covered", clear),
         "unknown": [bool(r["unknown"]) for r in rows if r["kind"] == "outside"],
@@ -456,7 +461,7 @@ def text_of(board: dict) -> str:
     lines += ["", "concealed -> named"]
     for truth, named in board["confusion"].items():
         lines.append(f"    {truth:24s} " + ", ".join(f"{n} {k}" for n, k in sorted(named.items(), key=lambda v: -v[1])))
-    wrong = [r for r in board["rows"] if r["failed"] or r["wrong"] or r["alarm"] or False in (r["top1"], r["said"])]
+    wrong = [r for r in board["rows"] if r["failed"] or r["wrong"] or r["alarm"] or False in _wanted(r)]
     if wrong:
         lines += ["", "cases that went wrong"]
     for r in wrong:
@@ -466,6 +471,11 @@ def text_of(board: dict) -> str:
             f"{r.get('where', '')} p = {r['probability']:.2f}"
         )
     return "\n".join(lines) + "\n"
+
+
+def _wanted(r: dict) -> tuple:
+    """What should be true of a case, by its kind."""
+    return r["top1"], r["said"], r["double"], r["unknown"] if r["kind"] == "outside" else None
 
 
 def _counted(p: dict) -> str:

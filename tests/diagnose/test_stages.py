@@ -24,6 +24,7 @@ from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import State, dihedral_angles
+from origami_sim.recording import Channel, NoiseReport, Recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from tests.diagnose.strips import hanging, record, subject
@@ -445,6 +446,48 @@ def test_frames_are_thinned_but_not_below_what_a_comparison_needs():
     assert len(half.times) == pytest.approx(len(long.times) / 2, abs=1)
 
 
+def test_thinned_frames_are_means_that_follow_a_bend():
+    """Noise falls with the root of the frames, the motion stays, and what cannot be averaged stays as it was read."""
+    t, rng = np.arange(4001) / 1000.0, np.random.default_rng(2)
+    swing = 0.7 * np.sin(2 * np.pi * 6.0 * t)
+
+    def thin(values, times=t, **report):
+        noise = 0.01
+        known = NoiseReport(noise, noise, 0.0, 0.0, noise, np.nan, np.nan, 0)
+        channel = Channel("a", "crease_angle", values, "rad", noise, noise_report=replace(known, **report))
+        (out,) = prepared([Recording("r", times, {"a": channel})], 200.0)
+        return out
+
+    exact = thin(swing)
+    assert np.array_equal(exact.times, t[::5])
+    assert exact.channels["a"].values == pytest.approx(swing[::5], abs=5e-6)  # a plain mean is off by 1e-3
+    noisy = thin(swing + rng.normal(0.0, 0.01, 4001)).channels["a"]
+    left = (noisy.values - swing[::5])[1:-1]
+    assert np.std(left) == pytest.approx(noisy.noise, rel=0.08) and noisy.noise < 0.5 * 0.01
+    assert abs(np.mean(left[1:] * left[:-1])) < 0.15 * np.var(left)
+    assert noisy.noise_report.level == noisy.noise
+    assert thin(swing, lag_1=0.6).channels["a"].noise > 1.4 * noisy.noise
+    assert thin(swing, quantum=0.03).channels["a"].noise == pytest.approx(0.03 / np.sqrt(12.0))
+    gap = np.where(t > 2.0, t + 0.5, t)
+    holed = np.where(np.arange(4001) == 1001, np.nan, swing)
+    for values, times in ((swing, gap), (holed, t)):
+        assert thin(values, times).channels["a"].values == pytest.approx(swing[::5], abs=5e-6)
+
+
+def test_wild_frames_are_left_out_and_told():
+    t = np.arange(800) / 120.0
+    values = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1)
+    values[[100, 300]] += 0.5
+    made = Recording("r", t, {"m": Channel("m", "marker_2d", values, "m", 1e-3)}, metadata={"notes": ["known."]})
+    (found,) = prepared([made], 200.0)
+    assert np.flatnonzero(np.isnan(found.channels["m"].values).all(axis=1)).tolist() == [100, 300]
+    assert found.metadata["notes"] == [
+        "known.", "r: 2 wild frames of channel 'm' are left out, the first at t = 0.833333 s."
+    ]  # fmt: skip
+    curve = replace(made, metadata={"time_base": "step"})
+    assert prepared([curve], 200.0)[0].channels["m"].values is values
+
+
 def test_a_segment_that_is_asked_for_has_a_start_of_its_own(monkeypatch):
     monkeypatch.setattr(prepare, "starting", lambda *_: "rest")
     at_rest = record(**SMALL)
@@ -536,19 +579,57 @@ def test_a_recorder_is_as_likely_to_be_wrong_as_any_of_its_channels_is(rubbing):
 @pytest.mark.parametrize(
     ("there", "further", "may"),
     [
-        (("crease", (0,)), ("crease", (0,)), True),
-        (("crease", (0,)), ("crease", (1,)), False),
-        (("crease", (0,)), ("crease", None), True),
-        (("crease", (0,)), ("panel", (1,)), True),
-        (("crease", (0,)), ("drive", None), True),
-        (("drive", None), ("crease", (1,)), True),
-        (("measurement", None), ("crease", (1,)), False),
-        (("measurement", (0,)), ("measurement", None), False),
+        (("crease_stiffening", "crease", (0,)), ("crease_offset", "crease", (0,)), True),
+        (("crease_stiffening", "crease", (0,)), ("crease_offset", "crease", (1,)), False),
+        (("crease_stiffening", "crease", (0,)), ("crease_offset", "crease", None), True),
+        (("crease_stiffening", "crease", (0,)), ("eccentric_weight", "panel", (1,)), True),
+        (("crease_stiffening", "crease", (0,)), ("field_lag", "drive", None), True),
+        (("field_lag", "drive", None), ("crease_offset", "crease", (1,)), True),
+        (("angle_offset", "measurement", None), ("crease_offset", "crease", (1,)), False),
+        (("angle_offset", "measurement", (0,)), ("angle_scale", "measurement", None), False),
+        # what keeps the energy leaves what keeps it, and a loss leaves losses; friction may stick like a spring
+        (("tether", "panel", (1,)), ("crease_quadratic_damping", "crease", None), False),
+        (("air_drag", "panel", None), ("crease_stiffening", "crease", None), False),
+        (("air_drag", "panel", None), ("crease_quadratic_damping", "crease", None), True),
+        (("tether", "panel", (1,)), ("crease_friction", "crease", None), True),
     ],
 )
-def test_what_an_inexact_law_leaves_acts_where_it_does(there, further, may):
-    one, two = (Suspect("x", "somewhere", kind, (), entities) for kind, entities in (there, further))
-    assert several.shares(SimpleNamespace(hypothesis=Hypothesis((one,))), replace(two, effect="y")) == may
+def test_what_an_inexact_law_leaves_acts_where_it_does_and_as_it_does(there, further, may):
+    one, two = (Suspect(effect, "somewhere", kind, (), entities) for effect, kind, entities in (there, further))
+    assert several.shares(SimpleNamespace(hypothesis=Hypothesis((one,))), two) == may
+
+
+def test_where_the_best_further_effect_is_no_gain_those_near_it_are_tried(monkeypatch):
+    """What has half of its squared score: the tilt, which then is a gain, but not what scores less."""
+    scores = {"weak at 1": 10.0, "weak at 2": 9.0, "tilt": -8.0, "weak at 3": 2.0, "other": 6.0}
+    found = [SimpleNamespace(suspect=SimpleNamespace(label=n, effect=n.split()[0]), score=v) for n, v in scores.items()]
+
+    def explanation(*labels):
+        suspects = tuple(SimpleNamespace(label=n) for n in labels)
+        return SimpleNamespace(hypothesis=SimpleNamespace(suspects=suspects), failed=False, cost=50.0)
+
+    tried = []
+
+    def contest(forward, best, signatures, *_):
+        tried.append([g.suspect.label for g in signatures])
+        return [best, *(explanation("first", label) for label in tried[-1])]
+
+    monkeypatch.setattr(several, "again", lambda *_: SimpleNamespace(signatures=found))
+    monkeypatch.setattr(several, "contest", contest)
+    monkeypatch.setattr(several, "shares", lambda *_: False)
+    monkeypatch.setattr(several, "look_elsewhere", lambda *_, **__: 0.001)
+    monkeypatch.setattr(several.words, "structure", lambda *_: SimpleNamespace(repeated=0.0))
+    monkeypatch.setattr(
+        several,
+        "score",
+        lambda forward, f, _: SimpleNamespace(evidence=1.0, label=f.hypothesis.suspects[-1].label),
+    )
+    monkeypatch.setattr(several, "better", lambda a, b: a.label == "tilt")
+    base, best = explanation(), explanation("first")
+    known = {id(best): SimpleNamespace(evidence=0.0, label="first")}
+    new, told = several.further(None, best, [base, best], known, None, None, Options())  # type: ignore[arg-type]
+    assert tried == [["weak at 1", "weak at 2"], ["tilt"]] and len(new) == 3
+    assert told is new[-1]
 
 
 def test_one_number_cannot_have_two_values():
@@ -655,7 +736,8 @@ def test_rivals_share_the_derivatives_of_an_experiment(rubbing):
         fresh, _ = experiment.separation(made, rival, weights)
         _, known = experiment.separation(made, base, weights)
         again, _ = experiment.separation(made, rival, weights, known)
-        assert 0.7 < again / fresh < 1.5, what  # they are those under another explanation
+        # they are those under another explanation: 0.97, 1.35 and 1.32 here
+        assert 0.9 < again / fresh < 1.4, what
 
 
 def test_a_clamped_crease_stays_as_it_is_and_tells_at_which_crease_something_acts(rubbing):

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import verdict
+from origami_sim.diagnose import compare, verdict
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.diagnose.verdict import _named, _tied
+from origami_sim.recording import DriveChannel, Recording
 
 
 def explanation(site: str, strength: float):
@@ -54,7 +55,7 @@ def test_a_tie_says_what_all_of_its_explanations_contain():
 
 @pytest.mark.parametrize(
     ("shows", "does", "unknown"),
-    [(9.0, 0.1, True), (9.0, 0.9, False), (2.7, 0.1, False), (verdict.STRUCTURED, 0.1, True)],
+    [(9.0, 0.1, True), (9.0, 0.9, False), (2.3, 0.1, False), (verdict.STRUCTURED, 0.1, True)],
 )
 def test_two_that_cancel_are_refuted_where_something_shows_without_them(monkeypatch, shows, does, unknown):
     monkeypatch.setattr(verdict, "together", lambda f: does)
@@ -67,6 +68,29 @@ def test_two_that_cancel_are_refuted_where_something_shows_without_them(monkeypa
     assert (found is not None) == unknown
     if found is not None:
         assert found.verdict == "UNKNOWN" and "mostly cancel" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("levels", "folds"),
+    [
+        ((1.0, 2.0, 1.01, 2.0), [[0, 1, 4, 5], [2, 3, 6, 7]]),  # repeats tell what they are to predict
+        ((1.0, 1.0, 1.0, 1.0), [[0, 1], [2, 3], [4, 5], [6, 7]]),
+        ((None, None, None, None), [[0, 1], [2, 3], [4, 5], [6, 7]]),
+        ((None, 1.0, 1.0, None), [[0, 1], [2, 3, 4, 5], [6, 7]]),
+    ],
+)
+def test_recordings_of_one_drive_level_are_held_out_together(levels, folds):
+    def recorded(level):
+        t = np.linspace(0.0, 1.0, 11)
+        values = np.stack([0.0 * t, -(level or 0.0) * np.sin(7.0 * t)], axis=1)
+        drive = {} if level is None else {"field": DriveChannel("field", values, "T", False)}
+        return Recording("a", t, {}, drive)
+
+    forward = SimpleNamespace(
+        recordings=[recorded(level) for level in levels],
+        blocks=[SimpleNamespace(recording=n // 2) for n in range(8)],
+    )
+    assert compare.folds(forward, range(8)) == folds
 
 
 def place(law, *, memory=0.0, share=0.9) -> Place:
