@@ -15,7 +15,7 @@ from origami_sim.diagnose.prescribed import curves
 from origami_sim.diagnose.refit import Fit, Weights, carried_on, fit
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.recording import Channel, Recording
+from origami_sim.recording import Channel, Recording, estimate_noise
 from origami_sim.recording.wild import wild_frames
 from origami_sim.solve.timestep import stable_step
 
@@ -110,17 +110,20 @@ def thinned(recording: Recording, every: int) -> Recording:
     out = recording.only(slice(None, None, every))
     steps = np.diff(recording.times)
     even = (steps < EVEN * np.median(steps)) & (steps > np.median(steps) / EVEN)
-    return replace(out, channels={n: averaged(c, every, even) for n, c in recording.channels.items()})
+    channels = {n: averaged(c, every, recording.times, even) for n, c in recording.channels.items()}
+    return replace(out, channels=channels)
 
 
-def averaged(channel: Channel, every: int, even: np.ndarray) -> Channel:
-    """A channel thinned by means over frames, with its noise.
+def averaged(channel: Channel, every: int, times: np.ndarray, even: np.ndarray) -> Channel:
+    """A channel thinned by means over frames, with the noise that these show: no less than that of frames that are
+    independent, nor of the steps of the readings.
 
     A mean over a bend is off by its second derivative times (w^2 - 1) / 24 for w frames, which the means beside it
-    tell. What lies at a gap, and the first and last frame, stays as it was read.
+    tell. Where frames are missing a parabola through the others takes its place. What lies at a gap in time, and the
+    first and last frame, stays as it was read.
 
     Args:
-        even: (n - 1,) which steps in time are as usual.
+        times: (n,) [s]. even: (n - 1,) which steps in time are as usual.
     """
     n, half = len(channel.values), (every - 1) // 2
     width, at = 2 * half + 1, np.arange(0, n, every)
@@ -133,17 +136,23 @@ def averaged(channel: Channel, every: int, even: np.ndarray) -> Channel:
     inner = means[1:-1] - bend * (means[2:] - 2.0 * means[1:-1] + means[:-2])
     odd = np.concatenate([[0], np.cumsum(~even)])  # odd steps before each frame
     first, last = np.maximum(at[:-2] - half, 0), np.minimum(at[2:] + half, n - 1)
-    whole = (odd[first] == odd[last])[:, None] & np.isfinite(inner)
+    whole = odd[first] == odd[last]
     out = values[at]
-    out[1:-1] = np.where(whole, inner, out[1:-1])
+    out[1:-1] = np.where(whole[:, None] & np.isfinite(inner), inner, out[1:-1])
+    for k, d in np.argwhere(whole[:, None] & np.isnan(inner)).tolist():
+        frames = np.arange(n)[first[k] : last[k] + 1]
+        part, x = values[frames, d], frames - at[k + 1]
+        seen = np.isfinite(part)
+        if seen.sum() >= 2 * every and np.any(seen & (x < 0)) and np.any(seen & (x > 0)):
+            out[k + 1, d] = np.polynomial.Polynomial.fit(x[seen], part[seen], 2)(0.0)
+    out = out.reshape(len(at), *channel.values.shape[1:])
+    least = channel.noise * np.hypot(1.0 + 2.0 * bend, np.sqrt(2.0) * bend) / np.sqrt(width)  # white noise
     report = channel.noise_report
-    alike = float(np.clip(np.nan_to_num(report.lag_1), 0.0, 1.0)) if report is not None else 0.0
-    part = np.hypot(1.0 + 2.0 * bend, np.sqrt(2.0) * bend) * np.sqrt((1.0 + 2.0 * alike * (1.0 - 1.0 / width)) / width)
     count = report.quantum / np.sqrt(12.0) if report is not None else 0.0
-    noise = min(channel.noise, max(channel.noise * part, count))
+    noise = float(np.clip(estimate_noise(times[at], out), min(max(least, count), channel.noise), channel.noise))
     if report is not None and channel.noise == report.level:  # it was read from the data, and still is
         report = replace(report, level=noise)
-    return replace(channel, values=out.reshape(len(at), *channel.values.shape[1:]), noise=noise, noise_report=report)
+    return replace(channel, values=out, noise=noise, noise_report=report)
 
 
 def arranged(subject: Subject, recordings: list[Recording], o: Options) -> Forward:

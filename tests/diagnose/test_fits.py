@@ -720,7 +720,8 @@ def test_an_interval_is_wider_by_what_other_effects_could_do_to_it(stiff):
 def test_a_gain_holds_if_other_stretches_of_the_same_recording_predict_it(stiff):
     """Of two recordings one tells the effect: the other cannot predict it, another stretch of the first can."""
     forward, base, weights, one = stiff
-    twice = SimpleNamespace(blocks=[replace(b, recording=n % 2) for n, b in enumerate(forward.blocks)])
+    blocks = [replace(b, recording=n % 2) for n, b in enumerate(forward.blocks)]
+    twice = SimpleNamespace(blocks=blocks, recordings=2 * forward.recordings)
     known = [0, 2, 4, 6]  # what the second recording says of the number is taken away
     f = fit(forward, Hypothesis((one,)), weights, theta=np.concatenate([base.theta, [4e-4]]), local=base.local)
     tangent = [t if n in known else t * [1, 1, 1, 0] for n, t in enumerate(f.linear.tangent)]

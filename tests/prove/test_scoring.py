@@ -78,6 +78,21 @@ def test_what_the_screening_sees_of_an_effect_is_its_score_over_what_was_conceal
 def test_a_tie_holds_the_truth_without_naming_it_first():
     row = judge(ANSWER, diagnosis("TIE", ["crease_hysteresis at fold2", "crease_friction at fold2"], 0.97))
     assert not row["top1"] and row["inside"] and row["correct"] and not row["wrong"]
+    assert row["placed"] and row["found_site"] is None  # the right place, by the wrong name
+
+
+def test_every_case_that_went_wrong_is_listed_whatever_its_kind():
+    second = ANSWER | {"kind": "double", "second": {"names": ["air_drag"], "site": ""}}
+    friction = diagnosis("MECHANISM", ["crease_friction at fold2"], 0.8)
+    rows = [
+        judge(ANSWER | {"case": 11}, friction),
+        judge(ANSWER | {"case": 22, "kind": "outside"}, friction),
+        judge(second | {"case": 33}, friction),
+        judge(ANSWER | {"case": 44, "kind": "outside"}, diagnosis("UNKNOWN", [], None)),
+    ]
+    board = {"sealed": False, "seed": 1, "cases": 4, "failed": 0, **score.scores(rows), "rows": rows}
+    listed = score.text_of(board).partition("cases that went wrong")[2]
+    assert [line.split()[0] for line in listed.strip().splitlines()] == ["22", "33"]
 
 
 @pytest.mark.parametrize(
@@ -87,12 +102,13 @@ def test_a_tie_holds_the_truth_without_naming_it_first():
         ("MECHANISM", ["tether at the body"], 0.7, False, True),
         ("SEVERAL", ["crease_friction at fold2", "air_drag at all panels"], 0.95, True, True),
         ("TIE", ["tether at the body", "air_drag at all panels"], 0.95, True, None),
-        ("ADEQUATE", [], 0.99, False, None),
+        ("ADEQUATE", [], 0.99, True, None),  # where something was concealed
+        ("PARAMETER", [], 0.8, False, None),
         ("UNKNOWN", ["tether at the body"], 0.99, False, None),
     ],
 )
 def test_confidently_wrong(verdict, chosen, probability, wrong, blamed):
-    """Only what is named alone is blamed, however sure that is."""
+    """Only what is named alone is blamed, however sure that is; UNKNOWN has no probability."""
     row = judge(ANSWER, diagnosis(verdict, chosen, probability))
     assert row["wrong"] == wrong and row["blamed"] == blamed and not row["top1"]
 
