@@ -409,16 +409,17 @@ def credible(
 
 
 def chance_of_null(p_value: float) -> float:
-    """Probability that nothing is missing, from the look-elsewhere test (Sellke et al. 2001), prior 4 to 1."""
+    """Probability that nothing is missing, from the look-elsewhere test (Sellke et al. 2001), prior 4 to 1.
+
+    Never more than the prior: what is too small to be seen is not excluded by not being seen.
+    """
     bound = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else 1.0
     return float(4 * bound / (4 * bound + 1))
 
 
 def _adequate_or_parameter(w: _Weighed, given: Fit, weights: Weights) -> _Said:
     """Where nothing is missing: whether numbers of the model differ from what was known of them."""
-    probability = chance_of_null(w.p_small)
-    if w.nothing:
-        probability = max(w.probability(w.base), chance_of_null(w.p_value))
+    probability = chance_of_null(w.p_value if w.nothing else w.p_small)
     base, count = w.base, len(w.base.free)
     before = float(sum(whitened(r, weights) @ whitened(r, weights) for r in given.residuals))
     if not count or before - base.misfit - base.penalty <= chi2.ppf(0.99, count):

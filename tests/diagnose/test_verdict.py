@@ -53,6 +53,11 @@ def test_a_tie_says_what_all_of_its_explanations_contain():
     assert "contain" not in _tied([hypothesis(one), hypothesis(tilt)], p)
 
 
+def test_that_nothing_is_missing_is_never_surer_than_it_was_before():
+    assert verdict.chance_of_null(1.0) == verdict.chance_of_null(0.5) == 0.8
+    assert 0.0 < verdict.chance_of_null(0.001) < 0.1 < verdict.chance_of_null(0.05) < 0.8
+
+
 @pytest.mark.parametrize(
     ("shows", "does", "unknown"),
     [(9.0, 0.1, True), (9.0, 0.9, False), (2.3, 0.1, False), (verdict.STRUCTURED, 0.1, True)],
