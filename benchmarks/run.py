@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 PARTS = ("rollout", "startup", "scaling", "commands")
 
 
-def _machine() -> str:
+def machine() -> str:
     import numpy
     import warp
 
@@ -42,7 +42,7 @@ def main():
     import rollout
     import scaling
 
-    print(_machine(), flush=True)
+    print(machine(), flush=True)
     if args.device != "cpu":
         print(scaling.cuda_report(args.device, args.quick))
         return

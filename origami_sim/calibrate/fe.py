@@ -20,7 +20,7 @@ References: Hughes, The Finite Element Method (1987), 4.4 (selective integration
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -539,8 +539,3 @@ def _graded(start: float, stop: float, finest: float, *, at_start: bool, largest
     points = np.concatenate([[0.0], scaled])
     points[-1] = length
     return start + points if at_start else stop - points[::-1]
-
-
-def with_gap(bridge: Bridge, gap: float) -> Bridge:
-    """The same bridge with another gap [m]."""
-    return replace(bridge, gap=gap)

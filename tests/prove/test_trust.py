@@ -1,4 +1,4 @@
-"""The curve of trust: fitted to outcomes, from development runs only."""
+"""The curve of trust: fitted to outcomes, of development runs and of sealed ones that were scored."""
 
 import json
 
@@ -36,7 +36,7 @@ def run(folder, seed: int):
     return folder
 
 
-def test_sealed_runs_are_refused(tmp_path, monkeypatch):
+def test_sealed_runs_that_are_not_scored_are_refused(tmp_path, monkeypatch):
     before = FILE.read_bytes()
     monkeypatch.setattr("sys.argv", ["trust", str(run(tmp_path, DEVELOPMENT))])
     with pytest.raises(SystemExit, match="development"):
