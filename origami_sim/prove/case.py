@@ -9,6 +9,9 @@ import numpy as np
 
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject, diagnose, factor
+from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.overlay import write_overlays
+from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble
@@ -109,6 +112,17 @@ def diagnose_case(folder: Path) -> dict:
     found["rate"] = 1.0 / float(np.median(np.diff(recordings[0].times)))
     write_json(folder / "diagnosis.json", found)
     return found
+
+
+def show(folder: Path, into: Path) -> list[Path]:
+    """Page, replays and data of a case's diagnosis, as `origami-sim diagnose` writes them; they are returned."""
+    keep = Keep()
+    recordings = [read_recording(p) for p in sorted(folder.glob("recording*.csv"))]
+    found = diagnose(subject(folder), recordings, keep=keep)
+    assert keep.forward is not None
+    into.mkdir(parents=True, exist_ok=True)
+    page = write_report(found, into / "report.html", geometry=geometry_of(keep.forward.model))
+    return [page, found.save_json(into / "diagnosis.json"), *write_overlays(into, keep, found)]
 
 
 def telling(traces: list[dict]) -> dict | None:

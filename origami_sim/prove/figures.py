@@ -104,9 +104,9 @@ def strengths(board: dict, file: Path) -> None:
 
 
 def worked(board: dict, out: Path) -> None:
-    """One case whose effect was named: what was recorded and predicted, and how the explanations compare."""
+    """The named effect without which most was missed: what was recorded and predicted, and the explanations."""
     right = [r for r in board["rows"] if r["kind"] == "single" and r["top1"] and r["found_site"] is not False]
-    for row in sorted(right, key=lambda r: (r["verdict"] == "TIE", abs(np.log(r["d"] / 30.0)))):
+    for row in sorted(right, key=lambda r: (r["verdict"] != "MECHANISM", -r["refitted"])):
         found = json.loads((out / "cases" / f"{row['case']:04d}" / "diagnosis.json").read_text())
         if found.get("worked"):
             break
@@ -123,8 +123,8 @@ def worked(board: dict, out: Path) -> None:
     upper.set(ylabel=f"{trace['component']} [{trace['unit']}]")
     upper.legend(fontsize=7)
     lower.axhspan(-2 * trace["noise"], 2 * trace["noise"], color="0.9", label="noise, 2 sd")
-    lower.plot(t, recorded - refitted, ".", color="C1", ms=3)
-    lower.plot(t, recorded - after, ".", color="C0", ms=3)
+    for predicted, color in ((refitted, "C1"), (after, "C0")):
+        lower.plot(t, recorded - predicted, ".", color=color, ms=3, alpha=0.6)
     lower.set(xlabel="time [s], or load step", ylabel=f"recorded less predicted [{trace['unit']}]")
     lower.legend(fontsize=7)
     side.barh(range(len(rows)), [c["probability"] for c in rows], color="C0", alpha=0.4)

@@ -370,6 +370,16 @@ def test_scene_and_coupon_agree_without_an_effect(truth, tmp_path):
     assert predicted == pytest.approx(recording.channels["moment"].values, abs=1e-11)
 
 
+def test_a_case_has_a_page_and_a_replay(truth, tmp_path):
+    rigid = truth["rigid"].RigidCase(flap(truth) | {"recordings": [{"release": [0.5]}], "duration": 1.5}, {})
+    tracker = {"noise": 0.004, "quantum": 0.002, "smoothing": False, "lost": 0.0, "gap": 0, "stated": 0.004}
+    rigid.write(tmp_path, [], tracker, np.random.default_rng(0))
+    (tmp_path / "object.json").write_text(json.dumps(rigid.known()))
+    page, data, replay = case.show(tmp_path, tmp_path / "shown")
+    assert json.loads(data.read_text())["verdict"] in page.read_text() and replay.stat().st_size > 1000
+    assert not (tmp_path / "diagnosis.json").exists()
+
+
 def test_every_effect_of_a_coupon_shows(truth):
     coupon = truth["coupon"]
     made = coupon.CouponCase(coupon.draw("crease_coupon", np.random.default_rng(2)), {})
