@@ -84,11 +84,18 @@ SHORT = 3 / BAND[0]
 COLOUR = 0.1
 """Part by which the noise of trackers may differ below the band in which it is read."""
 
-FAST = (1 / 4, 3 / 8, 1 / 2)
+FAST = (3 / 16, 11 / 32, 1 / 2)
 """Frequencies per frame of two bands in which noise that is white has the same power."""
 
-WHITE, TINTED = 0.8, 0.35
-"""Ratio of the powers in these bands from which on noise counts as white, and the part that it may still differ by."""
+WHITE, TINTED = 1.2, 0.35
+"""Ratio of the powers in these bands up to which noise counts as white, and the part that it may still differ by."""
+
+LEVER = 1.2
+"""Logarithm of the power of smoothed noise at zero frequency over that in the band, for a fall by e between its halves:
+the square of its middle over the difference of the squares of theirs."""
+
+STEEPER = 4.0 * LEVER**2
+"""Doubt about that, over the doubt about the noise in the band: each of two medians is of half of the frequencies."""
 
 NEIGHBOURS = 9
 """Frequencies over which the noise of trackers hardly changes."""
@@ -475,13 +482,16 @@ def structure(f: Fit, reference: Fit) -> Structure:
 
     The noise is read from residuals so that a level that was stated wrongly does not matter. What is missing often
     shows in a narrow band, such as where the device swings, hence octaves. The band in which noise is read is itself
-    compared with the fastest frequencies, if noise looks white there: what shakes a device may fill it.
+    compared with the fastest frequencies, if noise looks white there: what shakes a device may fill it. If it does not,
+    a tracker has smoothed it, and its power goes on growing below the band.
     """
     noise = noise_of(reference.residuals)
     short = min(map(len, f.residuals)) < SHORT
     edge = BAND[1] if short else BAND[0]
     octaves = 1 + int(np.ceil(np.log2(2.0 * edge * max(map(len, f.residuals)))))
     white = np.full(len(noise), np.nan) if short else white_of(reference.residuals)
+    if not short and np.all(np.isnan(white)):
+        noise = noise * np.sqrt(growth_of(reference.residuals))
     power, count = np.zeros((2, len(f.residuals), octaves + 1))  # the last one is the band
     frames = np.zeros(len(noise))
     for b, r in enumerate(f.residuals):
@@ -498,7 +508,8 @@ def structure(f: Fit, reference: Fit) -> Structure:
             count[b, octave] += parts * (seen.any(axis=0) & np.isfinite(scaled)).sum()
     # of second differences, or of the median of a spectrum
     doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
-    slow = COLOUR**2 + float(doubt.mean() / len(noise))
+    doubt = float(doubt.mean() / len(noise))
+    slow = COLOUR**2 + doubt * (1.0 if short or np.any(white == white) else 1.0 + STEEPER)
     return Structure(power, count, np.append(np.full(octaves, slow), TINTED**2), uneven_of(f.residuals))
 
 
@@ -572,8 +583,19 @@ def noise_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
 def white_of(residuals: Sequence[np.ndarray]) -> np.ndarray:
     """(D,) the same from the fastest frequencies; nan if the noise of all components together is not white there."""
     lower, upper = (np.nanmean(_spectrum(residuals, a, b), axis=0) for a, b in pairwise(FAST))
-    white = np.nanmean(upper / lower) > WHITE
+    white = 1.0 / WHITE < np.nanmean(upper) / np.nanmean(lower) < WHITE
     return np.sqrt((lower + upper) / 2.0) if white else np.full(len(lower), np.nan)
+
+
+def growth_of(residuals: Sequence[np.ndarray]) -> float:
+    """Power of the noise at zero frequency over that in its band, from how it falls within the band; 1 at least.
+
+    The logarithm of the power of what a filter lets through begins as a square of the frequency.
+    """
+    middle = sum(BAND) / 2.0
+    lower, upper = (np.nanmedian(_spectrum(residuals, *b), axis=0) for b in ((BAND[0], middle), (middle, BAND[1])))
+    fall = float(np.nanmean(np.log(lower / upper)))
+    return float(np.exp(max(fall, 0.0) * LEVER))
 
 
 def _spectrum(residuals: Sequence[np.ndarray], low: float, high: float) -> np.ndarray:

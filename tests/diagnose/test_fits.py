@@ -5,6 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.ndimage import convolve1d
+from scipy.signal import savgol_coeffs
 from scipy.stats import multivariate_normal
 
 from origami_sim.diagnose import Options, Subject, experiment, factor, search
@@ -548,6 +550,29 @@ def test_a_segment_without_a_value_has_no_structure():
     np.testing.assert_array_equal(a.power.sum(axis=0), b.power.sum(axis=0))
     np.testing.assert_array_equal(a.count.sum(axis=0), b.count.sum(axis=0))
     assert noise_of(gap) == pytest.approx(noise_of(left)), "nor does it tell of the noise"
+
+
+FILTERS = {
+    "mean of three": np.full(3, 1 / 3),
+    "mean of five": np.full(5, 1 / 5),
+    "parabolas over seven": savgol_coeffs(7, 2),
+    "forgets half per frame": 0.5 ** np.arange(12),
+}
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_filter_of_the_tracker_is_no_structure_and_hides_none(name):
+    """No alarm by noise that is smoothed before it is recorded; 16 standard deviations of something slow are found."""
+    rng, alarms, found = np.random.default_rng(7), 0, 0
+    kernel = FILTERS[name] / FILTERS[name].sum()
+    tone = np.sin(2 * np.pi * np.arange(240) / 60.0)[:, None]
+    tone *= 16.0 / np.sqrt(8 * 2 * np.sum(tone**2))
+    for _ in range(40):
+        noise = convolve1d(rng.normal(size=(8 * 240, 2)), kernel, axis=0, mode="wrap").reshape(8, 240, 2)
+        quiet, heard = (SimpleNamespace(residuals=list(r)) for r in (noise, noise + tone))
+        alarms += structure(quiet, quiet).score > STRUCTURED
+        found += structure(heard, heard).repeated > STRUCTURED
+    assert alarms <= 1 and found >= 30
 
 
 @pytest.mark.parametrize("smooth", [False, True])
