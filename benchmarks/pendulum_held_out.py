@@ -9,7 +9,7 @@ segments are adapted. The block-energy error is the error of the change of energ
 masses. Which effects are fitted was found on all of the data: what is held out are their numbers, not the choice.
 """
 
-import sys
+import argparse
 
 import numpy as np
 
@@ -85,14 +85,16 @@ def single(files: list[str]):
 
 
 def main():
-    files = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="+", metavar="RECORDING")
+    files = parser.parse_args().files
     forward, splits = single(files) if len(files) > 1 else doubled(files[0])
     named = SINGLE_NAMED if len(files) > 1 else NAMED
     _, base, weights = nominal_fits(forward)
     found = {s.label: s for s in suspects(forward.model, forward.recordings, forward.drive, forward.parameters)}
     given = np.array([f.start for f in forward.subject.nominals])
     names = list(forward.recordings[0].channels)
-    print(f"{len(forward.blocks)} segments of {forward.blocks[0].times[-1]:.2f} s")
+    print(f"rms of angles [mrad]; {len(forward.blocks)} segments of {forward.blocks[0].times[-1]:.2f} s")
     print(f"{'model':34s}{'held out':>16s}{''.join(f'{n:>10s}' for n in names)}{'block energy':>14s}")
     for name, labels in {"published": None, "refitted": (), **named}.items():
         for held, (train, test) in splits.items():
@@ -103,7 +105,7 @@ def main():
                 theta = fit(forward, hypothesis, weights, theta=start, local=base.local, blocks=train, most=8).theta
             f = fit(forward, hypothesis, weights, theta=theta, local=base.local, blocks=test, fixed=True)
             rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0)) * 1e3
-            text = f"{name:34s}{held:>16s}" + "".join(f"{v:8.2f} m" for v in rms)
+            text = f"{name:34s}{held:>16s}" + "".join(f"{v:10.2f}" for v in rms)
             print(text + (f"{missed_energy(forward, f):11.1f} uJ" if len(files) == 1 else ""), flush=True)
 
 

@@ -20,8 +20,8 @@ FAITHFUL = 0.7
 SHORT = 0.2
 """Part of a step up to which it is too short to be bent."""
 
-SLOWEST = 2.5
-"""How many times smaller than at the beginning the solver's step may become at a trial."""
+SLOWEST, UTMOST = 2.5, 10.0
+"""How many times smaller than where a fit begins the solver's step may become, and than without any suspect."""
 
 FAINT = 1e-7
 """Changes of a start that show so much less than others, and of which nothing else is known, are left alone."""
@@ -361,8 +361,8 @@ def fit(
         cost = sum(float(r @ r) for r in gaps) + penalty(free, theta)
         return cost if np.isfinite(cost) else np.inf, gaps, theta, local
 
-    def too_slow(theta) -> bool:
-        return bool(width) and forward.step(hypothesis, theta) < slowest
+    def too_slow(theta, least: float) -> bool:
+        return bool(width) and forward.step(hypothesis, theta) < least
 
     line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
     own = 0 < kept < width
@@ -370,7 +370,9 @@ def fit(
     best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
-    slowest = forward.step(hypothesis, theta) / SLOWEST
+    step = forward.step(hypothesis, theta)
+    slowest = min(step, forward.step(Hypothesis(), theta[: len(forward.subject.nominals)]) / UTMOST)
+    slow = max(step / SLOWEST, slowest)
     floor = weights.part * sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
     finest, hoped, settled = (OWN if rough else ALL), np.inf, False
     for n in range(most):
@@ -389,7 +391,7 @@ def fit(
             trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
             # (or be of no model at all)
-            if hypothesis.suspects and part > trying[-1] and too_slow(trial):
+            if hypothesis.suspects and too_slow(trial, slow if part > trying[-1] else slowest):
                 continue
             there = at(trial, start)
             owed = FAITHFUL * whole * part * (2.0 - part)
@@ -401,7 +403,7 @@ def fit(
                 bend = more - (1.0 - part) * change
                 aside = np.clip(trial + bend * scale, lower, upper)
                 longer = np.linalg.norm(bend) > np.linalg.norm(part * change)
-                if reach < min(there[0], best - gain) and not longer and not too_slow(aside):
+                if reach < min(there[0], best - gain) and not longer and not too_slow(aside, slow):
                     there = min(there, at(aside, start + moved - (1.0 - part) * moves), key=lambda p: p[0])
             if best - there[0] > gain:
                 found, gain = there, best - there[0]
