@@ -26,7 +26,7 @@ from origami_sim.diagnose.compare import (
 from origami_sim.diagnose.forward import CALM, FINER, NEAR, UNSEEN, Forward, local_line, refined, shifted
 from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting, steady
-from origami_sim.diagnose.refit import Linearisation, Weights, fit, linearise
+from origami_sim.diagnose.refit import UTMOST, Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
 from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
 from origami_sim.diagnose.trust import trust
@@ -111,6 +111,32 @@ def test_a_curved_valley_is_followed_past_what_cannot_be_simulated():
 def test_a_curved_valley_is_followed_to_a_bound():
     found = fit(Valley(30.0, most=0.5), Hypothesis(), Weights(np.ones(1)), most=8)
     assert found.theta == pytest.approx([0.5, 0.25], abs=1e-9) and found.at_bound.tolist() == [True, False]
+
+
+class Film:
+    """Something whose strength shows by its logarithm, and slows the simulation down as it grows."""
+
+    local = 0
+    model = SimpleNamespace(contacts=())
+    blocks = (SimpleNamespace(values=np.full((2, 1), np.log1p([30.0, 10.0])[:, None]), known=np.zeros(0)),)
+    subject = SimpleNamespace(nominals=(Free("film", "x", "-", start=0.0, scale=1.0, spread=1e-3),))
+
+    def step(self, hypothesis, theta) -> float:
+        return 1.0 / (1.0 + np.sum(theta[1:]))
+
+    def predict(self, hypothesis, thetas, locals_, blocks, *, soft=False) -> list[np.ndarray]:
+        return [np.log1p(np.stack([thetas[:, 1], thetas[:, 1]], axis=1))[:, :, None]]
+
+
+def test_no_series_of_fits_asks_for_ever_smaller_steps_of_the_solver():
+    """Each may ask for steps 2.5 times smaller; all of them only for ten times smaller ones than without a suspect."""
+    film = Hypothesis((Suspect("film", "here", "ground", (Free("film", "C", "N", 0.0, 1.0, 0.0, 1e6),)),))
+    theta, steps = np.array([0.0, 0.1]), []
+    for _ in range(8):
+        theta = fit(Film(), film, Weights(np.ones(1)), theta=theta).theta
+        steps.append(Film().step(film, theta))
+    assert steps[0] < 0.5, "it does grow"
+    assert 1.0 / UTMOST <= steps[-1] < 0.25
 
 
 def test_new_weights_are_those_of_a_new_linearisation(stiff):
