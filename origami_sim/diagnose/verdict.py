@@ -41,6 +41,9 @@ SMALL, SHOWN = 4, 2.0
 CANCELLED = 0.4
 """Several named effects must do so much together of what each does: two that cancel are a third with another law."""
 
+WORSE = 2.0
+"""Held-out error over that without an effect beyond which nothing is named: the few numbers fit what they have seen."""
+
 STRAINED = 3.0
 """Standard deviations from what was known that no number of a named explanation may be."""
 
@@ -338,6 +341,8 @@ def _refuted(w: _Weighed) -> _Said | None:
         text += f"needs {number} {strain:.1f} standard deviations from what is known of it"
     elif len(w.best.hypothesis.suspects) > 1 and together(w.best) < CANCELLED and w.before.score >= STRUCTURED:
         text += "are effects that mostly cancel each other, as if both stood for one with another law"
+    elif w.left > max(FLOOR, WORSE * w.over):
+        text += "predicts what it was not fitted to much worse than no effect does"
     else:
         return None
     return _Said("UNKNOWN", f"{text}{_as_well(w)}; {w.fall}.", np.nan, [w.best.hypothesis.label], w.best)

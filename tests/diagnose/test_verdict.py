@@ -69,10 +69,26 @@ def test_two_that_cancel_are_refuted_where_something_shows_without_them(monkeypa
         free=(), theta=(), hypothesis=SimpleNamespace(free=(), suspects=("one", "other"), label="one + other")
     )
     left = {"share": 0.0, "after": SimpleNamespace(repeated=0.0), "leaves": False, "fall": "it falls", "kept": []}
-    found = verdict._refuted(SimpleNamespace(best=best, before=SimpleNamespace(score=shows), **left))  # type: ignore[arg-type]
+    error = {"over": 2.0, "left": 1.0}
+    found = verdict._refuted(SimpleNamespace(best=best, before=SimpleNamespace(score=shows), **left, **error))  # type: ignore[arg-type]
     assert (found is not None) == unknown
     if found is not None:
         assert found.verdict == "UNKNOWN" and "mostly cancel" in found.sentence
+
+
+@pytest.mark.parametrize(("over", "left", "unknown"), [(6.5, 433.0, True), (6.5, 1.0, False), (0.5, 1.2, False)])
+def test_what_predicts_held_out_data_much_worse_than_nothing_is_not_named(monkeypatch, over, left, unknown):
+    """An ageing friction of the proof was called static friction, with 433 instead of 6.5 times the noise held out."""
+    monkeypatch.setattr(verdict, "_say", lambda f: "one")
+    best = SimpleNamespace(
+        free=(), theta=(), hypothesis=SimpleNamespace(free=(), suspects=("one",), label="one at a crease")
+    )
+    same = {"share": 0.0, "after": SimpleNamespace(repeated=0.0), "leaves": False, "fall": "it falls", "kept": []}
+    found = verdict._refuted(
+        SimpleNamespace(best=best, before=SimpleNamespace(score=9.0), over=over, left=left, **same)  # type: ignore[arg-type]
+    )
+    assert (found is not None) == unknown
+    assert found is None or (found.verdict == "UNKNOWN" and "much worse" in found.sentence)
 
 
 @pytest.mark.parametrize(
