@@ -135,11 +135,18 @@ class Misalignment(Law):
 
 
 class Lag(Law):
+    """A supply of first order, exact for a field that goes straight from step to step: a lag may be shorter than one."""
+
     def reset(self, world, q):
-        self.b = np.zeros(3)
+        self.b, self.wanted = np.zeros(3), None
 
     def field(self, b, dt):
-        self.b = b + (self.b - b) * math.exp(-dt / self.strength) if self.strength > 0 else b
+        if self.strength <= 0:
+            return b
+        if self.wanted is not None:
+            behind = (b - self.wanted) * (self.strength / dt)
+            self.b = b - behind + (self.b - self.wanted + behind) * math.exp(-dt / self.strength)
+        self.wanted = b
         return self.b
 
 
