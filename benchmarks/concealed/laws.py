@@ -135,7 +135,7 @@ class Misalignment(Law):
 
 
 class Lag(Law):
-    """A supply of first order, exact for a field that goes straight from step to step: a lag may be shorter than one."""
+    """A supply of first order, exact for a field that is straight between steps: a lag may be shorter than one."""
 
     def reset(self, world, q):
         self.b, self.wanted = np.zeros(3), None
