@@ -495,7 +495,8 @@ def structure(f: Fit, reference: Fit) -> Structure:
     edge = BAND[1] if short else BAND[0]
     octaves = 1 + int(np.ceil(np.log2(2.0 * edge * max(map(len, f.residuals)))))
     white = np.full(len(noise), np.nan) if short else white_of(reference.residuals)
-    if not short and np.all(np.isnan(white)):
+    smoothed = not short and np.all(np.isnan(white))
+    if smoothed:
         noise = noise * np.sqrt(growth_of(reference.residuals))
     power, count = np.zeros((2, len(f.residuals), octaves + 1))  # the last one is the band
     frames = np.zeros(len(noise))
@@ -514,7 +515,7 @@ def structure(f: Fit, reference: Fit) -> Structure:
     # of second differences, or of the median of a spectrum
     doubt = 3.9 / frames if short else (1.0 / np.log(2.0)) ** 2 / ((BAND[1] - BAND[0]) * frames)
     doubt = float(doubt.mean() / len(noise))
-    slow = COLOUR**2 + doubt * (1.0 if short or np.any(white == white) else 1.0 + STEEPER)
+    slow = COLOUR**2 + doubt * (1.0 + STEEPER if smoothed else 1.0)
     return Structure(power, count, np.append(np.full(octaves, slow), TINTED**2), uneven_of(f.residuals))
 
 
