@@ -57,7 +57,7 @@ _DIAGNOSE_HELP = """\
 writes report.html, diagnosis.json, patched.toml (for run --calibration, and for --model) and a replay. Interrupted, the
 same command goes on where it stopped.
 
-exit codes: 10 ADEQUATE (what is left is noise), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
+exit codes: 10 ADEQUATE (nothing is found missing), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
 makes the difference), 13 MECHANISM (an effect is missing), 14 TIE (several explain it alike), 15 SEVERAL (more than one
 is missing), 16 UNKNOWN (none of the catalogue), 17 UNTESTABLE (these recordings cannot tell); 2 bad input, 130
 interrupted

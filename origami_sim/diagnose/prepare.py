@@ -104,7 +104,7 @@ def tamed(recording: Recording) -> Recording:
 
 
 def thinned(recording: Recording, every: int) -> Recording:
-    """One frame of so many, each the mean of those around it, as far as half way to the next."""
+    """One frame of so many, each the mean of those around it, as far as half way to the next (shared by both)."""
     if every <= 1:
         return recording
     out = recording.only(slice(None, None, every))
@@ -118,21 +118,21 @@ def averaged(channel: Channel, every: int, times: np.ndarray, even: np.ndarray) 
     """A channel thinned by means over frames, with the noise that these show: no less than that of frames that are
     independent, nor of the steps of the readings.
 
-    A mean over a bend is off by its second derivative times (w^2 - 1) / 24 for w frames, which the means beside it
-    tell. Where frames are missing a parabola through the others takes its place. What lies at a gap in time, and the
-    first and last frame, stays as it was read.
+    A mean over a bend is off by half its second derivative times the mean square of the distances, which the means
+    beside it tell. Where frames are missing a parabola through the others takes its place. What lies at a gap in time,
+    and the first and last frame, stays as it was read.
 
     Args:
         times: (n,) [s]. even: (n - 1,) which steps in time are as usual.
     """
-    n, half = len(channel.values), (every - 1) // 2
-    width, at = 2 * half + 1, np.arange(0, n, every)
-    if half == 0 or len(at) < 3:
+    n, half, at = len(channel.values), every // 2, np.arange(0, len(channel.values), every)
+    if len(at) < 3:
         return replace(channel, values=channel.values[::every])
-    values = channel.values.reshape(n, -1)
-    around = at[1:-1, None] + np.arange(-half, half + 1)
-    means = np.concatenate([values[:1], values[np.minimum(around, n - 1)].mean(axis=1), values[at[-1:]]])
-    bend = (width**2 - 1) / (24.0 * every**2)
+    values, away = channel.values.reshape(n, -1), np.arange(-half, half + 1)
+    share = np.where(2 * np.abs(away) == every, 0.5, 1.0) / every
+    around = values[np.minimum(at[1:-1, None] + away, n - 1)]
+    means = np.concatenate([values[:1], np.einsum("j,njd->nd", share, around), values[at[-1:]]])
+    bend = float(share @ away**2) / (2.0 * every**2)
     inner = means[1:-1] - bend * (means[2:] - 2.0 * means[1:-1] + means[:-2])
     odd = np.concatenate([[0], np.cumsum(~even)])  # odd steps before each frame
     first, last = np.maximum(at[:-2] - half, 0), np.minimum(at[2:] + half, n - 1)
@@ -146,7 +146,7 @@ def averaged(channel: Channel, every: int, times: np.ndarray, even: np.ndarray) 
         if seen.sum() >= 2 * every and np.any(seen & (x < 0)) and np.any(seen & (x > 0)):
             out[k + 1, d] = np.polynomial.Polynomial.fit(x[seen], part[seen], 2)(0.0)
     out = out.reshape(len(at), *channel.values.shape[1:])
-    least = channel.noise * np.hypot(1.0 + 2.0 * bend, np.sqrt(2.0) * bend) / np.sqrt(width)  # white noise
+    least = channel.noise * np.hypot(1.0 + 2.0 * bend, np.sqrt(2.0) * bend) * np.linalg.norm(share)  # white noise
     report = channel.noise_report
     count = report.quantum / np.sqrt(12.0) if report is not None else 0.0
     noise = float(np.clip(estimate_noise(times[at], out), min(max(least, count), channel.noise), channel.noise))

@@ -45,13 +45,13 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model
 
 MEANING = {
-    "ADEQUATE": "What is left is noise: nothing needs to be added.",
+    "ADEQUATE": "Nothing is found that the model lacks.",
     "PARAMETER": "The model has the right effects; its own numbers were off.",
     "MEASUREMENT": "The measurement, not the device, makes the difference.",
     "MECHANISM": "A physical effect was left out of the model.",
     "TIE": "Several explanations do equally well; only another experiment can tell them apart.",
     "SEVERAL": "More than one effect was left out of the model.",
-    "UNKNOWN": "Something real and reproducible is missing that the catalogue does not contain.",
+    "UNKNOWN": "Something real is missing that the catalogue does not name.",
     "UNTESTABLE": "These recordings cannot answer the question.",
 }
 

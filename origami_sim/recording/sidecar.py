@@ -22,7 +22,7 @@
 
     [channels.theta1]                   # the name that the simulation's observer uses
     column = "theta1_rad"               # or columns = ["x", "y", "z"], or track = "name of the tracked point"
-    kind = "panel_angle"                # panel_angle, crease_angle, marker, marker_2d, tip_displacement, force
+    kind = "panel_angle"                # panel_angle, crease_angle, marker, marker_2d, tip_displacement, force, moment
     unit = "rad"                        # of the column; may be left out where the file states its unit of length
     noise = 1e-4                        # standard deviation in `unit`; estimated from the data when left out
     sign = 1                            # value = sign * (reading - offset)

@@ -480,6 +480,23 @@ def test_thinned_frames_are_means_that_follow_a_bend():
     assert np.isnan(holed.values).sum() <= 2
 
 
+@pytest.mark.parametrize(("rate", "every"), [(400, 2), (500, 2), (700, 3), (800, 4)])
+def test_no_frame_is_thrown_away_where_frames_are_thinned(rate, every):
+    t, rng = np.arange(10 * rate) / rate, np.random.default_rng(3)
+    swing = 0.7 * np.sin(2 * np.pi * 4.0 * t)
+
+    def thin(values):
+        made = Recording("r", t, {"a": Channel("a", "crease_angle", values, "rad", 0.01)})
+        return prepared([made], 200.0)[0]
+
+    assert np.array_equal(thin(swing).times, t[::every])
+    assert thin(swing).channels["a"].values == pytest.approx(swing[::every], abs=2e-5)
+    noisy = thin(swing + rng.normal(0.0, 0.01, len(t))).channels["a"]
+    left = (noisy.values - swing[::every])[1:-1]
+    assert np.std(left) == pytest.approx(noisy.noise, rel=0.08)
+    assert noisy.noise < 1.25 * 0.01 / np.sqrt(every)  # a mean without its bend has 1 / root
+
+
 def test_wild_frames_are_left_out_and_told():
     t = np.arange(800) / 120.0
     values = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1)
