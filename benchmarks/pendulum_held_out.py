@@ -95,9 +95,8 @@ def main():
     given = np.array([f.start for f in forward.subject.nominals])
     names = list(forward.recordings[0].channels)
     print(f"rms of angles [mrad]; {len(forward.blocks)} segments of {forward.blocks[0].times[-1]:.2f} s")
-    print(
-        f"{'model':34s}{'held out':>16s}{''.join(f'{n:>10s}' for n in names)}{'' if len(files) > 1 else '  block energy'}"
-    )
+    energies = "" if len(files) > 1 else "  block energy"
+    print(f"{'model':34s}{'held out':>16s}{''.join(f'{n:>10s}' for n in names)}{energies}")
     for name, labels in {"published": None, "refitted": (), **named}.items():
         for held, (train, test) in splits.items():
             hypothesis = Hypothesis(tuple(found[s] for s in labels or ()))
