@@ -598,7 +598,7 @@ def test_a_filter_of_the_tracker_is_no_structure_and_hides_none(name):
         quiet, heard = (SimpleNamespace(residuals=list(r)) for r in (noise, noise + tone))
         alarms += structure(quiet, quiet).score > STRUCTURED
         found += structure(heard, heard).repeated > STRUCTURED
-    assert alarms <= 1 and found >= 30
+    assert alarms <= 1 and found >= 36  # measured: none, and 37 to 40
 
 
 @pytest.mark.parametrize("smooth", [False, True])
