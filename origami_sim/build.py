@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
+from origami_sim.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, rigid, second_moments, triangle
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.materials import MATERIALS, layered_rigidity, material
-from origami_sim.model import Model, Parameters, dihedral_angles
+from origami_sim.model import BODY, Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 
 MEMBRANE_POISSON = 1.0 / 3.0
@@ -28,6 +29,8 @@ class Sheet:
             divided sheets). Triangles have their mass at their corners: exact mass and centre, too large an inertia.
         membrane: factor on the membrane stiffness; below 1 it buys a longer time step (keep strains under a percent).
         membrane_damping: dashpots in the bars, as a ratio of critical.
+        panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, in reduced coordinates: a step that
+            creases set, not the stiffness of panels).
 
     Raises:
         InputError: unknown material, thickness or modulus not positive, faces that cannot be triangulated.
@@ -44,8 +47,11 @@ class Sheet:
         triangulation: str = "diagonal",
         membrane: float = 1.0,
         membrane_damping: float = 0.02,
+        panels: str = "elastic",
     ):
-        self.pattern = pattern
+        if panels not in ("elastic", "rigid"):
+            raise InputError("no such panels", field="panels", value=panels, allowed="elastic, rigid")
+        self.pattern, self.panels = pattern, panels
         self.mesh = triangulate(pattern, triangulation)
         faces = pattern.face_count
         self._names = [m or material for m in pattern.materials]
@@ -72,6 +78,7 @@ class Sheet:
         self._rigidity = np.full(faces, np.nan)
         self._patches: list[dict] = [{} for _ in range(faces)]
         self._lumps: dict[int, tuple[float, np.ndarray, float]] = {}
+        self._stated: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
         self._extra_mass = np.zeros(len(self.mesh.vertices))
         self._free = np.ones((len(self.mesh.vertices), 3))
         self._labels: dict[str, tuple[str, ...]] = {}
@@ -234,6 +241,28 @@ class Sheet:
         self._lumps[panel] = (mass, np.asarray(centre, float), inertia)
         return self
 
+    def body(self, panel: int, *, mass: float, centre: ArrayLike, inertia: ArrayLike) -> "Sheet":
+        """Gives a panel the mass [kg], centre of mass [m] and inertia tensor [kg m^2] of a measured rigid body.
+
+        It replaces the weight of the panel and of its patches. Rigid panels may have any body; elastic ones only one
+        that masses at their nodes can make, with its centre of mass in their plane.
+
+        Args:
+            centre: in the reference state, anywhere. inertia: about the centre of mass, [3, 3] in the reference axes, or
+                the three principal moments along x, y and z.
+
+        Raises:
+            InputError: no such panel, a mass or an inertia that no body has.
+        """
+        self._triangles_of(panel)
+        tensor, middle = np.asarray(inertia, float), np.asarray(centre, float)
+        tensor = np.diag(tensor) if tensor.shape == (3,) else tensor
+        check_body(mass, tensor, f"body of panel {panel}")
+        if middle.shape != (3,) or not np.all(np.isfinite(middle)):
+            raise InputError("a centre is a place", field=f"body of panel {panel}.centre", value=centre, allowed="x, y, z")
+        self._stated[panel] = (mass, middle, tensor)
+        return self
+
     def mass(self, nodes, mass: float) -> "Sheet":
         """Adds point masses [kg]."""
         if not np.all(np.asarray(mass, float) >= 0):
@@ -337,6 +366,8 @@ class Sheet:
         p = Parameters(model)
         mass = self._node_masses()
         p.set("inertia", "mass", mass)
+        for name, values in self._bodies().items():
+            p.set("body", name, values)
         lengths = np.linalg.norm(mesh.vertices[mesh.bars[:, 1]] - mesh.vertices[mesh.bars[:, 0]], axis=1)
         stiffness = self.membrane * self._bar_sections() / lengths
         p.set("bars", "rest_length", lengths).set("bars", "stiffness", stiffness)
@@ -359,7 +390,7 @@ class Sheet:
                     p.set("eccentric_weight", "offset", offset, [t])
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
-        return model, p
+        return rigid(model, p) if self.panels == "rigid" else (model, p)
 
     # geometry -----------------------------------------------------------------------------------------------------
 
@@ -454,14 +485,57 @@ class Sheet:
             out[q] = self.rigidity(int(mesh.bend_face[q])) * span**2 / self.area[pair].sum()
         return out
 
+    def _bodies(self) -> dict[str, np.ndarray]:
+        """Mass, centre of mass and inertia of each panel with its patches and point masses, as `model.BODY` names them."""
+        x, left, rows = self.mesh.vertices, self._extra_mass.copy(), []
+        for panel in range(self.pattern.face_count):
+            nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
+            normal = self._area_vector[triangles].sum(0)
+            normal /= np.linalg.norm(normal)
+            parts = []  # mass, centre, second moments about the origin
+            if panel in self._stated:
+                mass, centre, tensor = self._stated[panel]
+                parts.append((mass, centre, 0.5 * np.trace(tensor) * np.eye(3) - tensor + mass * np.outer(centre, centre)))
+            elif panel in self._lumps:
+                mass, centre, inertia = self._lumps[panel]
+                e1, e2 = self._frame(panel, normal)
+                width = np.ptp(x[nodes] @ e2)
+                spread = inertia * np.outer(e1, e1) + mass * width**2 / 12 * np.outer(e2, e2)
+                parts.append((mass, centre, spread + mass * np.outer(centre, centre)))
+            else:
+                thick, patch = self.thickness[panel], self._patches[panel]
+                for t in triangles:
+                    parts.append(triangle(x[self.mesh.triangles[t]], self.density[panel] * thick * self.area[t], thick))
+                if patch:
+                    middle = patch["centre"] + patch["side"] * 0.5 * (thick + patch["thickness"]) * normal
+                    parts.append(rectangle(middle, patch["size"], patch["thickness"], normal, self._patch_mass(patch)))
+            for n in nodes:  # a mass on a crease is the first panel's
+                parts.append((left[n], x[n], left[n] * np.outer(x[n], x[n])))
+                left[n] = 0.0
+            mass = sum(m for m, *_ in parts)
+            centre = sum(m * c for m, c, _ in parts) / mass
+            tensor = inertia_tensor(sum(s for *_, s in parts) - mass * np.outer(centre, centre))
+            rows.append([mass, *centre, *(tensor[k] for k in SYMMETRIC)])
+        return dict(zip(BODY, np.array(rows).T, strict=True))
+
+    def _frame(self, panel: int, normal: np.ndarray) -> np.ndarray:
+        """[2, 3] unit vectors in the panel's plane: along its longest side, and across it."""
+        corners = self.mesh.vertices[list(self.pattern.faces[panel])]
+        sides = np.roll(corners, -1, axis=0) - corners
+        e1 = sides[np.argmax(np.linalg.norm(sides, axis=1))]
+        e1 = e1 / np.linalg.norm(e1)
+        return np.stack([e1, np.cross(normal, e1)])
+
     def _node_masses(self) -> np.ndarray:
         mesh, out = self.mesh, self._extra_mass.copy()
+        if self.panels == "rigid":  # the bodies have it
+            return np.ones(len(mesh.vertices))
         for panel in range(self.pattern.face_count):
             nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
             patch = self._patches[panel]
             sheet = self.density[panel] * self.thickness[panel] * self.area[triangles]
             centred = len(nodes) > len(self.pattern.faces[panel])
-            if panel not in self._lumps and not centred:
+            if panel not in self._lumps and panel not in self._stated and not centred:
                 extra = self._patch_mass(patch) if patch else 0.0
                 for t, m in zip(triangles, sheet, strict=True):
                     out[mesh.triangles[t]] += (m + extra * self._share(panel, t)) / 3
@@ -479,14 +553,22 @@ class Sheet:
         x = self.mesh.vertices
         normal = self._area_vector[triangles].sum(0)
         normal /= np.linalg.norm(normal)
-        corners = x[list(self.pattern.faces[panel])]
-        sides = np.roll(corners, -1, axis=0) - corners
-        e1 = sides[np.argmax(np.linalg.norm(sides, axis=1))]
-        e1 = e1 / np.linalg.norm(e1)
-        frame = np.stack([e1, np.cross(normal, e1)])
+        frame = self._frame(panel, normal)
         origin = self._centroid(panel)
         y = (x[nodes] - origin) @ frame.T
-        if panel in self._lumps:
+        if panel in self._stated:
+            mass, centre, tensor = self._stated[panel]
+            c, spread = (centre - origin) @ frame.T, frame @ second_moments(tensor) @ frame.T
+            if abs((centre - origin) @ normal) > 1e-6 * np.abs(y).max():
+                raise InputError(
+                    "the centre of mass lies off the panel's plane",
+                    field=f"body of panel {panel}.centre",
+                    value=centre.tolist(),
+                    allowed="a place in its plane, or panels='rigid'",
+                )
+            target = np.append(mass * np.array([1.0, *c]), np.diag(spread) + mass * c**2)
+            target = np.append(target, spread[0, 1] + mass * c[0] * c[1])
+        elif panel in self._lumps:
             mass, centre, inertia = self._lumps[panel]
             c = (centre - origin) @ frame.T
             target = np.array([mass, mass * c[0], mass * c[1], inertia + mass * c[0] ** 2, np.nan, mass * c[0] * c[1]])
@@ -511,12 +593,12 @@ class Sheet:
         floor = 0.01 * target[0] / len(nodes)  # no node without inertia
         rest = target[given] - matrix @ np.full(len(nodes), floor)
         solution, residual = nnls(matrix * scale[:, None], rest * scale)
-        if panel in self._lumps and residual > 1e-6 * target[0]:
+        if (panel in self._lumps or panel in self._stated) and residual > 1e-6 * target[0]:
             raise InputError(
                 "no non-negative node masses have this mass, centre and inertia",
                 field=f"panel {panel}",
                 value=float(residual),
-                allowed="a body whose masses lie within its panel",
+                allowed="a body whose masses lie within its panel, or panels='rigid'",
             )
         return solution + floor
 

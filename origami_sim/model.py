@@ -12,6 +12,10 @@ from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
 
 
+BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx", "yy", "zz", "xy", "xz", "yz")))
+"""Numbers of a rigid body: mass, centre of mass, inertia tensor about it."""
+
+
 @dataclass(frozen=True)
 class Model:
     """Topology and reference geometry, shared by all worlds.
@@ -32,6 +36,8 @@ class Model:
         effects: names of the effects that are switched on, in the order of summation.
         names: labels by family ("crease", "panel", "contact", "node"), for reports.
         channels: recorded channels that errors of the measurement tell apart; 1: the same for all.
+        panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, see `bodies.rigid`).
+        carriers: panels of the last nodes, which stand for the mass of rigid panels and are corners of no triangle.
     """
 
     position: np.ndarray
@@ -49,6 +55,8 @@ class Model:
     effects: tuple[str, ...]
     names: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     channels: int = 1
+    panels: str = "elastic"
+    carriers: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
 
     def count(self, family: str) -> int:
         """Number of entities of a family of effects."""
@@ -65,6 +73,11 @@ class Model:
                 "node": self.position,
             }[family]
         )
+
+    @property
+    def panel_count(self) -> int:
+        """Number of panels."""
+        return int(self.triangle_panel.max(initial=-1)) + 1
 
     @property
     def laws(self) -> tuple[str, ...]:
@@ -100,14 +113,16 @@ class Model:
 class Parameters:
     """Parameter arrays by (owner, name): shape [entity, world] or [entity, 1], tables [entity, world, knot].
 
-    Owners are the effects that are switched on, "inertia" (mass [kg] per node) and "plane" (the ground's tilt [rad],
-    azimuth [rad], height [m] and reach [m], the gap below which contact laws are evaluated).
+    Owners are the effects that are switched on, "inertia" (mass [kg] per node), "plane" (the ground's tilt [rad],
+    azimuth [rad], height [m] and reach [m], the gap below which contact laws are evaluated) and "body" (mass [kg],
+    centre [m] and inertia [kg m^2] of each panel as a rigid body in the reference state; zero: not stated).
     """
 
     def __init__(self, model: Model, values: Mapping[tuple[str, str], np.ndarray] | None = None):
         self._values: dict[tuple[str, str], np.ndarray] = {
             ("inertia", "mass"): np.ones((len(model.position), 1)),
             **{("plane", n): np.zeros((1, 1)) for n in ("tilt", "azimuth", "height", "reach")},
+            **{("body", n): np.zeros((model.panel_count, 1)) for n in BODY},
         }
         for name in model.effects:
             effect = get(name)
@@ -161,12 +176,16 @@ class Parameters:
         self._values[owner, name] = out
         return self
 
+    def replace(self, owner: str, name: str, value: np.ndarray) -> None:
+        """Puts an array [entity, world] in the place of another, of any number of entities, unchecked."""
+        self._values[owner, name] = np.array(value, float)
+
     @staticmethod
     def _check_bounds(owner: str, name: str, value: np.ndarray):
         low, high = 0.0, np.inf
-        if owner not in ("inertia", "plane"):
+        if owner not in ("inertia", "plane", "body"):
             low, high = next(p.bounds for p in get(owner).parameters if p.name == name)
-        elif owner == "plane":
+        elif owner != "inertia":
             low = -np.inf
         elif np.any(value <= 0):
             raise InputError(

@@ -16,6 +16,7 @@ import warp as wp
 
 from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, Effect, get
+from origami_sim.solve import articulated, templates
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
@@ -38,6 +39,9 @@ FIXED_SLOTS = (
 NATURAL = wp.constant(0x7FFFFFFF)
 """Masked with this, an index is seen to be no negative one, and every access to an array is spared that test."""
 
+MOVING = ("rollout", "rigid")
+"""Kernels with a time loop: of nodes, and of rigid panels."""
+
 BITS = 62
 """Effects of which one integer tells whether they act in a world."""
 
@@ -47,112 +51,6 @@ CPU_FLAGS = "-fno-slp-vectorize -ffp-contract=fast"
 Products and sums are fused across statements, as on CUDA. The other kernels round every one, so that a law without
 strength adds exactly nothing.
 """
-
-_ARGUMENTS = """
-    mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
-    electrodes: wp.array(dtype=wp.int32), triangles: wp.array(dtype=wp.vec3i),
-    magnets: wp.array(dtype=wp.int32),
-    contacts: wp.array(dtype=wp.vec3i), weights: wp.array(dtype=vec3), offsets: wp.array(dtype=scalar),
-    axes: wp.array(dtype=vec3), crease_count: int,
-    P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
-    series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),
-    X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
-    memory: wp.array2d(dtype=scalar),
-"""
-
-_ROLLOUT_HEAD = """
-@wp.kernel(enable_backward=False)
-def rollout({arguments}
-    A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
-    power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
-    first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
-    every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar), carried: wp.array3d(dtype=vec3),
-):
-    w = (first_world + wp.tid()) & NATURAL
-    if status[0, w] >= 0:
-        return
-    frame = int(0)
-    wait = every
-{hoist}
-    half_dt = scalar(0.5) * dt
-    limit = speed_limit * speed_limit
-    fastest = int(-1)
-    # one pass more than steps: at the start of a run the first pass only finds the acceleration
-    begin = int(0)
-    if first_step < 0:
-        begin = int(-1)
-    start = wp.max(first_step, 0)
-    for s in range(begin, steps):
-        h = dt
-        half = half_dt
-        if s < 0:
-            h = scalar(0.0)
-            half = scalar(0.0)
-        time = dt * scalar(start + s + 1)
-        if s >= 0 and s < carried.shape[0]:  # nodes that are held follow a prescribed motion
-            for row in range(mask.shape[0]):
-                n = row & NATURAL
-                V[n, w] = carried[s, n, w % carried.shape[2]]
-        # kick and drift; v becomes the prediction of the velocity at the end of the step
-        for row in range(mask.shape[0]):
-            n = row & NATURAL
-            ahead = V[n, w] + half * A[n, w]
-            X[n, w] = X[n, w] + h * ahead
-            V[n, w] = ahead + half * A[n, w]
-            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-{body}
-        # second kick, with the new acceleration
-        for row in range(mask.shape[0]):
-            n = row & NATURAL
-            new = wp.cw_mul(mask[n], F[n, w]) * (scalar(1.0) / {mass})
-            V[n, w] = V[n, w] + half * (new - A[n, w])
-            A[n, w] = new
-            speed = wp.dot(V[n, w], V[n, w])
-            if not (speed <= limit):  # also true for nan
-                fastest = n
-                limit = wp.max(speed, limit)  # so that the fastest is named
-        if fastest >= 0:
-            status[0, w] = start + s + 1
-            status[1, w] = fastest
-            break
-        if s >= 0 and every > 0:
-            wait -= 1
-            if wait == 0:
-                for row in range(mask.shape[0]):
-                    film[frame, row, w] = X[row, w]
-                for row in range(hinges.shape[0]):
-                    film_angles[frame, row, w] = angles[row, w]
-                frame += 1
-                wait = every
-"""
-
-_EVALUATE_HEAD = """
-@wp.kernel(enable_backward=False)
-def evaluate({arguments}
-    forces: wp.array3d(dtype=vec3), energies: wp.array2d(dtype=scalar), gaps: wp.array2d(dtype=scalar),
-    first_world: int, time: scalar,
-):
-    w = (first_world + wp.tid()) & NATURAL
-    h = scalar(0.0)
-{hoist}
-{body}
-"""
-
-_TOTAL_HEAD = """
-@wp.kernel(enable_backward=False)
-def total({arguments}
-    F: wp.array2d(dtype=vec3), first_world: int, time: scalar,
-):
-    w = (first_world + wp.tid()) & NATURAL
-    h = scalar(0.0)
-    for row in range(mask.shape[0]):
-        n = row & NATURAL
-        F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-{hoist}
-{body}
-"""
-
 
 class _Text:
     """Lines of source at a current depth."""
@@ -201,6 +99,10 @@ class Program:
         return self._kernel("rollout")
 
     @functools.cached_property
+    def rigid(self) -> wp.Kernel:
+        return self._kernel("rigid")
+
+    @functools.cached_property
     def evaluate(self) -> wp.Kernel:
         return self._kernel("evaluate")
 
@@ -210,7 +112,7 @@ class Program:
 
     def _kernel(self, name: str) -> wp.Kernel:
         kernel = written(self.sources[name], name, self.effects)
-        if name == "rollout" and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
+        if name in MOVING and hasattr(wp.config, "cpu_compiler_flags"):  # warp 1.15 has no such setting
             common = wp.config.cpu_compiler_flags or "-march=native"
             kernel.module.options["cpu_compiler_flags"] = f"{common} {CPU_FLAGS}"
         return kernel
@@ -230,6 +132,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "kinematics": kinematics,
         "magnetostatics": magnetostatics,
         "wave": wave,
+        "articulated": articulated,
         "NATURAL": NATURAL,
     }
     for e in effects:
@@ -326,6 +229,10 @@ class _Composer:
         if mode == "rollout":
             for line in writes:
                 t(line)
+        if mode == "rigid" and writes:  # stages in between look ahead and change nothing
+            with t.block("if last:"):
+                for line in writes:
+                    t(line)
 
     def add_energy(self, t: _Text, effect: Effect, entity: str, mode: str):
         if mode == "evaluate" and effect.energy is not None:
@@ -333,7 +240,7 @@ class _Composer:
             t(f"energies[{i}, w] = energies[{i}, w] + {self.call(effect, 'energy', entity)}")
 
     def add_work(self, t: _Text, effect: Effect, power: str, mode: str):
-        if mode == "rollout" and effect.exchanges_work:
+        if mode in MOVING and effect.exchanges_work:
             t(f"power_{effect.name} += {power}")
 
     def scatter(self, t: _Text, effect: Effect, node: str, force: str, mode: str):
@@ -342,8 +249,8 @@ class _Composer:
         t(f"{target} = {target} + {force}")
 
     def body(self, mode: str) -> str:
-        """The force evaluation. Modes: 'rollout', 'total' (summed) and 'evaluate' (by effect)."""
-        t = _Text(2 if mode == "rollout" else 1)
+        """The force evaluation. Modes: 'rollout', 'rigid', 'total' (summed) and 'evaluate' (by effect)."""
+        t = _Text({"rollout": 2, "rigid": 4}.get(mode, 1))
         if "field" in self.drives:
             t(f"uniform_field = vec3({', '.join(self.channel(str(FIELD + i)) for i in range(3))})")
         if "gradient" in self.drives:
@@ -353,7 +260,7 @@ class _Composer:
         if "load" in self.drives:
             t(f"load = {self.channel(str(LOAD))}")
         for e in self.effects:
-            if mode == "rollout" and e.exchanges_work:
+            if mode in MOVING and e.exchanges_work:
                 t(f"power_{e.name} = scalar(0.0)")
         self._nodes(t, mode)
         self._bars(t, mode)
@@ -366,6 +273,11 @@ class _Composer:
                 with self.acting(t, e):
                     t(f"work[{i}, w] = work[{i}, w] + half * (power[{i}, w] + power_{e.name})")
                     t(f"power[{i}, w] = power_{e.name}")
+            if mode == "rigid" and e.exchanges_work:
+                with self.acting(t, e):
+                    t(f"tree.spent[{i}, w] = tree.spent[{i}, w] + share * power_{e.name}")
+                    with t.block("if last:"):
+                        t(f"power[{i}, w] = power_{e.name}")
         return str(t)
 
     def _nodes(self, t: _Text, mode: str):
@@ -439,11 +351,20 @@ class _Composer:
         t(f"r = (c + {shift}) & NATURAL")
         for i, node in enumerate("ijkl"):
             t(f"{node} = hinges[r][{i}] & NATURAL")
-        self._fold(t)
+        if mode == "rigid":
+            t("fold = articulated.fold(tree, hinges, angles, X, V, r, w)")
+            t("angle = fold[0]")
+        else:
+            self._fold(t)
         if any("turn" in e.arguments for e in effects):
-            t("turn = angle - angles[r, w]" if mode == "rollout" else "turn = scalar(0.0)")
-        t("angles[r, w] = angle")
-        if any("rate" in e.arguments or e.exchanges_work for e in effects):
+            t("turn = angle - angles[r, w]" if mode in MOVING else "turn = scalar(0.0)")
+        if mode == "rigid":
+            with t.block("if last:"):
+                t("angles[r, w] = angle")
+            t("rate = fold[1]")
+        else:
+            t("angles[r, w] = angle")
+        if mode != "rigid" and any("rate" in e.arguments or e.exchanges_work for e in effects):
             t("rate = " + " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl"))
         if any("voltage" in e.drives for e in effects):
             t(f"voltage = {self.channel(f'{VOLTAGE} + electrodes[r]')}")
@@ -465,7 +386,9 @@ class _Composer:
                         self.scatter(t, e, node, f"M{i} * g.g{node}", mode)
                 else:
                     t(f"moment += M{i}")
-        if mode != "evaluate":
+        if mode == "rigid":
+            t("articulated.bend(tree, hinges, X, F, r, w, moment)")
+        elif mode != "evaluate":
             for node in "ijkl":
                 t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
         t.depth -= 1
@@ -539,6 +462,10 @@ class _Composer:
         t("patch = kinematics.normal_gradients(X[n1, w], X[n2, w], X[n3, w])")
         t("at = at + off * patch.n")
         t("gap = wp.dot(up, at) - plane_height")
+        if mode == "rigid":
+            t("way = at - tree.feet0[c, w]")
+            with t.block("if last:"):
+                t("tree.feet[c, w] = at")
         if mode == "evaluate":
             t("gaps[c, w] = gap")
         t("if gap < reach:")
@@ -567,7 +494,7 @@ class _Composer:
             t("normal = up")
             t("velocity = velocity - up * rate")
             t("speed = wp.length(velocity)")
-            t("slip = velocity * h")
+            t("slip = way - up * wp.dot(up, way)" if mode == "rigid" else "slip = velocity * h")
             if mode == "rollout":
                 # the step was made with the velocity at its middle, half a kick behind the prediction
                 t("kick = share[0] * A[n1, w] + share[1] * A[n2, w] + share[2] * A[n3, w]")
@@ -597,12 +524,12 @@ class _Composer:
                 t(f"F[n{i}, w] = F[n{i}, w] + share[{i - 1}] * push - (off * wp.dot(push, patch.g{i})) * patch.n")
         t.depth -= 1
         resets = [m for e in tangents for m in e.memory]
-        if resets and mode == "rollout":
-            t("else:")
-            for e in tangents:
-                for m in e.memory:
-                    for k in range(m.size):
-                        t(f"memory[m_{e.name}_{m.name} + {m.size} * c + {k}, w] = scalar(0.0)", 1)
+        if resets and mode in MOVING:
+            with t.block("elif last:" if mode == "rigid" else "else:"):
+                for e in tangents:
+                    for m in e.memory:
+                        for k in range(m.size):
+                            t(f"memory[m_{e.name}_{m.name} + {m.size} * c + {k}, w] = scalar(0.0)")
         t.depth -= 1
 
     def _contact_force(self, t: _Text, effect: Effect, force: str, mode: str):
@@ -615,12 +542,13 @@ class _Composer:
             self.scatter(t, effect, f"n{i}", at_node, mode)
 
     def sources(self) -> dict[str, str]:
-        given = {"arguments": _ARGUMENTS, "hoist": self.hoist()}
+        given = {"arguments": templates.ARGUMENTS, "hoist": self.hoist()}
         mass = self.value("inertia", "mass", "n")
         return {
-            "rollout": _ROLLOUT_HEAD.format(**given, body=self.body("rollout"), mass=mass),
-            "evaluate": _EVALUATE_HEAD.format(**given, body=self.body("evaluate")),
-            "total": _TOTAL_HEAD.format(**given, body=self.body("total")),
+            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass),
+            "rigid": templates.RIGID.format(**given, body=self.body("rigid")),
+            "evaluate": templates.EVALUATE.format(**given, body=self.body("evaluate")),
+            "total": templates.TOTAL.format(**given, body=self.body("total")),
         }
 
 

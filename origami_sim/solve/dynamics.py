@@ -11,8 +11,9 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve.batch import Batch, Evaluation
+from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
+from origami_sim.solve.rigid import batch_of
 from origami_sim.solve.timestep import TimeStep, stable_step
 
 
@@ -132,6 +133,8 @@ def simulate(
     if method not in ("explicit", "implicit"):
         raise InputError("no such method", field="method", value=method, allowed="explicit, implicit")
     implicit = method == "implicit"
+    if implicit and model.panels == "rigid":
+        raise InputError("rigid panels need no implicit steps", field="method", value=method, allowed="explicit")
     if dt is not None and not 0 < dt <= (np.finfo(float).max if implicit else chosen.limit):
         what = "the time step is above the stability limit" if dt > 0 else "the time step must be positive"
         allowed = "> 0 s" if implicit else f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}"
@@ -167,7 +170,8 @@ def simulate(
             threads=threads,
         )
     else:
-        batch = Batch(model, parameters, applied, state, device=device, threads=threads)
+        exact = {} if model.panels != "rigid" or dt is None else {"tolerance": 0.0}  # a given step is taken as it is
+        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, **exact)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 

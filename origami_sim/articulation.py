@@ -1,0 +1,220 @@
+"""Rigid panels joined by creases: a tree of hinges in which a device's motion has few coordinates.
+
+The simulator knows only nodes. To start it where a recording starts, and to ask which moment a recorded motion needs at
+which crease, panels are taken as rigid here: a spanning tree of panels, the fold angles of its creases and, where no
+panel is held, the pose of the root.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from origami_sim.model import Model, dihedral_angles
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Configurations of W worlds.
+
+    Attributes:
+        rotation: [W, 3, 3] of the root panel. centre: [W, 3] where the root's reference centre is [m].
+        angles: [J, W] fold angles of the tree's creases [rad].
+    """
+
+    rotation: np.ndarray
+    centre: np.ndarray
+    angles: np.ndarray
+
+    @property
+    def worlds(self) -> int:
+        return self.angles.shape[1]
+
+    def select(self, worlds) -> "Pose":
+        return Pose(self.rotation[worlds], self.centre[worlds], self.angles[:, worlds])
+
+
+class Articulation:
+    """The tree of a model.
+
+    Attributes:
+        creases: (J,) creases of the tree, from the root outwards.
+        floating: whether the root can move; its six coordinates (shift, then turn) then come first.
+        size: number of coordinates m.
+        open: creases outside the tree, which close loops.
+        sides: panels left and right of each crease; None: none.
+    """
+
+    def __init__(self, model: Model):
+        self.model = model
+        x, panels = model.position, model.triangle_panel
+        nodes = [np.unique(model.triangles[panels == p]) for p in range(int(panels.max(initial=-1)) + 1)]
+        nodes = nodes or [np.arange(len(x))]  # without panels it is one body
+        held = ~np.any(model.free, axis=1)
+        fixed = [p for p, n in enumerate(nodes) if len(n) and np.all(held[n])]
+        self.floating = not np.any(held)
+        root = fixed[0] if fixed else int(np.argmax([len(n) for n in nodes])) if nodes else 0
+        if not fixed and not self.floating:  # held by single nodes: the panel that holds most of them
+            root = int(np.argmax([held[n].sum() for n in nodes]))
+        sides = [self._sides(model, nodes, c) for c in range(len(model.creases))]
+        reached, order, queue = {root}, [], deque([root])
+        while queue:
+            parent = queue.popleft()
+            for c, (left, right) in enumerate(sides):
+                for child, here, sign in ((left, right, 1.0), (right, left, -1.0)):
+                    if here == parent and child is not None and child not in reached:
+                        reached.add(child)
+                        order.append((c, parent, child, sign))
+                        queue.append(child)
+        self.root, self._joints, self._nodes, self.sides = root, order, nodes, sides
+        self.creases = np.array([c for c, *_ in order], int)
+        self.open = np.setdiff1d(np.arange(len(model.creases)), self.creases)
+        self._rest = dihedral_angles(x[:, None], model.creases)[:, 0]
+        self._centre = x[nodes[root]].mean(0) if nodes else x.mean(0)
+        owner = np.full(len(x), -1)
+        for p in [root, *(child for _, _, child, _ in order)]:
+            fresh = nodes[p][owner[nodes[p]] < 0]
+            owner[fresh] = p
+        owner[owner < 0] = root
+        if len(model.carriers):
+            owner[-len(model.carriers) :] = model.carriers
+        self._owner = owner
+        parents = {child: parent for _, parent, child, _ in order}
+        below: list[set[int]] = [{child} for _, _, child, _ in order]
+        for _, _, child, _ in order:
+            p = child
+            while p in parents:
+                p = parents[p]
+                for joint, members in enumerate(below):
+                    if order[joint][2] == p:
+                        members.add(child)
+        self._below = below
+        self._carried = [np.isin(owner, list(members)) for members in below]
+
+    @property
+    def order(self) -> list[int]:
+        """Panels from the root outwards."""
+        return [self.root, *(child for _, _, child, _ in self._joints)]
+
+    @property
+    def joints(self) -> list[tuple[int, int, int, float]]:
+        """(crease, panel towards the root, panel beyond, sign of the crease's angle) of each joint."""
+        return self._joints
+
+    @property
+    def owner(self) -> np.ndarray:
+        """[N] panel that carries each node."""
+        return self._owner
+
+    @staticmethod
+    def _sides(model: Model, nodes: list[np.ndarray], crease: int) -> tuple[int | None, int | None]:
+        """Panels on the side of l and on the side of i."""
+        i, j, k, m = model.creases[crease]
+        found: list[int | None] = []
+        for tip in (m, i):
+            triangle = np.flatnonzero(np.all(np.isin(model.triangles, [j, k, tip]), axis=1))
+            found.append(int(model.triangle_panel[triangle[0]]) if len(triangle) else None)
+        return found[0], found[1]
+
+    @property
+    def size(self) -> int:
+        return 6 * self.floating + len(self.creases)
+
+    def names(self) -> list[str]:
+        """Names of the coordinates."""
+        root = [f"{k} {a}" for k in ("shift", "turn") for a in "xyz"] if self.floating else []
+        return root + [self.model.name("crease", int(c)) for c in self.creases]
+
+    def reference(self, worlds: int = 1) -> Pose:
+        """The reference state."""
+        return Pose(
+            np.tile(np.eye(3), (worlds, 1, 1)),
+            np.tile(self._centre, (worlds, 1)),
+            np.tile(self._rest[self.creases][:, None], worlds),
+        )
+
+    def moved(self, pose: Pose, by: np.ndarray) -> Pose:
+        """The pose after a small displacement [m, W] of the coordinates."""
+        if not self.floating:
+            return replace(pose, angles=pose.angles + by)
+        turn = Rotation.from_rotvec(by[3:6].T).as_matrix()
+        return Pose(turn @ pose.rotation, pose.centre + by[:3].T, pose.angles + by[6:])
+
+    def positions(self, pose: Pose) -> np.ndarray:
+        """Node positions [N, W, 3] [m]."""
+        x = self.model.position
+        turns = {self.root: pose.rotation}
+        shifts = {self.root: pose.centre - pose.rotation @ self._centre}
+        for joint, (c, parent, child, sign) in enumerate(self._joints):
+            _, j, k, _ = self.model.creases[c]
+            axis = (x[k] - x[j]) / np.linalg.norm(x[k] - x[j])
+            angle = sign * (pose.angles[joint] - self._rest[c])
+            turns[child] = turns[parent] @ Rotation.from_rotvec(angle[:, None] * axis).as_matrix()
+            shifts[child] = turns[parent] @ x[j] + shifts[parent] - turns[child] @ x[j]
+        out = np.empty((len(x), pose.worlds, 3))
+        for panel in turns:
+            mine = np.flatnonzero(self._owner == panel)
+            out[mine] = np.einsum("wab,nb->nwa", turns[panel], x[mine]) + shifts[panel]
+        return out
+
+    def jacobian(self, pose: Pose, x: np.ndarray | None = None) -> np.ndarray:
+        """Velocities of the nodes for unit rates of the coordinates, [m, N, W, 3]."""
+        x = self.positions(pose) if x is None else x
+        out = np.zeros((self.size, *x.shape))
+        first = 0
+        if self.floating:
+            for a in range(3):
+                unit = np.eye(3)[a]
+                out[a] = unit
+                out[3 + a] = np.cross(unit, x - pose.centre)
+            first = 6
+        for joint, (c, _, _, sign) in enumerate(self._joints):
+            carried = self._carried[joint]
+            out[first + joint, carried] = np.cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
+        return out
+
+    def sought(self, shown: np.ndarray) -> np.ndarray:
+        """Projector [..., m, m] on the directions in which a pose is sought, given where the search begins.
+
+        These are all folds, and of shifts and turns those that stand out of noise there: seen from the side, a device
+        cannot be told to roll, but once rolled a little, rolling further would explain any error of its length.
+
+        Args:
+            shown: [..., D, m] what changes of the coordinates by 1 m and 1 rad show, in deviations of noise.
+        """
+        out = np.zeros((*shown.shape[:-2], self.size, self.size)) + np.eye(self.size)
+        rigid = 6 * self.floating
+        if rigid:
+            _, size, along = np.linalg.svd(shown[..., :rigid], full_matrices=False)
+            along = along * (size > 1.0)[..., None]
+            out[..., :rigid, :rigid] = np.swapaxes(along, -1, -2) @ along
+        return out
+
+    def inverse(self, shown: np.ndarray, sought: np.ndarray, rounding: float) -> np.ndarray:
+        """Pseudo-inverse [..., m, D] of `shown` in the directions that are sought, less those of rounding's size."""
+        return sought @ np.linalg.pinv(shown @ sought, rcond=rounding)
+
+    def turning(self, x: np.ndarray) -> dict[int, np.ndarray]:
+        """Angular velocities of the panels that creases move for unit rates of the coordinates, each [m, W, 3]."""
+        out = {child: np.zeros((self.size, *x.shape[1:])) for _, _, child, _ in self._joints}
+        first = self.size - len(self.creases)
+        for p, turns in out.items():
+            if self.floating:
+                turns[3:6] = np.eye(3)[:, None]
+            for joint, (c, _, _, sign) in enumerate(self._joints):
+                if p in self._below[joint]:
+                    turns[first + joint] = self._axis(x, c, sign)
+        return out
+
+    @property
+    def outer(self) -> dict[int, tuple[np.ndarray, int]]:
+        """Of each panel that a crease moves, its nodes and that crease's coordinate."""
+        first = self.size - len(self.creases)
+        return {child: (self._nodes[child], first + n) for n, (_, _, child, _) in enumerate(self._joints)}
+
+    def _axis(self, x: np.ndarray, crease: int, sign: float) -> np.ndarray:
+        """(W, 3) about which the outer panel turns when the fold grows."""
+        _, j, k, _ = self.model.creases[crease]
+        axis = x[k] - x[j]
+        return sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)

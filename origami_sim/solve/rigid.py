@@ -1,0 +1,355 @@
+"""Rollouts of rigid panels: hinge angles and the pose of the root in place of the nodes of bars."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from origami_sim.articulation import Articulation
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.solve import articulated
+from origami_sim.solve.batch import _FIRST, Batch
+
+TOLERANCE = 1e-9
+"""Largest error of one step [rad], or part of the device's size; half and double cost 13 % more and less."""
+
+FINEST = 1e-7
+"""Part of the asked step below which a world is given up as unstable."""
+
+STABILISATION = 100.0
+"""Rate at which an error of a closed loop decays [1/s]; a loop that is consistent at first only gathers rounding."""
+
+SOFTNESS = 1e-10
+"""Softness of loop constraints, relative to the mobility of their nodes: redundant ones share the load."""
+
+TABLEAU = np.array(
+    [
+        [0, 0, 0, 0, 0, 0, 0, 0],
+        [1 / 5, 1 / 5, 0, 0, 0, 0, 0, 0],
+        [3 / 10, 3 / 40, 9 / 40, 0, 0, 0, 0, 0],
+        [4 / 5, 44 / 45, -56 / 15, 32 / 9, 0, 0, 0, 0],
+        [8 / 9, 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0, 0],
+        [1, 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0, 0],
+        [1, 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0],
+        [0, 71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
+    ]
+)
+"""Times and weights of the stages (Dormand & Prince 1980, order 5), and the weights of the error (5 less 4)."""
+
+
+class RigidBatch(Batch):
+    """A batch of worlds with rigid panels, moved in reduced coordinates.
+
+    Panels keep the shapes that they have in the state. Steps are of order five; within each of them, unless
+    `tolerance` is 0, the solver takes as many as the error of the embedded formula asks for, world by world.
+
+    Args:
+        model: with `panels` "rigid" (see `bodies.rigid`). tolerance: error of one step [rad]; 0: steps as given.
+        The rest as for `Batch`.
+
+    Raises:
+        InputError: panels that are not joined by creases, held in a way that is no rigid motion, without mass or
+            inertia; loops that the model's creases cannot close.
+    """
+
+    def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options):
+        super().__init__(model, parameters, drive, state, **options)
+        self.tolerance = tolerance
+        self.tree_of = Topology(model)
+        self._fresh = 1
+        self._tree = self._made(state)
+
+    def _made(self, state: State) -> articulated.Tree:
+        """The tree on the device, its bodies shaped and placed as in a state."""
+        t, model, w = self.tree_of, self.model, self.worlds
+        x, tree = state.x, articulated.Tree()
+        bodies, joints, roots = len(t.parent), len(t.parent) - 1, len(t.turns)
+        m, rows, effects = joints + roots, len(t.row_node), len(self.program.effects)
+        mass = np.broadcast_to(self._mass, (len(x), w))
+
+        def constant(a, dtype):
+            return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
+
+        def blank(count, dtype=wp.float64):
+            return wp.zeros((count, self._stride), dtype=dtype, device=self.device)
+
+        def filled(a, dtype):
+            out = np.zeros((len(a), self._stride, *a.shape[2:]))
+            out[:, :w] = a
+            return wp.array(out, dtype=dtype, device=self.device)
+
+        tree.parent = constant(t.parent, wp.int32)
+        tree.body_of = constant(t.body_of, wp.int32)
+        tree.joint_of = constant(t.joint_of, wp.int32)
+        tree.root_turn, tree.root_shift = constant(t.turns, wp.vec3d), constant(t.shifts, wp.vec3d)
+        tree.root_pivot, tree.root_follows = constant(t.pivots, wp.vec3d), int(t.follows)
+        tree.row_node, tree.row_body = constant(t.row_node, wp.int32), constant(t.row_body, wp.int32)
+        tree.row_axis = constant(t.row_axis, wp.vec3d)
+        tree.stabilisation, tree.softness = STABILISATION, SOFTNESS
+        tree.tableau = constant(TABLEAU, wp.float64)
+        # bodies
+        centre, weight, inertia = self._bodies(x, mass)
+        origin = x[t.root_nodes].mean(axis=0)[None]
+        axis, pivot = np.zeros((joints, w, 3)), np.zeros((joints, w, 3))
+        for j, (c, sign) in enumerate(t.joints):
+            along = x[model.creases[c, 2]] - x[model.creases[c, 1]]
+            axis[j] = sign * along / np.linalg.norm(along, axis=-1, keepdims=True)
+            pivot[j] = x[model.creases[c, 1]]
+        tree.reference, tree.root_centre = filled(x, wp.vec3d), filled(origin, wp.vec3d)
+        tree.axis, tree.pivot = filled(axis, wp.vec3d), filled(pivot, wp.vec3d)
+        tree.start = filled(state.angles[: len(model.creases)], wp.float64)
+        tree.mass, tree.centre = filled(weight, wp.float64), filled(centre, wp.vec3d)
+        tree.inertia = filled(inertia, wp.mat33d)
+        # coordinates
+        y = np.zeros((7 + joints, w))
+        y[:3], y[6] = origin[0].T, 1.0
+        tree.y, tree.u = filled(y, wp.float64), filled(self._rates(state, origin[0], axis, pivot), wp.float64)
+        tree.y0, tree.u0 = blank(7 + joints), blank(m)
+        tree.dy, tree.du = blank(7 * (7 + joints)), blank(7 * m)
+        tree.span = filled(np.full((1, w), np.inf), wp.float64)
+        tree.angles0, tree.memory0 = blank(len(state.angles)), blank(len(state.memory))
+        tree.feet, tree.feet0 = filled(contact_points(model, x), wp.vec3d), blank(len(model.contacts), wp.vec3d)
+        tree.power0, tree.spent = blank(effects), blank(effects)
+        for name in ("turned", "second"):
+            setattr(tree, name, blank(bodies, wp.mat33d))
+        for name in ("placed", "omega", "speed", "alpha", "gain", "force", "moment", "first"):
+            setattr(tree, name, blank(bodies, wp.vec3d))
+        tree.hinge, tree.joint = blank(joints, wp.vec3d), blank(joints, wp.vec3d)
+        tree.torque, tree.heavy, tree.factor = blank(joints), blank(bodies), blank(m * m)
+        tree.rows, tree.solved, tree.gram = blank(rows * m), blank(rows * m), blank(rows * rows)
+        tree.pull = blank(rows)
+        self.size = float(np.ptp(model.position, axis=0).max()) or 1.0
+        return tree
+
+    def _bodies(self, x: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Centres [B, W, 3], masses [B, W] and inertia tensors about the centres [B, W, 3, 3] of the bodies."""
+        count, w = len(self.tree_of.parent), self.worlds
+        centre, weight, inertia = np.zeros((count, w, 3)), np.zeros((count, w)), np.zeros((count, w, 3, 3))
+        for b in range(count):
+            mine = self.tree_of.body_of == b
+            weight[b] = mass[mine].sum(axis=0)
+            safe = np.where(weight[b] > 0, weight[b], 1.0)
+            centre[b] = (mass[mine][:, :, None] * x[mine]).sum(axis=0) / safe[:, None]
+            r = x[mine] - centre[b]
+            spread = np.einsum("nw,nwa,nwb->wab", mass[mine], r, r)
+            inertia[b] = np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3) - spread
+        return centre, weight, inertia
+
+    def _rates(self, state: State, origin: np.ndarray, axis: np.ndarray, pivot: np.ndarray) -> np.ndarray:
+        """Rates of the coordinates [m, W] that fit the velocities of a state best."""
+        if not np.any(state.v):
+            return np.zeros((len(self.tree_of.turns) + len(axis), self.worlds))
+        by = self.jacobian(state.x, origin, axis, pivot)
+        by = np.moveaxis(by, 2, 0).reshape(self.worlds, len(by), -1)  # [W, m, 3 N]
+        right = by @ np.moveaxis(state.v, 1, 0).reshape(self.worlds, -1, 1)
+        return np.linalg.solve(by @ np.swapaxes(by, 1, 2), right)[:, :, 0].T
+
+    def jacobian(self, x: np.ndarray, origin: np.ndarray, axis: np.ndarray, pivot: np.ndarray) -> np.ndarray:
+        """Velocities of the nodes for unit rates of the coordinates, [m, N, W, 3]."""
+        t = self.tree_of
+        out = np.zeros((len(t.turns) + len(axis), *x.shape))
+        for k, (turn, shift, point) in enumerate(zip(t.turns, t.shifts, t.pivots, strict=True)):
+            out[k] = shift + np.cross(turn, x - (origin if t.follows else point))
+        for j in range(len(axis)):
+            mine = np.isin(t.body_of, t.beyond(j + 1))
+            out[len(t.turns) + j, mine] = np.cross(axis[j], x[mine] - pivot[j])
+        return out
+
+    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
+        fixed = self.tolerance == 0.0
+        self._launch(
+            self.program.rigid,
+            [
+                self._tree,
+                self._f,
+                self._work,
+                self._power,
+                self._status,
+                _FIRST,
+                max(self.step, 0),
+                self._fresh,
+                steps,
+                wp.float64(dt),
+                wp.float64(self.tolerance),
+                wp.float64(self.size),
+                wp.float64(0.0 if fixed else FINEST * dt),
+                every,
+                film,
+                angles,
+            ],
+        )
+        self._fresh = 0
+        self.step = max(self.step, 0) + steps
+
+    def carry(self, path: np.ndarray, dt: float):
+        """Refused: rigid panels that are carried along a path are held; see `batch_of`."""
+        raise InputError("only held panels can be carried", field="carry", allowed="a model that is held everywhere")
+
+    def place(self, x: np.ndarray, angles: np.ndarray, memory: np.ndarray | None = None):
+        """See `Batch.place`: what asks for forces there needs no tree; to move on from there, make another batch."""
+        super().place(x, angles, memory)
+
+
+class Topology:
+    """Tree of a model's panels: bodies, joints, how the root may move, and the loops to be closed.
+
+    Attributes:
+        parent: [B] body towards the root, bodies numbered outwards. body_of: [N]. joint_of: [C], -1 closes a loop.
+        joints: (crease, sign of its angle) of each joint.
+        turns, shifts, pivots: [d, 3] of the rates of the root. follows: whether it turns about its own centre.
+        root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `articulated.Tree`.
+    """
+
+    def __init__(self, model: Model):
+        arm = Articulation(model)
+        panels = arm.order
+        apart = sorted(set(range(max(model.panel_count, 1))) - set(panels))
+        if apart:
+            raise InputError(
+                "rigid panels have to be joined by creases",
+                field="panels",
+                value=", ".join(model.name("panel", p) for p in apart),
+                allowed="one connected sheet, or panels='elastic'",
+            )
+        body = {p: b for b, p in enumerate(panels)}
+        self.parent = np.array([-1, *(body[p] for _, p, _, _ in arm.joints)], np.int32)
+        self.joints = [(int(c), sign) for c, _, _, sign in arm.joints]
+        owner = arm.owner
+        self.body_of = np.array([body[p] for p in owner], np.int32)
+        self.joint_of = np.full(len(model.creases), -1, np.int32)
+        for j, (c, _) in enumerate(self.joints):
+            self.joint_of[c] = j
+        self._beyond = [np.array([b]) for b in range(len(panels))]
+        for b in range(len(panels) - 1, 0, -1):
+            self._beyond[self.parent[b]] = np.concatenate([self._beyond[self.parent[b]], self._beyond[b]])
+        self.root_nodes = np.flatnonzero(self.body_of == 0)
+        self.turns, self.shifts, self.pivots, self.follows = self._root(model)
+        self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body)
+
+    def beyond(self, body: int) -> np.ndarray:
+        """A body and all that it carries."""
+        return self._beyond[body]
+
+    def _root(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """How the root can move with its nodes held as they are.
+
+        The rigid motions that the held directions leave are found at the reference; they stay possible wherever the
+        root goes if they form a group, that is if their commutators are among them.
+        """
+        nodes = self.root_nodes
+        x, held = model.position[nodes], model.free[nodes] == 0.0
+        centre = x.mean(axis=0)
+        size = np.ptp(x, axis=0).max() or 1.0
+        rows = []
+        for point, axes in zip((x - centre) / size, held, strict=True):
+            for a in np.flatnonzero(axes):
+                e = np.eye(3)[a]
+                rows.append(np.concatenate([np.cross(point, e), e]))  # of (angular velocity, velocity of the centre)
+        if not rows:
+            return np.eye(6)[:, :3], np.eye(6)[:, 3:], np.tile(centre, (6, 1)), True
+        _, s, vt = np.linalg.svd(np.array(rows))
+        basis = vt[np.sum(s > 1e-9) :]
+        if not len(basis):
+            return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), False
+        basis = _reduced(basis)
+        turns, moves = basis[:, :3], basis[:, 3:]
+        for a in range(len(basis)):
+            for b in range(a):
+                bracket = np.concatenate(
+                    [np.cross(turns[a], turns[b]), np.cross(turns[a], moves[b]) - np.cross(turns[b], moves[a])]
+                )
+                if np.linalg.norm(bracket - basis.T @ np.linalg.lstsq(basis.T, bracket, rcond=None)[0]) > 1e-9:
+                    raise InputError(
+                        "a rigid panel is held at nodes that would have to slide",
+                        field="free",
+                        value=[int(n) for n in nodes[held.any(axis=1)]],
+                        allowed="a panel that is free, held, or turns about a fixed line, point or normal of a plane",
+                    )
+        translations = basis[np.linalg.norm(turns, axis=1) < 1e-9, 3:]
+        span = translations.T @ np.linalg.pinv(translations.T) if len(translations) else np.zeros((3, 3))
+        # a turn may be taken about the centre wherever that is, if every shift of its pivot is a motion, too
+        follows = all(
+            np.allclose(span @ side, side, atol=1e-9) for t in turns for side in np.cross(t, np.eye(3))
+        )
+        if follows:
+            kept = np.linalg.norm(turns, axis=1) > 1e-9
+            moves = np.where(kept[:, None], moves - moves @ span.T, moves)
+        return turns, moves * size, np.tile(centre, (len(basis), 1)), follows
+
+    def _loops(self, model: Model, arm: Articulation, body: dict[int, int]):
+        """Rows of the constraints: both ends of creases that close loops, and held nodes of panels other than the root."""
+        nodes, pairs, axes = [], [], []
+
+        def add(node: int, one: int, other: int, directions):
+            for a in directions:
+                nodes.append(node)
+                pairs.append((one, other))
+                axes.append(np.eye(3)[a])
+
+        for c in arm.open:
+            left, right = arm.sides[c]
+            if left is None or right is None or left == right:
+                continue
+            one, other = body[left], body[right]
+            if self.parent[one] == other or self.parent[other] == one:
+                joint = max(one, other) - 1
+                if _on_line(model, int(c), self.joints[joint][0]):  # a further piece of the same fold line
+                    self.joint_of[c] = joint
+                    continue
+            for n in model.creases[c, 1:3]:
+                add(int(n), one, other, range(3))
+        held = model.free == 0.0
+        for n in np.flatnonzero(held.any(axis=1)):
+            if self.body_of[n] != 0:
+                add(int(n), int(self.body_of[n]), -1, np.flatnonzero(held[n]))
+        return (
+            np.array(nodes, np.int32),
+            np.array(pairs, np.int32).reshape(-1, 2),
+            np.array(axes, float).reshape(-1, 3),
+        )
+
+
+def _reduced(basis: np.ndarray) -> np.ndarray:
+    """Another basis [d, 6] of the same motions, with as many pure translations as there are."""
+    _, s, vt = np.linalg.svd(basis[:, :3].T)
+    rank = int(np.sum(s > 1e-9))
+    return vt @ basis if rank else basis
+
+
+def _on_line(model: Model, c: int, other: int) -> bool:
+    """Whether two creases lie on one line in the reference state."""
+    x = model.position
+    a, b = x[model.creases[other, 1:3]]
+    along = (b - a) / np.linalg.norm(b - a)
+    away = np.cross(x[model.creases[c, 1:3]] - a, along)
+    return bool(np.linalg.norm(away, axis=1).max() < 1e-9 * np.linalg.norm(b - a))
+
+
+def contact_points(model: Model, x: np.ndarray) -> np.ndarray:
+    """Places of the contact points [K, W, 3] [m] at positions x [N, W, 3]."""
+    if not len(model.contacts):
+        return np.zeros((0, *x.shape[1:]))
+    a, b, c = (x[model.contacts[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    corners = np.stack([a, b, c], axis=1)
+    return np.einsum("kc,kcwa->kwa", model.contact_weights, corners) + model.contact_offsets[:, None, None] * normal
+
+
+def batch_of(
+    model: Model, parameters: Parameters, drive: Drive, state: State, *, among: Sequence[str] = (), **options
+) -> Batch:
+    """A batch of worlds of whichever kind the model's panels ask for.
+
+    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path.
+    """
+    if model.panels != "rigid":
+        return Batch(model, parameters, drive, state, among=among, **options)
+    if not np.any(model.free):
+        unit = parameters.copy()
+        unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
+        options.pop("tolerance", None)
+        return Batch(model, unit, drive, state, among=among, **options)
+    return RigidBatch(model, parameters, drive, state, among=among, **options)

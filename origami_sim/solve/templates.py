@@ -1,0 +1,183 @@
+"""Text of the kernels around the laws of the effects: arguments, time loops, what is done with the forces."""
+
+ARGUMENTS = """
+    mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
+    electrodes: wp.array(dtype=wp.int32), triangles: wp.array(dtype=wp.vec3i),
+    magnets: wp.array(dtype=wp.int32),
+    contacts: wp.array(dtype=wp.vec3i), weights: wp.array(dtype=vec3), offsets: wp.array(dtype=scalar),
+    axes: wp.array(dtype=vec3), crease_count: int,
+    P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
+    series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),
+    X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
+    memory: wp.array2d(dtype=scalar),
+"""
+
+ROLLOUT = """
+@wp.kernel(enable_backward=False)
+def rollout({arguments}
+    A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
+    power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
+    first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
+    every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar), carried: wp.array3d(dtype=vec3),
+):
+    w = (first_world + wp.tid()) & NATURAL
+    if status[0, w] >= 0:
+        return
+    frame = int(0)
+    wait = every
+{hoist}
+    half_dt = scalar(0.5) * dt
+    limit = speed_limit * speed_limit
+    fastest = int(-1)
+    # one pass more than steps: at the start of a run the first pass only finds the acceleration
+    begin = int(0)
+    if first_step < 0:
+        begin = int(-1)
+    start = wp.max(first_step, 0)
+    for s in range(begin, steps):
+        h = dt
+        half = half_dt
+        if s < 0:
+            h = scalar(0.0)
+            half = scalar(0.0)
+        time = dt * scalar(start + s + 1)
+        if s >= 0 and s < carried.shape[0]:  # nodes that are held follow a prescribed motion
+            for row in range(mask.shape[0]):
+                n = row & NATURAL
+                V[n, w] = carried[s, n, w % carried.shape[2]]
+        # kick and drift; v becomes the prediction of the velocity at the end of the step
+        for row in range(mask.shape[0]):
+            n = row & NATURAL
+            ahead = V[n, w] + half * A[n, w]
+            X[n, w] = X[n, w] + h * ahead
+            V[n, w] = ahead + half * A[n, w]
+            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+{body}
+        # second kick, with the new acceleration
+        for row in range(mask.shape[0]):
+            n = row & NATURAL
+            new = wp.cw_mul(mask[n], F[n, w]) * (scalar(1.0) / {mass})
+            V[n, w] = V[n, w] + half * (new - A[n, w])
+            A[n, w] = new
+            speed = wp.dot(V[n, w], V[n, w])
+            if not (speed <= limit):  # also true for nan
+                fastest = n
+                limit = wp.max(speed, limit)  # so that the fastest is named
+        if fastest >= 0:
+            status[0, w] = start + s + 1
+            status[1, w] = fastest
+            break
+        if s >= 0 and every > 0:
+            wait -= 1
+            if wait == 0:
+                for row in range(mask.shape[0]):
+                    film[frame, row, w] = X[row, w]
+                for row in range(hinges.shape[0]):
+                    film_angles[frame, row, w] = angles[row, w]
+                frame += 1
+                wait = every
+"""
+
+EVALUATE = """
+@wp.kernel(enable_backward=False)
+def evaluate({arguments}
+    forces: wp.array3d(dtype=vec3), energies: wp.array2d(dtype=scalar), gaps: wp.array2d(dtype=scalar),
+    first_world: int, time: scalar,
+):
+    w = (first_world + wp.tid()) & NATURAL
+    h = scalar(0.0)
+{hoist}
+{body}
+"""
+
+TOTAL = """
+@wp.kernel(enable_backward=False)
+def total({arguments}
+    F: wp.array2d(dtype=vec3), first_world: int, time: scalar,
+):
+    w = (first_world + wp.tid()) & NATURAL
+    h = scalar(0.0)
+    for row in range(mask.shape[0]):
+        n = row & NATURAL
+        F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+{hoist}
+{body}
+"""
+
+RIGID = """
+@wp.kernel(enable_backward=False)
+def rigid({arguments}
+    tree: articulated.Tree, F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
+    power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
+    first_world: int, first_step: int, fresh: int, steps: int, dt: scalar, tolerance: scalar, size: scalar,
+    finest: scalar, every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar),
+):
+    w = (first_world + wp.tid()) & NATURAL
+    if status[0, w] >= 0:
+        return
+    frame = int(0)
+    wait = every
+{hoist}
+    final = int(articulated.STAGES - 1)
+    # one pass more than steps: at first only the accelerations are found
+    begin = int(0)
+    if fresh == 1:
+        begin = int(-1)
+    for s in range(begin, steps):
+        clock = scalar(0.0)
+        going = int(1)
+        while going == 1:
+            step = dt - clock
+            whole = int(1)
+            if tolerance > scalar(0.0) and step > tree.span[0, w]:
+                whole = int(0)
+                step = wp.min(tree.span[0, w], scalar(0.5) * step)
+            first_stage = int(1)
+            if s < 0:
+                step = scalar(0.0)
+                first_stage = final
+            articulated.begin(tree, angles, memory, power, w)
+            for stage in range(first_stage, final + 1):
+                if s >= 0:
+                    articulated.go(tree, stage, step, w)
+                h = tree.tableau[stage, 0] * step
+                time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
+                share = tree.tableau[final, 1 + stage]
+                last = stage == final
+                articulated.pose(tree, X, V, F, w)
+{body}
+                articulated.accelerate(tree, F, X, stage, w)
+            error = scalar(0.0)
+            if s >= 0:
+                error = articulated.error_of(tree, step, size, w)
+            if s < 0 or (tolerance == scalar(0.0) and error <= scalar(1.0)) or error <= tolerance:
+                articulated.carry_over(tree, work, step, w)
+                clock += step
+                if s < 0 or whole == 1:
+                    going = int(0)
+            else:
+                articulated.go_back(tree, angles, memory, power, w)
+                whole = int(0)
+            if s >= 0 and tolerance > scalar(0.0):
+                longer = articulated.next_step(step, error / tolerance)
+                if whole == 0:
+                    tree.span[0, w] = longer
+                else:  # cut off by the end: it says nothing against the longer ones before
+                    tree.span[0, w] = wp.max(tree.span[0, w], longer)
+            if going == 1 and (tree.span[0, w] < finest or tolerance == scalar(0.0)):
+                status[0, w] = first_step + s + 1
+                status[1, w] = articulated.fastest(tree, V, w)
+                going = int(0)
+        if status[0, w] >= 0:
+            break
+        if s >= 0 and every > 0:
+            wait -= 1
+            if wait == 0:
+                for row in range(mask.shape[0]):
+                    film[frame, row, w] = X[row, w]
+                for row in range(hinges.shape[0]):
+                    film_angles[frame, row, w] = angles[row, w]
+                frame += 1
+                wait = every
+"""
