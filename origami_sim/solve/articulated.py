@@ -4,6 +4,9 @@ The panels form a tree. Its coordinates are the pose of the root panel, as far a
 crease of the tree. Bodies are numbered from the root outwards, joint b - 1 carries body b. All velocities and moments
 are taken about the origin O, the root's centre at that instant, in the axes of the world; composite inertias are then
 plain sums (Featherstone 2008, chapters 6 and 8). Loops are closed by constraint forces.
+
+What belongs to a world lies in one stretch of one buffer, so that threads share no memory; `Tree` has the places of its
+parts in that stretch.
 """
 
 import warp as wp
@@ -20,72 +23,125 @@ POSE = wp.constant(7)
 STAGES = wp.constant(7)
 """Stages of a step; the last is the first of the next."""
 
+NATURAL = wp.constant(0x7FFFFFFF)
+"""Masked with this, an index is seen to be no negative one, and an access is spared that test."""
+
 
 @wp.struct
 class Tree:
-    """Topology, bodies and coordinates of W worlds; arrays [rows, W] unless stated.
+    """Topology, and where in a world's stretch of the buffer its numbers lie.
 
-    B bodies, J = B - 1 joints, d rates of the root, m = d + J rates in all, R constraint rows.
+    B bodies, J = B - 1 joints, d rates of the root, m = d + J rates in all, R constraint rows. Shapes are per world.
     """
 
-    # topology, without a world
+    data: wp.array(dtype=scalar)  # [W width] the buffer
+    width: int
+    bodies: int
+    roots: int
+    rates: int
+    rows: int
+    follows: int  # 1: the root turns about its own centre
     parent: wp.array(dtype=wp.int32)  # [B]
     body_of: wp.array(dtype=wp.int32)  # [N] body that carries a node
     joint_of: wp.array(dtype=wp.int32)  # [C] joint of a crease, -1 where it closes a loop
-    root_turn: wp.array(dtype=vec3)  # [d] angular velocity of the root for unit rates
-    root_shift: wp.array(dtype=vec3)  # [d] velocity of its centre besides
-    root_pivot: wp.array(dtype=vec3)  # [d] point about which it turns, where that does not move with it
-    root_follows: int  # 1: it turns about its own centre
-    row_node: wp.array(dtype=wp.int32)  # [R] node at which bodies are joined
-    row_body: wp.array2d(dtype=wp.int32)  # [R, 2] the bodies; -1: the ground
-    row_axis: wp.array(dtype=vec3)  # [R] direction in which they are
+    # [3 d + R] angular velocities of the root for unit rates, velocities of its centre besides, points about which it
+    # turns where those do not move with it; then directions in which constraints hold
+    axes: wp.array(dtype=vec3)
+    joined: wp.array2d(dtype=wp.int32)  # [R, 3] node at which two bodies are joined, the bodies; -1: the ground
     stabilisation: scalar  # rate at which an open loop closes [1/s]
     softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
     tableau: wp.array2d(dtype=scalar)  # [STAGES + 1, STAGES + 1] time, then weights; the last row is the error's
     # bodies
-    reference: wp.array2d(dtype=vec3)  # [N, W]
-    root_centre: wp.array2d(dtype=vec3)  # [1, W]
-    axis: wp.array2d(dtype=vec3)  # [J, W]
-    pivot: wp.array2d(dtype=vec3)  # [J, W]
-    start: wp.array2d(dtype=scalar)  # [C, W] crease angles in the reference state
-    mass: wp.array2d(dtype=scalar)  # [B, W]
-    centre: wp.array2d(dtype=vec3)  # [B, W]
-    inertia: wp.array2d(dtype=mat33)  # [B, W] about the centre
-    # coordinates and rates, now and at the step's begin; derivatives at the stages
-    y: wp.array2d(dtype=scalar)  # [7 + J, W]
-    u: wp.array2d(dtype=scalar)  # [m, W]
-    y0: wp.array2d(dtype=scalar)
-    u0: wp.array2d(dtype=scalar)
-    dy: wp.array2d(dtype=scalar)  # [STAGES (7 + J), W]
-    du: wp.array2d(dtype=scalar)  # [STAGES m, W]
-    span: wp.array2d(dtype=scalar)  # [1, W] length of the next step
-    # what a step changes besides, to go back to: crease angles, memory, contact points
-    angles0: wp.array2d(dtype=scalar)
-    memory0: wp.array2d(dtype=scalar)
-    feet: wp.array2d(dtype=vec3)  # [K, W] contact points at the step's begin
-    feet0: wp.array2d(dtype=vec3)
-    power0: wp.array2d(dtype=scalar)  # [E, W]
-    spent: wp.array2d(dtype=scalar)  # [E, W] mean power of each effect in a step, by the weights of its stages
+    reference: int  # [N, 3] nodes
+    middle: int  # [3] the root's centre
+    axis: int  # [J, 3]
+    pivot: int  # [J, 3]
+    start: int  # [C] crease angles in the reference state
+    mass: int  # [B]
+    centre: int  # [B, 3]
+    inertia: int  # [B, 9] about the centre
+    # coordinates and rates, now and at the step's begin; their derivatives at the stages; length of the next step
+    y: int  # [7 + J]
+    u: int  # [m]
+    y0: int
+    u0: int
+    dy: int  # [STAGES, 7 + J]
+    du: int  # [STAGES, m]
+    span: int
+    # what a step changes besides, to go back to
+    hinges: int  # number of hinge angles
+    memories: int
+    feet_count: int
+    effects: int
+    angles0: int
+    memory0: int
+    feet: int  # [K, 3] contact points now
+    feet0: int  # and at the step's begin
+    power0: int  # [E]
+    spent: int  # [E] mean power of each effect in a step, by the weights of its stages
     # of one evaluation
-    turned: wp.array2d(dtype=mat33)  # [B, W]
-    placed: wp.array2d(dtype=vec3)  # [B, W] x = turned reference + placed
-    hinge: wp.array2d(dtype=vec3)  # [J, W] axis now
-    joint: wp.array2d(dtype=vec3)  # [J, W] pivot now, from O
-    omega: wp.array2d(dtype=vec3)  # [B, W]
-    speed: wp.array2d(dtype=vec3)  # [B, W] velocity at O
-    alpha: wp.array2d(dtype=vec3)  # [B, W] accelerations if rates did not change
-    gain: wp.array2d(dtype=vec3)  # [B, W] the same of the body's point at O
-    force: wp.array2d(dtype=vec3)  # [B, W]
-    moment: wp.array2d(dtype=vec3)  # [B, W] about O
-    torque: wp.array2d(dtype=scalar)  # [J, W]
-    heavy: wp.array2d(dtype=scalar)  # [B, W] composite mass, first moment, second moment about O
-    first: wp.array2d(dtype=vec3)
-    second: wp.array2d(dtype=mat33)
-    factor: wp.array2d(dtype=scalar)  # [m m, W] mass matrix, then its Cholesky factor
-    rows: wp.array2d(dtype=scalar)  # [R m, W] Jacobian of the constraints
-    solved: wp.array2d(dtype=scalar)  # [R m, W] its product with the inverse factor
-    gram: wp.array2d(dtype=scalar)  # [R R, W]
-    pull: wp.array2d(dtype=scalar)  # [R, W] constraint forces
+    turned: int  # [B, 9]
+    placed: int  # [B, 3] x = turned reference + placed
+    hinge: int  # [J, 3] axis now
+    joint: int  # [J, 3] pivot now, from O
+    omega: int  # [B, 3]
+    speed: int  # [B, 3] velocity at O
+    alpha: int  # [B, 3] angular acceleration if rates did not change
+    gain: int  # [B, 3] the same of the body's point at O
+    force: int  # [B, 3]
+    moment: int  # [B, 3] about O
+    torque: int  # [J]
+    heavy: int  # [B] composite mass, first moment [B, 3], inertia [B, 9] about O
+    first: int
+    second: int
+    factor: int  # [m, m] mass matrix, then its Cholesky factor
+    jacobian: int  # [R, m] of the constraints
+    solved: int  # [R, m] its product with the inverse factor
+    gram: int  # [R, R]
+    pull: int  # [R] constraint forces
+
+
+PARTS = tuple(
+    "reference middle axis pivot start mass centre inertia y u y0 u0 dy du span angles0 memory0 feet feet0 power0 spent "
+    "turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor jacobian solved "
+    "gram pull".split()
+)
+"""Parts of a world's stretch, in order."""
+
+
+@wp.func
+def at(data: wp.array(dtype=scalar), i: int):
+    return data[i & NATURAL]
+
+
+@wp.func
+def vec_at(data: wp.array(dtype=scalar), i: int):
+    return vec3(data[i & NATURAL], data[(i + 1) & NATURAL], data[(i + 2) & NATURAL])
+
+
+@wp.func
+def put_vec(data: wp.array(dtype=scalar), i: int, v: vec3):
+    data[i & NATURAL] = v[0]
+    data[(i + 1) & NATURAL] = v[1]
+    data[(i + 2) & NATURAL] = v[2]
+
+
+@wp.func
+def mat_at(data: wp.array(dtype=scalar), i: int):
+    return wp.matrix_from_rows(vec_at(data, i), vec_at(data, i + 3), vec_at(data, i + 6))
+
+
+@wp.func
+def put_mat(data: wp.array(dtype=scalar), i: int, m: mat33):
+    put_vec(data, i, m[0])
+    put_vec(data, i + 3, m[1])
+    put_vec(data, i + 6, m[2])
+
+
+@wp.func
+def copy(data: wp.array(dtype=scalar), target: int, source: int, count: int):
+    for i in range(count):
+        data[(target + i) & NATURAL] = data[(source + i) & NATURAL]
 
 
 @wp.func
@@ -95,316 +151,286 @@ def outer_inertia(mass: scalar, r: vec3):
 
 
 @wp.func
-def skewed(axis: vec3, angle: scalar):
+def rotation(axis: vec3, angle: scalar):
     """Rotation by an angle about a unit axis (Rodrigues)."""
-    s = wp.sin(angle)
-    c = scalar(1.0) - wp.cos(angle)
     k = wp.skew(axis)
-    return wp.identity(n=3, dtype=scalar) + s * k + c * (k * k)
-
-
-@wp.func
-def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), w: int):
-    """Places and velocities of all nodes from coordinates and rates; clears what forces are added to."""
-    bodies = tree.parent.shape[0]
-    roots = tree.root_turn.shape[0]
-    zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-    origin = vec3(tree.y[0, w], tree.y[1, w], tree.y[2, w])
-    q = wp.quatd(tree.y[3, w], tree.y[4, w], tree.y[5, w], tree.y[6, w])
-    turn = wp.quat_to_matrix(wp.normalize(q))
-    tree.turned[0, w] = turn
-    tree.placed[0, w] = origin - turn * tree.root_centre[0, w]
-    omega = zero
-    speed = zero
-    for k in range(roots):
-        rate = tree.u[k, w]
-        omega = omega + rate * tree.root_turn[k]
-        speed = speed + rate * tree.root_shift[k]
-        if tree.root_follows == 0:
-            speed = speed + rate * wp.cross(tree.root_turn[k], origin - tree.root_pivot[k])
-    gain = zero
-    if tree.root_follows == 0:
-        gain = wp.cross(omega, speed)
-    tree.omega[0, w] = omega
-    tree.speed[0, w] = speed
-    tree.alpha[0, w] = zero
-    tree.gain[0, w] = gain
-    tree.force[0, w] = zero
-    tree.moment[0, w] = zero
-    for b in range(1, bodies):
-        p = tree.parent[b]
-        j = b - 1
-        up = tree.turned[p, w]
-        a = up * tree.axis[j, w]
-        at = up * tree.pivot[j, w] + tree.placed[p, w]
-        own = up * skewed(tree.axis[j, w], tree.y[POSE + j, w])
-        tree.turned[b, w] = own
-        tree.placed[b, w] = at - own * tree.pivot[j, w]
-        r = at - origin
-        rate = tree.u[roots + j, w]
-        before = tree.omega[p, w]
-        now = before + rate * a
-        tree.hinge[j, w] = a
-        tree.joint[j, w] = r
-        tree.omega[b, w] = now
-        tree.speed[b, w] = tree.speed[p, w] - rate * wp.cross(a, r)
-        swing = tree.alpha[p, w] + rate * wp.cross(before, a)
-        tree.alpha[b, w] = swing
-        # both bodies accelerate alike at the pivot
-        there = tree.gain[p, w] + wp.cross(tree.alpha[p, w], r) + wp.cross(before, wp.cross(before, r))
-        tree.gain[b, w] = there - wp.cross(swing, r) - wp.cross(now, wp.cross(now, r))
-        tree.torque[j, w] = scalar(0.0)
-        tree.force[b, w] = zero
-        tree.moment[b, w] = zero
-    for n in range(X.shape[0]):
-        b = tree.body_of[n]
-        x = tree.turned[b, w] * tree.reference[n, w] + tree.placed[b, w]
-        X[n, w] = x
-        V[n, w] = tree.speed[b, w] + wp.cross(tree.omega[b, w], x - origin)
-        F[n, w] = zero
-
-
-@wp.func
-def along_joint(tree: Tree, j: int, w: int):
-    """Velocity at O for a unit rate of a joint."""
-    return wp.cross(tree.joint[j, w], tree.hinge[j, w])
+    return wp.identity(n=3, dtype=scalar) + wp.sin(angle) * k + (scalar(1.0) - wp.cos(angle)) * (k * k)
 
 
 @wp.func
 def along_root(tree: Tree, k: int, origin: vec3):
     """Velocity of the root's centre for a unit rate."""
-    out = tree.root_shift[k]
-    if tree.root_follows == 0:
-        out = out + wp.cross(tree.root_turn[k], origin - tree.root_pivot[k])
+    out = tree.axes[tree.roots + k]
+    if tree.follows == 0:
+        out = out + wp.cross(tree.axes[k], origin - tree.axes[2 * tree.roots + k])
     return out
 
 
 @wp.func
-def add_rows(tree: Tree, row: int, body: int, sign: scalar, r: vec3, axis: vec3, m: int, roots: int, w: int):
-    """Adds to a constraint's row the velocity of a body's point at r along an axis, for unit rates."""
-    b = body
-    while b > 0:
+def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), w: int):
+    """Places and velocities of all nodes from coordinates and rates; clears what forces are added to."""
+    s = tree.data
+    o = w * tree.width
+    zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+    origin = vec_at(s, o + tree.y)
+    q = o + tree.y + 3
+    turn = wp.quat_to_matrix(wp.normalize(wp.quatd(at(s, q), at(s, q + 1), at(s, q + 2), at(s, q + 3))))
+    put_mat(s, o + tree.turned, turn)
+    put_vec(s, o + tree.placed, origin - turn * vec_at(s, o + tree.middle))
+    omega = zero
+    speed = zero
+    for k in range(tree.roots):
+        rate = at(s, o + tree.u + k)
+        omega = omega + rate * tree.axes[k]
+        speed = speed + rate * along_root(tree, k, origin)
+    gain = zero
+    if tree.follows == 0:
+        gain = wp.cross(omega, speed)
+    put_vec(s, o + tree.omega, omega)
+    put_vec(s, o + tree.speed, speed)
+    put_vec(s, o + tree.alpha, zero)
+    put_vec(s, o + tree.gain, gain)
+    put_vec(s, o + tree.force, zero)
+    put_vec(s, o + tree.moment, zero)
+    for b in range(1, tree.bodies):
+        p = tree.parent[b]
         j = b - 1
-        k = row * m + roots + j
-        tree.rows[k, w] = tree.rows[k, w] + sign * wp.dot(axis, wp.cross(tree.hinge[j, w], r - tree.joint[j, w]))
-        b = tree.parent[b]
-    origin = vec3(tree.y[0, w], tree.y[1, w], tree.y[2, w])
-    for k in range(roots):
-        by = along_root(tree, k, origin) + wp.cross(tree.root_turn[k], r)
-        tree.rows[row * m + k, w] = tree.rows[row * m + k, w] + sign * wp.dot(axis, by)
-
-
-@wp.func
-def body_place(tree: Tree, body: int, n: int, w: int):
-    """Where a body, or the ground, has a node."""
-    out = tree.reference[n, w]
-    if body >= 0:
-        out = tree.turned[body, w] * tree.reference[n, w] + tree.placed[body, w]
-    return out
-
-
-@wp.func
-def acceleration(tree: Tree, body: int, r: vec3, w: int):
-    """Acceleration of a body's point at r from O if no rate changed; the ground has none."""
-    out = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-    if body >= 0:
-        o = tree.omega[body, w]
-        out = tree.gain[body, w] + wp.cross(tree.alpha[body, w], r) + wp.cross(o, wp.cross(o, r))
-    return out
-
-
-@wp.func
-def constrain(tree: Tree, stage: int, m: int, roots: int, w: int):
-    """Adds the forces that keep loops closed to the half-solved accelerations of the open tree.
-
-    With M = L L^T, S = J L^-T: (S S^T + soft) pull = -(bias + 2 c rate + c^2 gap + S z), z += S^T pull (Baumgarte).
-    """
-    count = tree.row_node.shape[0]
-    origin = vec3(tree.y[0, w], tree.y[1, w], tree.y[2, w])
-    total = scalar(0.0)
-    for i in range(count):
-        for k in range(m):
-            tree.rows[i * m + k, w] = scalar(0.0)
-        one = tree.row_body[i, 0]
-        other = tree.row_body[i, 1]
-        axis = tree.row_axis[i]
-        x = body_place(tree, one, tree.row_node[i], w)
-        r = x - origin
-        add_rows(tree, i, one, scalar(1.0), r, axis, m, roots, w)
-        if other >= 0:
-            add_rows(tree, i, other, scalar(-1.0), r, axis, m, roots, w)
-        gap = wp.dot(axis, x - body_place(tree, other, tree.row_node[i], w))
-        rate = scalar(0.0)
-        for k in range(m):
-            by = tree.rows[i * m + k, w]
-            rate = rate + by * tree.u[k, w]
-            tree.solved[i * m + k, w] = by
-        bias = wp.dot(axis, acceleration(tree, one, r, w) - acceleration(tree, other, r, w))
-        solve_lower(tree, tree.solved, i * m, m, w)
-        c = tree.stabilisation
-        right = -(bias + scalar(2.0) * c * rate + c * c * gap)
-        for k in range(m):
-            right = right - tree.solved[i * m + k, w] * tree.du[stage * m + k, w]
-        tree.pull[i, w] = right
-        for j in range(i + 1):
-            s = scalar(0.0)
-            for k in range(m):
-                s = s + tree.solved[i * m + k, w] * tree.solved[j * m + k, w]
-            tree.gram[i * count + j, w] = s
-            if i == j:
-                total = total + s
-    soft = tree.softness * total / scalar(count)
-    for i in range(count):  # Cholesky, as in `factorise`
-        for j in range(i + 1):
-            s = tree.gram[i * count + j, w]
-            if i == j:
-                s = s + soft
-            for k in range(j):
-                s = s - tree.gram[i * count + k, w] * tree.gram[j * count + k, w]
-            if i == j:
-                tree.gram[i * count + i, w] = wp.sqrt(wp.max(s, soft))
-            else:
-                tree.gram[i * count + j, w] = s / tree.gram[j * count + j, w]
-    for i in range(count):
-        s = tree.pull[i, w]
-        for k in range(i):
-            s = s - tree.gram[i * count + k, w] * tree.pull[k, w]
-        tree.pull[i, w] = s / tree.gram[i * count + i, w]
-    for back in range(count):
-        i = count - 1 - back
-        s = tree.pull[i, w]
-        for k in range(i + 1, count):
-            s = s - tree.gram[k * count + i, w] * tree.pull[k, w]
-        tree.pull[i, w] = s / tree.gram[i * count + i, w]
-    for i in range(count):
-        for k in range(m):
-            z = tree.solved[i * m + k, w] * tree.pull[i, w]
-            tree.du[stage * m + k, w] = tree.du[stage * m + k, w] + z
+        up = mat_at(s, o + tree.turned + 9 * p)
+        bare = vec_at(s, o + tree.axis + 3 * j)
+        pivot = vec_at(s, o + tree.pivot + 3 * j)
+        a = up * bare
+        there = up * pivot + vec_at(s, o + tree.placed + 3 * p)
+        own = up * rotation(bare, at(s, o + tree.y + POSE + j))
+        put_mat(s, o + tree.turned + 9 * b, own)
+        put_vec(s, o + tree.placed + 3 * b, there - own * pivot)
+        r = there - origin
+        rate = at(s, o + tree.u + tree.roots + j)
+        before = vec_at(s, o + tree.omega + 3 * p)
+        swing = vec_at(s, o + tree.alpha + 3 * p)
+        now = before + rate * a
+        put_vec(s, o + tree.hinge + 3 * j, a)
+        put_vec(s, o + tree.joint + 3 * j, r)
+        put_vec(s, o + tree.omega + 3 * b, now)
+        put_vec(s, o + tree.speed + 3 * b, vec_at(s, o + tree.speed + 3 * p) - rate * wp.cross(a, r))
+        # both bodies accelerate alike at the pivot
+        pull = vec_at(s, o + tree.gain + 3 * p) + wp.cross(swing, r) + wp.cross(before, wp.cross(before, r))
+        swing = swing + rate * wp.cross(before, a)
+        put_vec(s, o + tree.alpha + 3 * b, swing)
+        put_vec(s, o + tree.gain + 3 * b, pull - wp.cross(swing, r) - wp.cross(now, wp.cross(now, r)))
+        s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
+        put_vec(s, o + tree.force + 3 * b, zero)
+        put_vec(s, o + tree.moment + 3 * b, zero)
+    for row in range(X.shape[0]):
+        n = row & NATURAL
+        b = tree.body_of[n]
+        x = mat_at(s, o + tree.turned + 9 * b) * vec_at(s, o + tree.reference + 3 * n)
+        x = x + vec_at(s, o + tree.placed + 3 * b)
+        X[n, w] = x
+        V[n, w] = vec_at(s, o + tree.speed + 3 * b) + wp.cross(vec_at(s, o + tree.omega + 3 * b), x - origin)
+        F[n, w] = zero
 
 
 @wp.func
 def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3), stage: int, w: int):
     """Derivatives of coordinates and rates at a stage, from the forces on nodes and the moments at joints."""
-    bodies = tree.parent.shape[0]
-    joints = bodies - 1
-    roots = tree.root_turn.shape[0]
-    m = roots + joints
-    origin = vec3(tree.y[0, w], tree.y[1, w], tree.y[2, w])
+    s = tree.data
+    o = w * tree.width
+    roots = tree.roots
+    m = tree.rates
+    du = o + tree.du + stage * m
+    factor = o + tree.factor
+    origin = vec_at(s, o + tree.y)
     for k in range(m * m):
-        tree.factor[k, w] = scalar(0.0)
-    for n in range(X.shape[0]):
-        b = tree.body_of[n]
+        s[(factor + k) & NATURAL] = scalar(0.0)
+    for row in range(X.shape[0]):
+        n = row & NATURAL
+        b = 3 * tree.body_of[n]
         f = F[n, w]
-        tree.force[b, w] = tree.force[b, w] + f
-        tree.moment[b, w] = tree.moment[b, w] + wp.cross(X[n, w] - origin, f)
-    for b in range(bodies):
-        turn = tree.turned[b, w]
-        c = turn * tree.centre[b, w] + tree.placed[b, w] - origin
-        mass = tree.mass[b, w]
-        own = turn * tree.inertia[b, w] * wp.transpose(turn)
-        o = tree.omega[b, w]
-        a = tree.gain[b, w] + wp.cross(tree.alpha[b, w], c) + wp.cross(o, wp.cross(o, c))
-        tree.force[b, w] = tree.force[b, w] - mass * a
-        spin = own * tree.alpha[b, w] + wp.cross(o, own * o)
-        tree.moment[b, w] = tree.moment[b, w] - mass * wp.cross(c, a) - spin
-        tree.heavy[b, w] = mass
-        tree.first[b, w] = mass * c
-        tree.second[b, w] = own + outer_inertia(mass, c)
+        put_vec(s, o + tree.force + b, vec_at(s, o + tree.force + b) + f)
+        put_vec(s, o + tree.moment + b, vec_at(s, o + tree.moment + b) + wp.cross(X[n, w] - origin, f))
+    for b in range(tree.bodies):
+        turn = mat_at(s, o + tree.turned + 9 * b)
+        c = turn * vec_at(s, o + tree.centre + 3 * b) + vec_at(s, o + tree.placed + 3 * b) - origin
+        mass = at(s, o + tree.mass + b)
+        own = turn * mat_at(s, o + tree.inertia + 9 * b) * wp.transpose(turn)
+        omega = vec_at(s, o + tree.omega + 3 * b)
+        swing = vec_at(s, o + tree.alpha + 3 * b)
+        a = vec_at(s, o + tree.gain + 3 * b) + wp.cross(swing, c) + wp.cross(omega, wp.cross(omega, c))
+        put_vec(s, o + tree.force + 3 * b, vec_at(s, o + tree.force + 3 * b) - mass * a)
+        spin = own * swing + wp.cross(omega, own * omega) + mass * wp.cross(c, a)
+        put_vec(s, o + tree.moment + 3 * b, vec_at(s, o + tree.moment + 3 * b) - spin)
+        s[(o + tree.heavy + b) & NATURAL] = mass
+        put_vec(s, o + tree.first + 3 * b, mass * c)
+        put_mat(s, o + tree.second + 9 * b, own + outer_inertia(mass, c))
     # towards the root: what a joint carries is the sum of all beyond it
-    for back in range(joints):
-        b = joints - back
-        j = b - 1
-        p = tree.parent[b]
-        a = tree.hinge[j, w]
-        s = along_joint(tree, j, w)
-        k = roots + j
-        tree.du[stage * m + k, w] = (
-            tree.torque[j, w] + wp.dot(a, tree.moment[b, w]) + wp.dot(s, tree.force[b, w])
-        )
-        momentum = tree.heavy[b, w] * s + wp.cross(a, tree.first[b, w])
-        angular = wp.cross(tree.first[b, w], s) + tree.second[b, w] * a
-        i = b
-        while i > 0:
-            by = wp.dot(tree.hinge[i - 1, w], angular) + wp.dot(along_joint(tree, i - 1, w), momentum)
-            tree.factor[k * m + roots + i - 1, w] = by
-            tree.factor[(roots + i - 1) * m + k, w] = by
-            i = tree.parent[i]
-        for r in range(roots):
-            by = wp.dot(tree.root_turn[r], angular) + wp.dot(along_root(tree, r, origin), momentum)
-            tree.factor[k * m + r, w] = by
-            tree.factor[r * m + k, w] = by
-        tree.force[p, w] = tree.force[p, w] + tree.force[b, w]
-        tree.moment[p, w] = tree.moment[p, w] + tree.moment[b, w]
-        tree.heavy[p, w] = tree.heavy[p, w] + tree.heavy[b, w]
-        tree.first[p, w] = tree.first[p, w] + tree.first[b, w]
-        tree.second[p, w] = tree.second[p, w] + tree.second[b, w]
-    for k in range(roots):
-        s = along_root(tree, k, origin)
-        a = tree.root_turn[k]
-        tree.du[stage * m + k, w] = wp.dot(a, tree.moment[0, w]) + wp.dot(s, tree.force[0, w])
-        momentum = tree.heavy[0, w] * s + wp.cross(a, tree.first[0, w])
-        angular = wp.cross(tree.first[0, w], s) + tree.second[0, w] * a
-        for r in range(k + 1):
-            by = wp.dot(tree.root_turn[r], angular) + wp.dot(along_root(tree, r, origin), momentum)
-            tree.factor[k * m + r, w] = by
-            tree.factor[r * m + k, w] = by
-    factorise(tree, m, w)
-    solve_lower(tree, tree.du, stage * m, m, w)
-    if tree.row_node.shape[0] > 0:
-        constrain(tree, stage, m, roots, w)
-    solve_upper(tree, tree.du, stage * m, m, w)
+    for back in range(tree.bodies):
+        b = tree.bodies - 1 - back
+        heavy = at(s, o + tree.heavy + b)
+        first = vec_at(s, o + tree.first + 3 * b)
+        second = mat_at(s, o + tree.second + 9 * b)
+        force = vec_at(s, o + tree.force + 3 * b)
+        moment = vec_at(s, o + tree.moment + 3 * b)
+        moves = int(1)  # rates with which this body moves against the one before it
+        k = int(roots + b - 1)
+        if b == 0:
+            moves = roots
+            k = int(0)
+        for _move in range(moves):
+            a = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+            along = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+            load = scalar(0.0)
+            if b == 0:
+                a = tree.axes[k]
+                along = along_root(tree, k, origin)
+            else:
+                a = vec_at(s, o + tree.hinge + 3 * (b - 1))
+                along = wp.cross(vec_at(s, o + tree.joint + 3 * (b - 1)), a)
+                load = at(s, o + tree.torque + b - 1)
+            s[(du + k) & NATURAL] = load + wp.dot(a, moment) + wp.dot(along, force)
+            momentum = heavy * along + wp.cross(a, first)
+            angular = wp.cross(first, along) + second * a
+            i = b
+            while i > 0:
+                c = vec_at(s, o + tree.hinge + 3 * (i - 1))
+                by = wp.dot(c, angular) + wp.dot(wp.cross(vec_at(s, o + tree.joint + 3 * (i - 1)), c), momentum)
+                s[(factor + k * m + roots + i - 1) & NATURAL] = by
+                i = tree.parent[i]
+            for r in range(roots):
+                by = wp.dot(tree.axes[r], angular) + wp.dot(along_root(tree, r, origin), momentum)
+                s[(factor + k * m + r) & NATURAL] = by
+            k += 1
+        if b > 0:
+            p = tree.parent[b]
+            put_vec(s, o + tree.force + 3 * p, vec_at(s, o + tree.force + 3 * p) + force)
+            put_vec(s, o + tree.moment + 3 * p, vec_at(s, o + tree.moment + 3 * p) + moment)
+            s[(o + tree.heavy + p) & NATURAL] = at(s, o + tree.heavy + p) + heavy
+            put_vec(s, o + tree.first + 3 * p, vec_at(s, o + tree.first + 3 * p) + first)
+            put_mat(s, o + tree.second + 9 * p, mat_at(s, o + tree.second + 9 * p) + second)
+    factorise(s, factor, m, scalar(0.0))
+    solve_lower(s, factor, du, m)
+    if tree.rows > 0:
+        constrain(tree, stage, w)
+    solve_upper(s, factor, du, m)
     # rates of the coordinates
-    first = stage * (POSE + joints)
-    v = tree.speed[0, w]
-    o = tree.omega[0, w]
-    half = scalar(0.5)
-    qx = tree.y[3, w]
-    qy = tree.y[4, w]
-    qz = tree.y[5, w]
-    qw = tree.y[6, w]
-    for i in range(3):
-        tree.dy[first + i, w] = v[i]
-    tree.dy[first + 3, w] = half * (qw * o[0] + o[1] * qz - o[2] * qy)
-    tree.dy[first + 4, w] = half * (qw * o[1] + o[2] * qx - o[0] * qz)
-    tree.dy[first + 5, w] = half * (qw * o[2] + o[0] * qy - o[1] * qx)
-    tree.dy[first + 6, w] = -half * (qx * o[0] + qy * o[1] + qz * o[2])
-    for j in range(joints):
-        tree.dy[first + POSE + j, w] = tree.u[roots + j, w]
+    dy = o + tree.dy + stage * (POSE + tree.bodies - 1)
+    omega = vec_at(s, o + tree.omega)
+    q = vec_at(s, o + tree.y + 3)
+    last = at(s, o + tree.y + 6)
+    put_vec(s, dy, vec_at(s, o + tree.speed))
+    put_vec(s, dy + 3, scalar(0.5) * (last * omega + wp.cross(omega, q)))
+    s[(dy + 6) & NATURAL] = scalar(-0.5) * wp.dot(omega, q)
+    copy(s, dy + POSE, o + tree.u + roots, tree.bodies - 1)
 
 
 @wp.func
-def factorise(tree: Tree, m: int, w: int):
-    """Cholesky factor of the mass matrix, in its lower triangle; joints of separate branches have no entry."""
+def factorise(s: wp.array(dtype=scalar), first: int, m: int, least: scalar):
+    """Cholesky factor of a symmetric matrix [m, m] of which the lower triangle is given, in its place."""
     for i in range(m):
         for j in range(i + 1):
-            s = tree.factor[i * m + j, w]
+            x = at(s, first + i * m + j)
             for k in range(j):
-                s = s - tree.factor[i * m + k, w] * tree.factor[j * m + k, w]
+                x = x - at(s, first + i * m + k) * at(s, first + j * m + k)
             if i == j:
-                tree.factor[i * m + i, w] = wp.sqrt(s)
+                s[(first + i * m + i) & NATURAL] = wp.sqrt(wp.max(x, least))
             else:
-                tree.factor[i * m + j, w] = s / tree.factor[j * m + j, w]
+                s[(first + i * m + j) & NATURAL] = x / at(s, first + j * m + j)
 
 
 @wp.func
-def solve_lower(tree: Tree, target: wp.array2d(dtype=scalar), first: int, m: int, w: int):
-    """Solves with the factor, in place."""
+def solve_lower(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
+    """Solves with a Cholesky factor [m, m], in place."""
     for i in range(m):
-        s = target[first + i, w]
+        x = at(s, target + i)
         for k in range(i):
-            s = s - tree.factor[i * m + k, w] * target[first + k, w]
-        target[first + i, w] = s / tree.factor[i * m + i, w]
+            x = x - at(s, factor + i * m + k) * at(s, target + k)
+        s[(target + i) & NATURAL] = x / at(s, factor + i * m + i)
 
 
 @wp.func
-def solve_upper(tree: Tree, target: wp.array2d(dtype=scalar), first: int, m: int, w: int):
-    """Solves with the transposed factor, in place."""
+def solve_upper(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
+    """Solves with a transposed Cholesky factor [m, m], in place."""
     for back in range(m):
         i = m - 1 - back
-        s = target[first + i, w]
+        x = at(s, target + i)
         for k in range(i + 1, m):
-            s = s - tree.factor[k * m + i, w] * target[first + k, w]
-        target[first + i, w] = s / tree.factor[i * m + i, w]
+            x = x - at(s, factor + k * m + i) * at(s, target + k)
+        s[(target + i) & NATURAL] = x / at(s, factor + i * m + i)
+
+
+@wp.func
+def constrain(tree: Tree, stage: int, w: int):
+    """Adds the forces that keep loops closed to the half-solved accelerations of the open tree.
+
+    With M = L L^T, S = J L^-T: (S S^T + soft) pull = -(bias + 2 c rate + c^2 gap + S z), z += S^T pull (Baumgarte).
+    """
+    s = tree.data
+    o = w * tree.width
+    m = tree.rates
+    du = o + tree.du + stage * m
+    origin = vec_at(s, o + tree.y)
+    total = scalar(0.0)
+    for i in range(tree.rows):
+        row = o + tree.jacobian + i * m
+        solved = o + tree.solved + i * m
+        for k in range(m):
+            s[(row + k) & NATURAL] = scalar(0.0)
+        axis = tree.axes[3 * tree.roots + i]
+        reference = vec_at(s, o + tree.reference + 3 * tree.joined[i, 0])
+        gap = scalar(0.0)
+        bias = scalar(0.0)
+        here = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+        for side in range(2):
+            b = int(tree.joined[i, 1 + side])
+            sign = scalar(1.0)
+            if side == 1:
+                sign = scalar(-1.0)
+            x = reference
+            if b >= 0:
+                x = mat_at(s, o + tree.turned + 9 * b) * reference + vec_at(s, o + tree.placed + 3 * b)
+            if side == 0:
+                here = x - origin
+            gap += sign * wp.dot(axis, x)
+            if b >= 0:
+                omega = vec_at(s, o + tree.omega + 3 * b)
+                a = vec_at(s, o + tree.gain + 3 * b) + wp.cross(vec_at(s, o + tree.alpha + 3 * b), here)
+                bias += sign * wp.dot(axis, a + wp.cross(omega, wp.cross(omega, here)))
+                for k in range(tree.roots):
+                    by = along_root(tree, k, origin) + wp.cross(tree.axes[k], here)
+                    s[(row + k) & NATURAL] = at(s, row + k) + sign * wp.dot(axis, by)
+            while b > 0:
+                arm = here - vec_at(s, o + tree.joint + 3 * (b - 1))
+                entry = row + tree.roots + b - 1
+                along = wp.dot(axis, wp.cross(vec_at(s, o + tree.hinge + 3 * (b - 1)), arm))
+                s[entry & NATURAL] = at(s, entry) + sign * along
+                b = tree.parent[b]
+        rate = scalar(0.0)
+        for k in range(m):
+            rate += at(s, row + k) * at(s, o + tree.u + k)
+        copy(s, solved, row, m)
+        solve_lower(s, o + tree.factor, solved, m)
+        c = tree.stabilisation
+        right = -(bias + scalar(2.0) * c * rate + c * c * gap)
+        for k in range(m):
+            right -= at(s, solved + k) * at(s, du + k)
+        s[(o + tree.pull + i) & NATURAL] = right
+        for j in range(i + 1):
+            product = scalar(0.0)
+            for k in range(m):
+                product += at(s, solved + k) * at(s, o + tree.solved + j * m + k)
+            s[(o + tree.gram + i * tree.rows + j) & NATURAL] = product
+            if i == j:
+                total += product
+    soft = tree.softness * total / scalar(tree.rows)
+    for i in range(tree.rows):
+        k = o + tree.gram + i * tree.rows + i
+        s[k & NATURAL] = at(s, k) + soft
+    factorise(s, o + tree.gram, tree.rows, soft)
+    solve_lower(s, o + tree.gram, o + tree.pull, tree.rows)
+    solve_upper(s, o + tree.gram, o + tree.pull, tree.rows)
+    for i in range(tree.rows):
+        for k in range(m):
+            z = at(s, o + tree.solved + i * m + k) * at(s, o + tree.pull + i)
+            s[(du + k) & NATURAL] = at(s, du + k) + z
 
 
 @wp.func
@@ -419,11 +445,12 @@ def fold(
 ):
     """Angle and rate of a crease: coordinates of the tree, or found from the nodes where it closes a loop."""
     j = tree.joint_of[r]
+    o = w * tree.width
     angle = scalar(0.0)
     rate = scalar(0.0)
     if j >= 0:
-        angle = tree.start[r, w] + tree.y[POSE + j, w]
-        rate = tree.u[tree.root_turn.shape[0] + j, w]
+        angle = at(tree.data, o + tree.start + r) + at(tree.data, o + tree.y + POSE + j)
+        rate = at(tree.data, o + tree.u + tree.roots + j)
     else:
         n = hinges[r]
         g = kinematics.dihedral(X[n[0], w], X[n[1], w], X[n[2], w], X[n[3], w])
@@ -445,7 +472,8 @@ def bend(
     """Applies a crease's moment, at its joint or to the nodes."""
     j = tree.joint_of[r]
     if j >= 0:
-        tree.torque[j, w] = tree.torque[j, w] + moment
+        k = w * tree.width + tree.torque + j
+        tree.data[k & NATURAL] = at(tree.data, k) + moment
     else:
         n = hinges[r]
         g = kinematics.dihedral(X[n[0], w], X[n[1], w], X[n[2], w], X[n[3], w])
@@ -456,17 +484,35 @@ def bend(
 
 
 @wp.func
-def next_step(step: scalar, error: scalar):
-    """Length of the next step from that of a step of order five and its error over what is allowed."""
+def step_of(tree: Tree, clock: scalar, dt: scalar, tolerance: scalar, w: int):
+    """Length of the next step within one of dt, of which `clock` is over: never one that leaves a crumb."""
+    left = dt - clock
+    span = at(tree.data, w * tree.width + tree.span)
+    if tolerance > scalar(0.0) and left > span:
+        left = wp.min(span, scalar(0.5) * left)
+    return left
+
+
+@wp.func
+def lengthen(tree: Tree, step: scalar, error: scalar, cut: int, w: int):
+    """Sets the length of the next step from the error of one, over what is allowed; returns it.
+
+    A step that was cut off by the end of a frame says nothing against the longer ones before.
+    """
+    k = w * tree.width + tree.span
     factor = scalar(0.1)  # also where the error is not a number
     if error < scalar(1e20):
         factor = scalar(0.9) * wp.pow(wp.max(error, scalar(1e-6)), scalar(-0.2))
         factor = wp.clamp(factor, scalar(0.2), scalar(5.0))
-    return step * factor
+    longer = step * factor
+    if cut == 1:
+        longer = wp.max(longer, at(tree.data, k))
+    tree.data[k & NATURAL] = longer
+    return longer
 
 
 @wp.func
-def fastest(tree: Tree, V: wp.array2d(dtype=vec3), w: int):
+def fastest(V: wp.array2d(dtype=vec3), w: int):
     """The node that moves fastest, or that has no number for a velocity."""
     out = int(0)
     most = scalar(-1.0)
@@ -487,19 +533,18 @@ def begin(
     w: int,
 ):
     """Remembers where a step begins; its last stage was the first of this one."""
-    for i in range(tree.spent.shape[0]):
-        tree.spent[i, w] = tree.tableau[STAGES - 1, 1] * power[i, w]
-        tree.power0[i, w] = power[i, w]
-    for i in range(tree.y0.shape[0]):
-        tree.y0[i, w] = tree.y[i, w]
-    for i in range(tree.u0.shape[0]):
-        tree.u0[i, w] = tree.u[i, w]
-    for i in range(tree.angles0.shape[0]):
-        tree.angles0[i, w] = angles[i, w]
-    for i in range(tree.memory0.shape[0]):
-        tree.memory0[i, w] = memory[i, w]
-    for i in range(tree.feet0.shape[0]):
-        tree.feet0[i, w] = tree.feet[i, w]
+    s = tree.data
+    o = w * tree.width
+    for i in range(tree.effects):
+        s[(o + tree.spent + i) & NATURAL] = tree.tableau[STAGES - 1, 1] * power[i, w]
+        s[(o + tree.power0 + i) & NATURAL] = power[i, w]
+    copy(s, o + tree.y0, o + tree.y, POSE + tree.bodies - 1)
+    copy(s, o + tree.u0, o + tree.u, tree.rates)
+    for i in range(tree.hinges):
+        s[(o + tree.angles0 + i) & NATURAL] = angles[i, w]
+    for i in range(tree.memories):
+        s[(o + tree.memory0 + i) & NATURAL] = memory[i, w]
+    copy(s, o + tree.feet0, o + tree.feet, 3 * tree.feet_count)
 
 
 @wp.func
@@ -511,53 +556,56 @@ def go_back(
     w: int,
 ):
     """Returns to where the step began, of which the first stage is kept."""
-    for i in range(tree.spent.shape[0]):
-        power[i, w] = tree.power0[i, w]
-    for i in range(tree.y0.shape[0]):
-        tree.y[i, w] = tree.y0[i, w]
-    for i in range(tree.u0.shape[0]):
-        tree.u[i, w] = tree.u0[i, w]
-    for i in range(tree.angles0.shape[0]):
-        angles[i, w] = tree.angles0[i, w]
-    for i in range(tree.memory0.shape[0]):
-        memory[i, w] = tree.memory0[i, w]
-    for i in range(tree.feet0.shape[0]):
-        tree.feet[i, w] = tree.feet0[i, w]
+    s = tree.data
+    o = w * tree.width
+    for i in range(tree.effects):
+        power[i, w] = at(s, o + tree.power0 + i)
+    copy(s, o + tree.y, o + tree.y0, POSE + tree.bodies - 1)
+    copy(s, o + tree.u, o + tree.u0, tree.rates)
+    for i in range(tree.hinges):
+        angles[i, w] = at(s, o + tree.angles0 + i)
+    for i in range(tree.memories):
+        memory[i, w] = at(s, o + tree.memory0 + i)
+    copy(s, o + tree.feet, o + tree.feet0, 3 * tree.feet_count)
 
 
 @wp.func
 def carry_over(tree: Tree, work: wp.array2d(dtype=scalar), step: scalar, w: int):
     """Ends a step: its last stage is the first of the next, and its work is counted."""
-    for i in range(tree.spent.shape[0]):
-        work[i, w] = work[i, w] + step * tree.spent[i, w]
-    last = STAGES - 1
-    n = tree.y0.shape[0]
-    for i in range(n):
-        tree.dy[i, w] = tree.dy[last * n + i, w]
-    m = tree.u0.shape[0]
-    for i in range(m):
-        tree.du[i, w] = tree.du[last * m + i, w]
+    s = tree.data
+    o = w * tree.width
+    n = POSE + tree.bodies - 1
+    for i in range(tree.effects):
+        work[i, w] = work[i, w] + step * at(s, o + tree.spent + i)
+    copy(s, o + tree.dy, o + tree.dy + (STAGES - 1) * n, n)
+    copy(s, o + tree.du, o + tree.du + (STAGES - 1) * tree.rates, tree.rates)
+
+
+@wp.func
+def weighted(tree: Tree, first: int, count: int, row: int, stages: int):
+    """Sum of a number's derivatives over the stages, by a row of the tableau."""
+    x = scalar(0.0)
+    for k in range(stages):
+        x = x + tree.tableau[row, 1 + k] * at(tree.data, first + k * count)
+    return x
 
 
 @wp.func
 def go(tree: Tree, stage: int, h: scalar, w: int):
     """Coordinates and rates at a stage of a step of h."""
-    n = tree.y0.shape[0]
+    s = tree.data
+    o = w * tree.width
+    n = POSE + tree.bodies - 1
     for i in range(n):
-        s = scalar(0.0)
-        for k in range(stage):
-            s = s + tree.tableau[stage, 1 + k] * tree.dy[k * n + i, w]
-        tree.y[i, w] = tree.y0[i, w] + h * s
-    m = tree.u0.shape[0]
+        s[(o + tree.y + i) & NATURAL] = at(s, o + tree.y0 + i) + h * weighted(tree, o + tree.dy + i, n, stage, stage)
+    m = tree.rates
     for i in range(m):
-        s = scalar(0.0)
-        for k in range(stage):
-            s = s + tree.tableau[stage, 1 + k] * tree.du[k * m + i, w]
-        tree.u[i, w] = tree.u0[i, w] + h * s
+        s[(o + tree.u + i) & NATURAL] = at(s, o + tree.u0 + i) + h * weighted(tree, o + tree.du + i, m, stage, stage)
     if stage == STAGES - 1:
-        q = wp.normalize(wp.quatd(tree.y[3, w], tree.y[4, w], tree.y[5, w], tree.y[6, w]))
+        k = o + tree.y + 3
+        q = wp.normalize(wp.quatd(at(s, k), at(s, k + 1), at(s, k + 2), at(s, k + 3)))
         for i in range(4):
-            tree.y[3 + i, w] = q[i]
+            s[(k + i) & NATURAL] = q[i]
 
 
 @wp.func
@@ -566,24 +614,28 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
 
     An error of a rate counts as much as it turns within the step.
     """
-    n = tree.y0.shape[0]
+    o = w * tree.width
+    n = POSE + tree.bodies - 1
     worst = scalar(0.0)
     for i in range(n):
-        s = scalar(0.0)
-        for k in range(STAGES):
-            s = s + tree.tableau[STAGES, 1 + k] * tree.dy[k * n + i, w]
-        s = wp.abs(h * s)
+        x = wp.abs(h * weighted(tree, o + tree.dy + i, n, STAGES, STAGES))
         if i < 3:
-            s = s / size
-        worst = wp.max(worst, s)
-    m = tree.u0.shape[0]
+            x = x / size
+        worst = larger(worst, x)
+    m = tree.rates
     for i in range(m):
-        s = scalar(0.0)
-        for k in range(STAGES):
-            s = s + tree.tableau[STAGES, 1 + k] * tree.du[k * m + i, w]
-        s = wp.abs(h * h * s)
-        if i < tree.root_turn.shape[0]:
-            if wp.dot(tree.root_turn[i], tree.root_turn[i]) == scalar(0.0):
-                s = s / size
-        worst = wp.max(worst, s)
+        x = wp.abs(h * h * weighted(tree, o + tree.du + i, m, STAGES, STAGES))
+        if i < tree.roots:
+            if wp.dot(tree.axes[i], tree.axes[i]) == scalar(0.0):
+                x = x / size
+        worst = larger(worst, x)
     return worst
+
+
+@wp.func
+def larger(a: scalar, b: scalar):
+    """The larger of two numbers; not a number if one is none."""
+    out = a
+    if not (b <= a):
+        out = b
+    return out

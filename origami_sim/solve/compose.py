@@ -275,7 +275,8 @@ class _Composer:
                     t(f"power[{i}, w] = power_{e.name}")
             if mode == "rigid" and e.exchanges_work:
                 with self.acting(t, e):
-                    t(f"tree.spent[{i}, w] = tree.spent[{i}, w] + share * power_{e.name}")
+                    spent = f"tree.data[(w * tree.width + tree.spent + {i}) & NATURAL]"
+                    t(f"{spent} = {spent} + share * power_{e.name}")
                     with t.block("if last:"):
                         t(f"power[{i}, w] = power_{e.name}")
         return str(t)
@@ -463,9 +464,9 @@ class _Composer:
         t("at = at + off * patch.n")
         t("gap = wp.dot(up, at) - plane_height")
         if mode == "rigid":
-            t("way = at - tree.feet0[c, w]")
+            t("way = at - articulated.vec_at(tree.data, w * tree.width + tree.feet0 + 3 * c)")
             with t.block("if last:"):
-                t("tree.feet[c, w] = at")
+                t("articulated.put_vec(tree.data, w * tree.width + tree.feet + 3 * c, at)")
         if mode == "evaluate":
             t("gaps[c, w] = gap")
         t("if gap < reach:")

@@ -63,64 +63,67 @@ class RigidBatch(Batch):
 
     def _made(self, state: State) -> articulated.Tree:
         """The tree on the device, its bodies shaped and placed as in a state."""
-        t, model, w = self.tree_of, self.model, self.worlds
-        x, tree = state.x, articulated.Tree()
-        bodies, joints, roots = len(t.parent), len(t.parent) - 1, len(t.turns)
-        m, rows, effects = joints + roots, len(t.row_node), len(self.program.effects)
-        mass = np.broadcast_to(self._mass, (len(x), w))
+        t, model, w, x = self.tree_of, self.model, self.worlds, state.x
+        joints, rates = len(t.joints), len(t.joints) + len(t.turns)
+        tree = articulated.Tree()
+        tree.bodies, tree.roots, tree.rates, tree.rows = len(t.parent), len(t.turns), rates, len(t.row_node)
+        tree.hinges, tree.memories = len(state.angles), len(state.memory)
+        tree.feet_count, tree.effects = len(model.contacts), len(self.program.effects)
+        tree.follows, tree.stabilisation, tree.softness = int(t.follows), STABILISATION, SOFTNESS
 
         def constant(a, dtype):
             return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
-        def blank(count, dtype=wp.float64):
-            return wp.zeros((count, self._stride), dtype=dtype, device=self.device)
-
-        def filled(a, dtype):
-            out = np.zeros((len(a), self._stride, *a.shape[2:]))
-            out[:, :w] = a
-            return wp.array(out, dtype=dtype, device=self.device)
-
-        tree.parent = constant(t.parent, wp.int32)
-        tree.body_of = constant(t.body_of, wp.int32)
+        tree.parent, tree.body_of = constant(t.parent, wp.int32), constant(t.body_of, wp.int32)
         tree.joint_of = constant(t.joint_of, wp.int32)
-        tree.root_turn, tree.root_shift = constant(t.turns, wp.vec3d), constant(t.shifts, wp.vec3d)
-        tree.root_pivot, tree.root_follows = constant(t.pivots, wp.vec3d), int(t.follows)
-        tree.row_node, tree.row_body = constant(t.row_node, wp.int32), constant(t.row_body, wp.int32)
-        tree.row_axis = constant(t.row_axis, wp.vec3d)
-        tree.stabilisation, tree.softness = STABILISATION, SOFTNESS
+        tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
+        tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
         tree.tableau = constant(TABLEAU, wp.float64)
-        # bodies
-        centre, weight, inertia = self._bodies(x, mass)
-        origin = x[t.root_nodes].mean(axis=0)[None]
+        centre, mass, inertia = self._bodies(x, np.broadcast_to(self._mass, (len(x), w)))
+        origin = x[t.root_nodes].mean(axis=0)
         axis, pivot = np.zeros((joints, w, 3)), np.zeros((joints, w, 3))
         for j, (c, sign) in enumerate(t.joints):
             along = x[model.creases[c, 2]] - x[model.creases[c, 1]]
             axis[j] = sign * along / np.linalg.norm(along, axis=-1, keepdims=True)
             pivot[j] = x[model.creases[c, 1]]
-        tree.reference, tree.root_centre = filled(x, wp.vec3d), filled(origin, wp.vec3d)
-        tree.axis, tree.pivot = filled(axis, wp.vec3d), filled(pivot, wp.vec3d)
-        tree.start = filled(state.angles[: len(model.creases)], wp.float64)
-        tree.mass, tree.centre = filled(weight, wp.float64), filled(centre, wp.vec3d)
-        tree.inertia = filled(inertia, wp.mat33d)
-        # coordinates
         y = np.zeros((7 + joints, w))
-        y[:3], y[6] = origin[0].T, 1.0
-        tree.y, tree.u = filled(y, wp.float64), filled(self._rates(state, origin[0], axis, pivot), wp.float64)
-        tree.y0, tree.u0 = blank(7 + joints), blank(m)
-        tree.dy, tree.du = blank(7 * (7 + joints)), blank(7 * m)
-        tree.span = filled(np.full((1, w), np.inf), wp.float64)
-        tree.angles0, tree.memory0 = blank(len(state.angles)), blank(len(state.memory))
-        tree.feet, tree.feet0 = filled(contact_points(model, x), wp.vec3d), blank(len(model.contacts), wp.vec3d)
-        tree.power0, tree.spent = blank(effects), blank(effects)
-        for name in ("turned", "second"):
-            setattr(tree, name, blank(bodies, wp.mat33d))
-        for name in ("placed", "omega", "speed", "alpha", "gain", "force", "moment", "first"):
-            setattr(tree, name, blank(bodies, wp.vec3d))
-        tree.hinge, tree.joint = blank(joints, wp.vec3d), blank(joints, wp.vec3d)
-        tree.torque, tree.heavy, tree.factor = blank(joints), blank(bodies), blank(m * m)
-        tree.rows, tree.solved, tree.gram = blank(rows * m), blank(rows * m), blank(rows * rows)
-        tree.pull = blank(rows)
-        self.size = float(np.ptp(model.position, axis=0).max()) or 1.0
+        y[:3], y[6] = origin.T, 1.0
+        given = {
+            "reference": x,
+            "middle": origin[None],
+            "axis": axis,
+            "pivot": pivot,
+            "start": state.angles[: len(model.creases)],
+            "mass": mass,
+            "centre": centre,
+            "inertia": inertia,
+            "y": y,
+            "u": self._rates(state, origin, axis, pivot),
+            "span": np.full((1, w), np.inf),
+            "feet": contact_points(model, x),
+        }
+        sizes = {
+            **dict.fromkeys(("turned", "second"), 9 * tree.bodies),
+            **dict.fromkeys(("placed", "omega", "speed", "alpha", "gain", "force", "moment", "first"), 3 * tree.bodies),
+            **dict.fromkeys(("hinge", "joint"), 3 * joints),
+            **dict.fromkeys(("power0", "spent"), tree.effects),
+            **dict.fromkeys(("jacobian", "solved"), tree.rows * rates),
+            **{"y0": 7 + joints, "u0": rates, "dy": 7 * (7 + joints), "du": 7 * rates, "torque": joints},
+            **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
+            **{"heavy": tree.bodies, "factor": rates**2, "gram": tree.rows**2, "pull": tree.rows},
+        }
+        columns, place = [], 0
+        for name in articulated.PARTS:
+            setattr(tree, name, place)
+            a = np.zeros((sizes[name], w)) if name in sizes else given[name]
+            part = np.moveaxis(a, 1, 0).reshape(w, -1)
+            columns.append(part)
+            place += part.shape[1]
+        tree.width = place + (-place) % 8 + 8  # a cache line of its own for each world
+        data = np.zeros((w, tree.width))
+        data[:, :place] = np.concatenate(columns, axis=1)
+        tree.data = constant(data.ravel(), wp.float64)
+        self.size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
         return tree
 
     def _bodies(self, x: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

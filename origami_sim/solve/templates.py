@@ -128,11 +128,10 @@ def rigid({arguments}
         clock = scalar(0.0)
         going = int(1)
         while going == 1:
-            step = dt - clock
-            whole = int(1)
-            if tolerance > scalar(0.0) and step > tree.span[0, w]:
-                whole = int(0)
-                step = wp.min(tree.span[0, w], scalar(0.5) * step)
+            step = articulated.step_of(tree, clock, dt, tolerance, w)
+            ends = int(0)
+            if step == dt - clock:
+                ends = int(1)
             first_stage = int(1)
             if s < 0:
                 step = scalar(0.0)
@@ -148,26 +147,28 @@ def rigid({arguments}
                 articulated.pose(tree, X, V, F, w)
 {body}
                 articulated.accelerate(tree, F, X, stage, w)
+            allowed = tolerance
+            if tolerance == scalar(0.0):
+                allowed = scalar(1.0)  # a step as given only may not turn anything by radians more than it should
             error = scalar(0.0)
+            longer = dt
             if s >= 0:
                 error = articulated.error_of(tree, step, size, w)
-            if s < 0 or (tolerance == scalar(0.0) and error <= scalar(1.0)) or error <= tolerance:
+            if error <= allowed:
                 articulated.carry_over(tree, work, step, w)
                 clock += step
-                if s < 0 or whole == 1:
+                if s < 0 or ends == 1:
                     going = int(0)
+                if s >= 0 and tolerance > scalar(0.0):
+                    longer = articulated.lengthen(tree, step, error / allowed, ends, w)
             else:
                 articulated.go_back(tree, angles, memory, power, w)
-                whole = int(0)
-            if s >= 0 and tolerance > scalar(0.0):
-                longer = articulated.next_step(step, error / tolerance)
-                if whole == 0:
-                    tree.span[0, w] = longer
-                else:  # cut off by the end: it says nothing against the longer ones before
-                    tree.span[0, w] = wp.max(tree.span[0, w], longer)
-            if going == 1 and (tree.span[0, w] < finest or tolerance == scalar(0.0)):
+                longer = scalar(0.0)
+                if tolerance > scalar(0.0):
+                    longer = articulated.lengthen(tree, step, error / allowed, 0, w)
+            if longer < finest:
                 status[0, w] = first_step + s + 1
-                status[1, w] = articulated.fastest(tree, V, w)
+                status[1, w] = articulated.fastest(V, w)
                 going = int(0)
         if status[0, w] >= 0:
             break
