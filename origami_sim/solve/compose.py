@@ -276,7 +276,7 @@ class _Composer:
             if mode == "rigid" and e.exchanges_work:
                 with self.acting(t, e):
                     spent = f"tree.data[(w * tree.width + tree.spent + {i}) & NATURAL]"
-                    t(f"{spent} = {spent} + share * power_{e.name}")
+                    t(f"{spent} = {spent} + weighs * power_{e.name}")
                     with t.block("if last:"):
                         t(f"power[{i}, w] = power_{e.name}")
         return str(t)
@@ -341,7 +341,7 @@ class _Composer:
 
     def _hinges(self, t: _Text, mode: str, family: str):
         effects = self.family(family)
-        if not effects:
+        if not effects and family != "crease":  # fold angles are followed also where no law asks for them
             return
         # rows of hinges: creases first, then bending lines; parameters count within their family
         count, shift = "crease_count", "0"
@@ -387,6 +387,9 @@ class _Composer:
                         self.scatter(t, e, node, f"M{i} * g.g{node}", mode)
                 else:
                     t(f"moment += M{i}")
+        if not effects:
+            t.depth -= 1
+            return
         if mode == "rigid":
             t("articulated.bend(tree, hinges, X, F, r, w, moment)")
         elif mode != "evaluate":

@@ -13,6 +13,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
+from origami_sim.solve.rigid import TOLERANCE as RIGID
 from origami_sim.solve.rigid import batch_of
 from origami_sim.solve.timestep import TimeStep, stable_step
 
@@ -97,7 +98,7 @@ def simulate(
     state: State | None = None,
     method: str = "explicit",
     spectral_radius: float = 1.0,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     device: str = "cpu",
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -117,7 +118,8 @@ def simulate(
         state: where to start (default: the reference state at rest); its worlds must match.
         method: "explicit" or "implicit".
         spectral_radius: implicit: below 1 it damps modes faster than the step, so much per step (generalised-alpha).
-        tolerance: implicit without dt: position error of one step over the size of the structure.
+        tolerance: error of one step without dt: implicit, of positions over the size of the structure (default 1e-5);
+            rigid panels, of angles [rad], and of positions over the size (default 1e-10).
         device: "cpu" or "cuda:0". threads: CPU threads (default all cores).
         progress: called with the fraction done.
 
@@ -132,6 +134,8 @@ def simulate(
     chosen = stable_step(model, parameters)
     if method not in ("explicit", "implicit"):
         raise InputError("no such method", field="method", value=method, allowed="explicit, implicit")
+    if tolerance is not None and not (tolerance > 0 and np.isfinite(tolerance)):
+        raise InputError("steps need a positive tolerance", field="tolerance", value=tolerance, allowed="> 0")
     implicit = method == "implicit"
     if implicit and model.panels == "rigid":
         raise InputError("rigid panels need no implicit steps", field="method", value=method, allowed="explicit")
@@ -165,13 +169,13 @@ def simulate(
             applied,
             state,
             radius=spectral_radius,
-            tolerance=tolerance if dt is None else None,
+            tolerance=(tolerance or TOLERANCE) if dt is None else None,
             device=device,
             threads=threads,
         )
     else:
-        exact = {} if model.panels != "rigid" or dt is None else {"tolerance": 0.0}  # a given step is taken as it is
-        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, **exact)
+        error = {} if model.panels != "rigid" else {"tolerance": 0.0 if dt is not None else tolerance or RIGID}
+        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, **error)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 

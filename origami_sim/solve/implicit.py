@@ -36,7 +36,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import DISTORTIONS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve import compose
+from origami_sim.solve import compose, templates
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import STEP, _System
 from origami_sim.solve.timestep import stable_step
@@ -118,7 +118,7 @@ def _kernel(names: tuple[str, ...]) -> wp.Kernel:
     """The kernel of the averaged force for a set of effects."""
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
     composer = _Averager(effects)
-    source = _HEAD.format(arguments=compose._ARGUMENTS, hoist=composer.hoist(), body=composer.body("rollout"))
+    source = _HEAD.format(arguments=templates.ARGUMENTS, hoist=composer.hoist(), body=composer.body("rollout"))
     return compose.written(source, "average", effects)
 
 

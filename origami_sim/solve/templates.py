@@ -142,7 +142,7 @@ def rigid({arguments}
                     articulated.go(tree, stage, step, w)
                 h = tree.tableau[stage, 0] * step
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
-                share = tree.tableau[final, 1 + stage]
+                weighs = tree.tableau[final, 1 + stage]
                 last = stage == final
                 articulated.pose(tree, X, V, F, w)
 {body}

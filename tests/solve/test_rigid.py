@@ -1,0 +1,321 @@
+"""Rigid panels in reduced coordinates, against independent rigid-body solutions and against bars."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effects.kit import slope
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from origami_sim import Drive, Sheet, grid, simulate, strip
+from origami_sim.articulation import Articulation
+from origami_sim.bodies import body_of, mass_points, rigid
+from origami_sim.errors import InputError
+from origami_sim.model import State
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.rigid import RigidBatch, batch_of
+
+G = 9.80665
+
+
+def hanging(lengths=(0.04, 0.2, 0.15), width=0.03, *, panels="rigid", **options):
+    """A chain of plates that hangs from a held mount."""
+    pattern = strip(list(lengths), width)
+    pattern.vertices = pattern.vertices[:, [2, 1, 0]] * (1, 1, -1)
+    sheet = Sheet(pattern, thickness=2e-3, material="aluminium", triangulation="center", panels=panels, **options)
+    return sheet.fix(panels=[0]).gravity()
+
+
+def folded(model, angles, rates=None, worlds=1):
+    """A state of these fold angles [rad] and rates [rad/s], the root where it is."""
+    arm = Articulation(model)
+    pose = replace(arm.reference(worlds), angles=np.tile(np.array(angles, float)[:, None], worlds))
+    x = arm.positions(pose)
+    state = State.at_rest(model, worlds, x)
+    if rates is not None:
+        by = arm.jacobian(pose, x)[-len(angles) :]
+        state.v[:] = np.einsum("mnwa,m->nwa", by, rates)
+    return state
+
+
+def double_pendulum(model, parameters, angles, times, viscosity=(0.0, 0.0)):
+    """Fold angles of a two-arm chain from Lagrange's equations in absolute angles [len(times), 2]."""
+    body = [body_of(parameters, p) for p in (1, 2)]
+    (m1, m2), top = parameters["body", "mass"][1:, 0], -0.04
+    length = 0.2
+    a1, a2 = top - body[0][0][2], top - length - body[1][0][2]
+    i1, i2 = (b[1][1, 1] for b in body)
+
+    def rates(_, y):
+        p, q, dp, dq = y
+        coupling = m2 * length * a2
+        mass = np.array([[i1 + m1 * a1**2 + m2 * length**2, coupling * np.cos(p - q)], [0, i2 + m2 * a2**2]])
+        mass[1, 0] = mass[0, 1]
+        turn = coupling * np.sin(p - q)
+        c1, c2 = viscosity
+        right = [
+            -turn * dq**2 - (m1 * a1 + m2 * length) * G * np.sin(p) - c1 * dp + c2 * (dq - dp),
+            turn * dp**2 - m2 * a2 * G * np.sin(q) - c2 * (dq - dp),
+        ]
+        return [dp, dq, *np.linalg.solve(mass, right)]
+
+    y0 = [angles[0], sum(angles), 0.0, 0.0]
+    y = solve_ivp(rates, (0, times[-1]), y0, "DOP853", times, rtol=1e-12, atol=1e-12).y
+    return np.stack([y[0], y[1] - y[0]], axis=1)
+
+
+def test_a_chain_swings_as_lagranges_equations_say():
+    model, parameters = hanging().set("crease_viscosity", viscosity=np.array([2e-4, 1e-4])).build()
+    run = simulate(model, parameters, duration=2.0, rate=100.0, state=folded(model, [1.2, 0.7]))
+    expected = double_pendulum(model, parameters, [1.2, 0.7], run.times, (2e-4, 1e-4))
+    assert np.abs(run.creases[:, :, 0] - expected).max() < 1e-8
+    balance = run.energy_balance()
+    assert np.ptp(balance) < 1e-9 * run.energies["kinetic"].max()
+
+
+def test_a_given_step_is_of_order_five():
+    model, parameters = hanging().build()
+    state = folded(model, [1.2, 0.7])
+    expected = double_pendulum(model, parameters, [1.2, 0.7], np.array([0.0, 1.0]))[-1]
+    steps = np.array([0.005, 0.004, 0.0025])
+    errors = []
+    for dt in steps:
+        run = simulate(model, parameters, duration=1.0, rate=10.0, state=state, dt=dt)
+        assert run.dt == pytest.approx(dt)
+        errors.append(np.abs(run.creases[-1, :, 0] - expected).max())
+    assert slope(steps, errors) == pytest.approx(5.0, abs=0.6)
+    assert errors[-1] < 1e-6
+
+
+@pytest.mark.slow
+def test_bars_come_to_it_as_they_stiffen():
+    """Chain of plates with bars 16 times stiffer each time: the difference falls as 1/stiffness."""
+    rigid_model, rigid_parameters = hanging().build()
+    expected = simulate(rigid_model, rigid_parameters, duration=0.5, rate=50.0, state=folded(rigid_model, [0.8, 0.4]))
+    errors, factors = [], np.array([1e-4, 4e-4, 1.6e-3])
+    for factor in factors:
+        model, parameters = hanging(panels="elastic", membrane=factor, membrane_damping=0.0).build()
+        parameters.set("panel_bending", "stiffness", parameters["panel_bending", "stiffness"] * 1e2)
+        run = simulate(model, parameters, duration=0.5, rate=50.0, state=folded(model, [0.8, 0.4]))
+        errors.append(np.abs(run.creases - expected.creases).max())
+    assert slope(factors, errors) == pytest.approx(-1.0, abs=0.25)
+
+
+def test_a_free_body_tumbles_as_eulers_equations_say():
+    """An asymmetric plate without forces, turning about its middle axis: it flips (Euler; Dzhanibekov)."""
+    sheet = Sheet(grid(1, 1, 0.1, 0.06), thickness=4e-3, material="aluminium", panels="rigid")
+    model, parameters = sheet.build()
+    centre, inertia = body_of(parameters, 0)
+    omega = np.array([0.02, 9.0, 0.05]) if inertia[0, 0] < inertia[1, 1] else np.array([9.0, 0.02, 0.05])
+    state = State.at_rest(model)
+    state.v[:, 0] = np.cross(omega, model.position - centre) + [0.3, 0.0, 0.1]
+    run = simulate(model, parameters, duration=3.0, rate=50.0, state=state, tolerance=1e-12)
+
+    def rates(_, y):
+        turn = Rotation.from_quat(y[:4])
+        w = turn.inv().apply(y[4:])
+        dw = turn.apply(np.linalg.solve(inertia, -np.cross(w, inertia @ w)))
+        q = np.concatenate([0.5 * (y[3] * y[4:] + np.cross(y[4:], y[:3])), [-0.5 * y[:3] @ y[4:]]])
+        return np.concatenate([q, dw])
+
+    y = solve_ivp(rates, (0, 3), [0, 0, 0, 1, *omega], "DOP853", run.times, rtol=1e-12, atol=1e-13).y
+    for f, t in enumerate(run.times):
+        x = Rotation.from_quat(y[:4, f]).apply(model.position - centre) + centre + t * np.array([0.3, 0.0, 0.1])
+        assert np.abs(run.x[f, :, 0] - x).max() < 1e-8
+    middle = 0 if inertia[0, 0] > inertia[1, 1] else 1
+    across = np.array([Rotation.from_quat(q).as_matrix()[middle, middle] for q in y[:4].T])
+    assert across.min() < -0.9 or np.ptp(across) > 0.1, "it has to flip, or nothing was tested"
+
+
+def test_a_free_chain_keeps_momentum_angular_momentum_and_energy():
+    sheet = Sheet(strip([0.05, 0.08, 0.06], 0.04), thickness=2e-3, triangulation="center", panels="rigid")
+    sheet.patch(2, thickness=3e-3).crease(stiffness=np.array([3e-3, 2e-3]))
+    model, parameters = sheet.build()
+    state = folded(model, [0.6, -0.9], [3.0, -5.0])
+    state.v[:] += np.cross([1.0, 2.0, -1.5], state.x) + [0.2, 0.1, 0.4]
+    run = simulate(model, parameters, duration=2.0, rate=20.0, state=state, tolerance=1e-12)
+    mass = parameters["inertia", "mass"][:, 0, None]
+    for f in range(len(run.times)):
+        x, v = run.x[f, :, 0], run.v[f, :, 0]
+        assert (mass * v).sum(0) == pytest.approx((mass * run.v[0, :, 0]).sum(0), abs=1e-9 * mass.sum())
+        spin = (mass * np.cross(x, v)).sum(0)
+        assert spin == pytest.approx((mass * np.cross(run.x[0, :, 0], run.v[0, :, 0])).sum(0), abs=2e-11)
+    assert np.ptp(run.energy_balance()) < 1e-8 * run.energies["kinetic"].max()
+    edges = np.linalg.norm(run.x[:, 0, 0] - run.x[:, 1, 0], axis=-1)
+    assert np.ptp(edges) < 1e-12
+
+
+def test_a_body_hangs_from_its_crease_by_its_own_inertia_off_the_plane():
+    """Small swings of a plate with a heavy patch on one side: period of a physical pendulum about its own rest angle."""
+    sheet = hanging((0.04, 0.1)).body(1, mass=0.05, centre=(0.03, 0.0, -0.11), inertia=(9e-5, 8e-5, 3e-5))
+    model, parameters = sheet.build()
+    arm = np.hypot(0.03, 0.07)
+    rest = np.arctan2(0.03, 0.07)
+    inertia = 8e-5 + 0.05 * arm**2
+    period = 2 * np.pi * np.sqrt(inertia / (0.05 * G * arm))
+    sign = 1.0
+    for trial in (rest, -rest):  # which way the fold angle counts
+        run = simulate(model, parameters, duration=0.01, rate=1000.0, state=folded(model, [trial]))
+        if np.abs(np.ptp(run.creases)) < 1e-9:
+            sign = np.sign(trial)
+    run = simulate(model, parameters, duration=4 * period, rate=400.0, state=folded(model, [sign * rest + 1e-4]))
+    swing = run.creases[:, 0, 0] - sign * rest
+    expected = 1e-4 * np.cos(2 * np.pi * run.times / period)
+    assert np.abs(swing - expected).max() < 1e-8
+
+
+@pytest.mark.parametrize("held", ["line", "point", "plane"])
+def test_a_panel_held_at_some_nodes_turns_about_them(held):
+    sheet = Sheet(grid(1, 1, 0.1, 0.06), thickness=2e-3, material="aluminium", panels="rigid").gravity()
+    model, parameters = sheet.build()
+    edge = np.flatnonzero(np.isclose(model.position[:, 0], 0.0) & (np.arange(len(model.position)) < 4))
+    if held == "line":
+        sheet.fix(nodes=edge)
+    elif held == "point":
+        sheet.fix(nodes=edge[:1])
+    else:
+        sheet.fix(nodes=range(4), axes="y")
+    model, parameters = sheet.build()
+    run = simulate(model, parameters, duration=0.5, rate=40.0, tolerance=1e-12)
+    mass = parameters["inertia", "mass"][:, 0]
+    fall = np.einsum("n,fn->f", mass, run.x[:, :, 0, 2] - run.x[0, :, 0, 2])
+    kinetic = 0.5 * np.einsum("n,fna->f", mass, run.v[:, :, 0] ** 2)
+    assert kinetic + G * fall == pytest.approx(0.0, abs=1e-9 * kinetic.max())
+    assert kinetic.max() > 0.01
+    if held == "plane":
+        assert run.x[-1, 0, 0, 2] == pytest.approx(run.x[0, 0, 0, 2] - 0.5 * G * 0.25, abs=1e-9)
+        return
+    assert run.x[:, edge[0]] == pytest.approx(np.tile(run.x[0, edge[0]], (len(run.x), 1, 1)), abs=1e-12)
+    if held == "line":
+        assert run.x[:, edge[1]] == pytest.approx(np.tile(run.x[0, edge[1]], (len(run.x), 1, 1)), abs=1e-12)
+        body = body_of(parameters, 0)
+        about = body[1][1, 1] + mass.sum() * body[0][0] ** 2
+        speed = np.sqrt(-2 * G * fall[5] / about)  # of a physical pendulum
+        assert np.linalg.norm(run.v[5, 3, 0]) == pytest.approx(speed * np.linalg.norm(run.x[0, 3, 0, [0, 2]]), rel=1e-9)
+
+
+def test_creases_with_memory_move_as_in_bars():
+    """Friction and relaxation in a hinge: the same laws, the same motion as stiff bars give."""
+    runs = {}
+    for panels in ("rigid", "elastic"):
+        sheet = hanging((0.04, 0.1), panels=panels, membrane=1e-3).crease(stiffness=2e-3, rest_angle=0.0)
+        sheet.set("crease_friction", friction_moment=1e-3, yield_angle=0.01)
+        sheet.set("crease_relaxation", stiffness_1=2e-3, time_1=0.1)
+        model, parameters = sheet.build()
+        runs[panels] = simulate(model, parameters, duration=0.6, rate=100.0, state=folded(model, [1.0]))
+    assert runs["rigid"].creases == pytest.approx(runs["elastic"].creases, abs=2e-4)
+    assert runs["rigid"].work["crease_friction"][-1] == pytest.approx(runs["elastic"].work["crease_friction"][-1], rel=1e-3)
+    assert np.ptp(runs["rigid"].energy_balance()) < 1e-6
+
+
+def test_a_block_sticks_below_the_friction_angle_and_slides_above():
+    for tilt, coefficient in ((0.2, 0.3), (0.3, 0.2)):
+        sheet = Sheet(grid(1, 1, 0.04, 0.04), thickness=4e-3, panels="rigid").gravity()
+        for corner in ((0, 0, 0), (0.04, 0, 0), (0.04, 0.04, 0), (0, 0.04, 0)):
+            sheet.contact(0, corner)
+        sheet.set("ground", stiffness=2000.0, damping=2.0).set("friction", stiffness=2000.0, damping=2.0)
+        sheet.set("coulomb", friction_coefficient=coefficient)
+        model, parameters = sheet.build()
+        parameters.set("plane", "tilt", tilt).set("plane", "reach", 1e-4)
+        x = Rotation.from_rotvec([0, -tilt, 0]).apply(model.position)
+        run = simulate(model, parameters, duration=0.6, rate=100.0, state=State.at_rest(model, position=x))
+        assert not run.failures
+        along = run.centre_of_mass()[:, 0] @ [np.cos(tilt), 0, np.sin(tilt)]
+        if tilt < np.arctan(coefficient):
+            assert abs(along[-1] - along[30]) < 1e-9
+        else:
+            a = G * (np.sin(tilt) - coefficient * np.cos(tilt))
+            speed = (along[-1] - along[-11]) / 0.1
+            assert speed == pytest.approx(-a * (run.times[-1] - 0.05), rel=5e-3)
+
+
+def test_worlds_do_not_depend_on_each_other_nor_on_threads():
+    model, parameters = hanging().build()
+    states = [folded(model, [a, 0.3]) for a in (0.2, 1.0, 1.9)]
+    together = RigidBatch(model, parameters, Drive(), State.join(states), threads=2)
+    x, _ = together.film(5, 1, 0.02, np.inf)
+    for w, state in enumerate(states):
+        alone = RigidBatch(model, parameters, Drive(), state, threads=1)
+        assert np.array_equal(alone.film(5, 1, 0.02, np.inf)[0][:, :, 0], x[:, :, w])
+
+
+def test_a_run_goes_on_from_its_last_state():
+    model, parameters = hanging().build()
+    whole = simulate(model, parameters, duration=1.0, rate=50.0, state=folded(model, [1.0, -0.5]))
+    half = simulate(model, parameters, duration=0.5, rate=50.0, state=folded(model, [1.0, -0.5]))
+    rest = simulate(model, parameters, duration=0.5, rate=50.0, state=half.state)
+    assert rest.creases[-1] == pytest.approx(whole.creases[-1], abs=1e-8)
+    assert rest.times[-1] == pytest.approx(1.0)
+
+
+def test_mass_points_have_the_body():
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(9, 3)) * [3, 1, 0.2]
+    centre = points.mean(0)
+    spread = (points - centre).T @ (points - centre) * 0.7 / 9
+    inertia = np.trace(spread) * np.eye(3) - spread
+    found = mass_points(0.7, centre, inertia)
+    assert found.mean(0) == pytest.approx(centre)
+    r = found - centre
+    assert 0.7 / 4 * r.T @ r == pytest.approx(spread)
+
+
+def test_a_panel_is_the_slab_that_it_is():
+    sheet = Sheet(grid(1, 1, 0.1, 0.06), thickness=4e-3, density=1000.0, panels="rigid")
+    sheet.patch(0, thickness=2e-3, size=(0.02, 0.04), centre=(0.03, 0.02, 0.0), density=3000.0, side=-1)
+    _, parameters = sheet.build()
+    centre, inertia = body_of(parameters, 0)
+    slab, patch = 0.1 * 0.06 * 4e-3 * 1000, 0.02 * 0.04 * 2e-3 * 3000
+    x1, x2 = np.array([0.05, 0.03, 0.0]), np.array([0.03, 0.02, -3e-3])
+    middle = (slab * x1 + patch * x2) / (slab + patch)
+    assert centre == pytest.approx(middle)
+    expected = np.zeros((3, 3))
+    for m, x, (a, b, c) in ((slab, x1, (0.1, 0.06, 4e-3)), (patch, x2, (0.02, 0.04, 2e-3))):
+        r = x - middle
+        expected += m / 12 * np.diag([b**2 + c**2, a**2 + c**2, a**2 + b**2]) + m * ((r @ r) * np.eye(3) - np.outer(r, r))
+    assert inertia == pytest.approx(expected, abs=1e-12)
+
+
+def test_forces_are_those_of_the_same_nodes_in_bars():
+    """Gravity and the crease's moment do the same virtual work on the rigid model as on its elastic twin."""
+    model, parameters = hanging(panels="elastic").crease(stiffness=0.01).build()
+    other, own = rigid(model, parameters)
+    arm, state = Articulation(other), folded(other, [0.5, 0.3])
+    by = arm.jacobian(replace(arm.reference(), angles=np.array([[0.5], [0.3]])), state.x)
+    f = Batch(other, own, Drive(), state).evaluate(0.0).forces
+    elastic = folded(model, [0.5, 0.3])
+    g = Batch(model, parameters, Drive(), elastic).evaluate(0.0).forces
+    by_bars = Articulation(model).jacobian(replace(Articulation(model).reference(), angles=np.array([[0.5], [0.3]])), elastic.x)
+    for name in ("gravity", "crease"):
+        one, two = np.einsum("mnwa,nwa->m", by, f[name]), np.einsum("mnwa,nwa->m", by_bars, g[name])
+        assert one == pytest.approx(two, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: Sheet(strip([0.1], 0.05), thickness=1e-3, panels="soft"), ["panels", "soft", "elastic, rigid"]),
+        (lambda: hanging().set("maxwell_membrane").build(), ["neither bend nor stretch", "maxwell_membrane"]),
+        (lambda: hanging().body(1, mass=0.1, centre=(0, 0, -0.1), inertia=(1e-5, 1e-5, 9e-5)), ["no body has", "sum"]),
+        (lambda: hanging().body(1, mass=-0.1, centre=(0, 0, -0.1), inertia=(1e-5, 1e-5, 1e-5)), ["positive mass"]),
+        (
+            lambda: simulate(*hanging().build(), duration=0.1, method="implicit"),
+            ["rigid panels need no implicit steps"],
+        ),
+    ],
+)
+def test_what_no_rigid_panel_is_is_refused(make, words):
+    with pytest.raises(InputError) as error:
+        make()
+    assert all(w in str(error.value) for w in words), str(error.value)
+
+
+def test_held_panels_are_carried_for_the_memory_of_their_laws():
+    model, parameters = hanging((0.04, 0.1)).set("crease_friction", friction_moment=1e-3, yield_angle=0.01).build()
+    held = replace(model, free=np.zeros_like(model.free))
+    path = np.stack([folded(model, [a]).x[:, 0] for a in np.linspace(0.0, 0.5, 6)])
+    batch = batch_of(held, parameters, Drive(), folded(model, [0.0]))
+    batch.carry(path[:, :, None], 0.01)
+    assert np.abs(batch.state().memory).max() > 0
+    assert batch.state().x[:, 0] == pytest.approx(path[-1], abs=1e-12)
