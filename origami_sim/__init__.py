@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from origami_sim.bodies import rigid
     from origami_sim.build import Sheet
     from origami_sim.diagnose import Diagnosis, Subject, diagnose
     from origami_sim.drive import Drive, Signal, ramp, series, sine
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "bodies": "rigid",
     "build": "Sheet",
     "diagnose": "Diagnosis Subject diagnose",
     "drive": "Drive Signal ramp series sine",
@@ -66,7 +68,7 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     "read_pattern", "read_fold", "read_svg", "read_mesh", "write_fold", "write_mesh", "triangulate",
     "Sheet", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
     # a model and what drives it
-    "Model", "Parameters", "State", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
+    "Model", "Parameters", "State", "rigid", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
     # solutions
     "simulate", "Trajectory", "stable_step", "equilibrium", "Equilibrium", "continuation", "Path",
     # results

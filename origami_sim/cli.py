@@ -90,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
+    p.add_argument("--panels", choices=("elastic", "rigid"), help="bars and bending lines, or rigid bodies on hinges")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
 
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
@@ -261,6 +262,7 @@ def _run(args) -> int:
 
     module = scene_module(args.scene)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
+    settings = settings.with_panels(args.panels or settings.panels)
     if args.settings:
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})

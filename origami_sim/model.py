@@ -103,7 +103,7 @@ class Model:
         """Digest of everything in the model that moves it."""
         h = hashlib.sha256()
         for f in fields(self):
-            if f.name == "channels":
+            if f.name == "channels" or (f.name in ("panels", "carriers") and self.panels == "elastic"):
                 continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
@@ -268,11 +268,16 @@ class State:
 
     @classmethod
     def at_rest(cls, model: Model, worlds: int = 1, position: np.ndarray | None = None) -> "State":
-        """The reference state, or that of given positions ([N, 3] or [N, W, 3]), without motion."""
+        """The reference state, or that of given positions ([N, 3] or [N, W, 3]), without motion.
+
+        The mass points of rigid panels are put where their panels are.
+        """
         start = model.position if position is None else np.asarray(position, float)
         if start.ndim == 2:
             start = start[:, None, :]
         x = np.array(np.broadcast_to(start, (len(model.position), worlds, 3)))
+        if len(model.carriers) and position is not None:
+            _carry(model, x)
         effects = [get(e) for e in model.laws]
         rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
         hinges = np.concatenate([model.creases, model.bends])
@@ -307,6 +312,20 @@ class State:
     @property
     def worlds(self) -> int:
         return self.x.shape[1]
+
+
+def _carry(model: Model, x: np.ndarray) -> None:
+    """Moves the mass points in positions [N, W, 3] to where the corners of their panels are (Kabsch 1976)."""
+    first = len(model.position) - len(model.carriers)
+    for panel in np.unique(model.carriers):
+        corners = np.unique(model.triangles[model.triangle_panel == panel])
+        reference = model.position[corners]
+        middle, now = reference.mean(axis=0), x[corners].mean(axis=0)
+        u, _, vt = np.linalg.svd(np.einsum("nwa,nb->wab", x[corners] - now, reference - middle))
+        sign = np.sign(np.linalg.det(u @ vt))  # of flat panels the normal is left to choose
+        u[:, :, 2] *= sign[:, None]
+        mine = first + np.flatnonzero(model.carriers == panel)
+        x[mine] = np.einsum("wab,nb->nwa", u @ vt, model.position[mine] - middle) + now
 
 
 def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:

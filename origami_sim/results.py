@@ -42,7 +42,7 @@ MANIFEST, STATES, TABLES, REPLAY = "manifest.json", "states.npz", "tables", "rep
 _PACKAGES = ("origami-sim", "warp-lang", "numpy", "scipy", "rerun-sdk", "pyarrow")
 _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
-_MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names", "channels"))
+_MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers"))
 _REQUIRED = {
     "format": int,
     "scene": str,
@@ -307,7 +307,7 @@ def _with_plain_names(model: Model) -> Model:
 def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
     out = {name: getattr(t, name) for name in _FRAMES}
     out |= {f"energies.{n}": v for n, v in t.energies.items()} | {f"work.{n}": v for n, v in t.work.items()}
-    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, "channels")}
+    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, "channels", "panels", "carriers")}
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
     for channel, signal in t.drive.signals.items():
         out |= {f"drive.{channel}.{n}": v for n in _SIGNAL if (v := getattr(signal, n)) is not None}
@@ -495,6 +495,8 @@ class _Arrays:
 def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     given: dict[str, Any] = {n: arrays[f"model.{n}"] for n in _MODEL}
     given["channels"] = int(arrays.values.get("model.channels", 1))
+    if "model.carriers" in arrays.values:  # runs with rigid panels have them
+        given |= {"panels": str(arrays["model.panels"]), "carriers": arrays["model.carriers"]}
     model = _with_plain_names(Model(**given, effects=tuple(manifest["effects"]), names=manifest["names"]))
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:
@@ -507,7 +509,10 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
         )
     for key, value in arrays.under("parameters.").items():
         owner, _, name = key.partition(".")
-        parameters.set(owner, name, value)
+        if owner == "inertia" and model.panels == "rigid":  # corners of rigid panels have no mass of their own
+            parameters.replace(owner, name, value)
+        else:
+            parameters.set(owner, name, value)
     if parameters.hash != manifest["parameters_hash"]:
         raise InputError(
             "has not the parameters of the manifest beside it",

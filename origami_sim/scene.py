@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -57,11 +58,15 @@ class Setting:
 class Settings(Mapping[str, Setting]):
     """The settings of a calibration; values are attributes: settings.gap."""
 
-    def __init__(self, settings: Sequence[Setting], file: Path, effects: "Sequence[Addition]" = ()):
+    def __init__(
+        self, settings: Sequence[Setting], file: Path, effects: "Sequence[Addition]" = (), panels: str | None = None
+    ):
         self._settings = {s.name: s for s in settings}
-        self.file = file
+        self.file, self.panels = file, panels
         self.effects = tuple(effects)
         """Effects that the calibration adds to those of the scene."""
+        if panels not in (None, "elastic", "rigid"):
+            raise InputError("no such panels", file=file, field="panels", value=panels, allowed="elastic, rigid")
 
     def __getitem__(self, name: str) -> Setting:
         return self._settings[name]
@@ -87,7 +92,11 @@ class Settings(Mapping[str, Setting]):
             )
         for name in values:
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
-        return Settings(out, self.file, self.effects)
+        return Settings(out, self.file, self.effects, self.panels)
+
+    def with_panels(self, panels: str | None) -> "Settings":
+        """A copy for a device with "rigid" or "elastic" panels (None: as the scene builds them)."""
+        return Settings(list(self.values()), self.file, self.effects, panels)
 
     def override(self, assignments: Sequence[str], source: str | Path | None = None) -> "Settings":
         """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI.
@@ -95,8 +104,8 @@ class Settings(Mapping[str, Setting]):
         Errors name the `source` of the assignments (default: the file of the settings).
         """
         if source is not None:
-            changed = Settings(list(self.values()), Path(source), self.effects).override(assignments)
-            return Settings(list(changed.values()), self.file, self.effects)
+            changed = Settings(list(self.values()), Path(source), self.effects, self.panels).override(assignments)
+            return Settings(list(changed.values()), self.file, self.effects, self.panels)
         values = {}
         for text in assignments:
             name, equals, given = (part.strip() for part in text.partition("="))
@@ -159,7 +168,8 @@ def read_calibration(source: str | Path) -> Settings:
     """Reads a calibration: a TOML file, or the name of one that ships with the package.
 
     Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
-    `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`).
+    `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`), and the
+    word `panels` ("rigid", "elastic") says how its panels move.
 
     Raises:
         InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range, an effect or a
@@ -181,7 +191,8 @@ def read_calibration(source: str | Path) -> Settings:
         from origami_sim.diagnose.patch import read_additions
 
         additions = read_additions(data.pop("effects"), path)
-    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions)
+    panels = data.pop("panels", None)
+    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, panels)
 
 
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
@@ -348,6 +359,8 @@ def _extended(build: Callable) -> Callable:
     @functools.wraps(build)
     def extended(s: Settings, **options):
         built = build(s, **options)
+        if s.panels == "rigid":
+            built = (*rigid(*built[:2]), *built[2:])
         if not s.effects:
             return built
         from origami_sim.diagnose.patch import switched_on

@@ -84,6 +84,7 @@ class RigidBatch(Batch):
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
         tree.tableau = constant(TABLEAU, wp.float64)
         centre, mass, inertia = self._bodies(x, np.broadcast_to(self._mass, (len(x), w)))
+        self._check_inertia(x[:, 0], np.broadcast_to(self._mass, (len(x), w))[:, 0])
         origin = x[t.root_nodes].mean(axis=0)
         axis, pivot = np.zeros((joints, w, 3)), np.zeros((joints, w, 3))
         for j, (c, sign) in enumerate(t.joints):
@@ -144,13 +145,25 @@ class RigidBatch(Batch):
             inertia[b] = np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3) - spread
         return centre, weight, inertia
 
+    def _check_inertia(self, x: np.ndarray, mass: np.ndarray):
+        """Refuses a panel that turns without inertia."""
+        _, by = self.tree_of.positions(x, np.zeros((len(self.tree_of.turns) + len(self.tree_of.joints), 1)))
+        by = by[:, :, 0]
+        heavy = np.einsum("mna,n,mna->m", by, mass, by)
+        light = np.flatnonzero(heavy <= 1e-15 * heavy.max(initial=0.0))
+        if len(light):
+            k = int(light[0]) - len(self.tree_of.turns)
+            where = f"beyond {self.model.name('crease', self.tree_of.joints[k][0])}" if k >= 0 else "of the first panel"
+            raise InputError("a rigid panel needs mass and inertia", field="body", value=f"none {where}", allowed="> 0")
+
     def _rates(self, state: State, origin: np.ndarray, axis: np.ndarray, pivot: np.ndarray) -> np.ndarray:
         """Rates of the coordinates [m, W] that fit the velocities of a state best."""
         if not np.any(state.v):
             return np.zeros((len(self.tree_of.turns) + len(axis), self.worlds))
-        by = self.jacobian(state.x, origin, axis, pivot)
+        corners = len(state.x) - len(self.model.carriers)  # mass points go along
+        by = self.jacobian(state.x, origin, axis, pivot)[:, :corners]
         by = np.moveaxis(by, 2, 0).reshape(self.worlds, len(by), -1)  # [W, m, 3 N]
-        right = by @ np.moveaxis(state.v, 1, 0).reshape(self.worlds, -1, 1)
+        right = by @ np.moveaxis(state.v[:corners], 1, 0).reshape(self.worlds, -1, 1)
         return np.linalg.solve(by @ np.swapaxes(by, 1, 2), right)[:, :, 0].T
 
     def jacobian(self, x: np.ndarray, origin: np.ndarray, axis: np.ndarray, pivot: np.ndarray) -> np.ndarray:
@@ -221,6 +234,7 @@ class Topology:
                 allowed="one connected sheet, or panels='elastic'",
             )
         body = {p: b for b, p in enumerate(panels)}
+        self._creases = model.creases
         self.parent = np.array([-1, *(body[p] for _, p, _, _ in arm.joints)], np.int32)
         self.joints = [(int(c), sign) for c, _, _, sign in arm.joints]
         owner = arm.owner
@@ -238,6 +252,41 @@ class Topology:
     def beyond(self, body: int) -> np.ndarray:
         """A body and all that it carries."""
         return self._beyond[body]
+
+    def positions(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
+
+        Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size) and turns of the root, then
+        changes of fold angles [rad].
+        """
+        w, roots, size = q.shape[1], len(self.turns), float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
+        centre = start[self.root_nodes].mean(axis=0)
+        pivots = np.tile(centre, (roots, 1)) if self.follows else self.pivots
+        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w, 1))
+        for n in range(w):
+            twist = np.zeros((4, 4))
+            for k in range(roots):
+                twist[:3, :3] += q[k, n] * np.cross(np.eye(3), self.turns[k])
+                twist[:3, 3] += q[k, n] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
+            moved = expm(twist)
+            turn[n], shift[n] = moved[:3, :3], centre + moved[:3, 3]
+        turns, places, axes, joints = [turn], [shift - turn @ centre], [], []
+        for j, (c, sign) in enumerate(self.joints):
+            first, last = start[self._creases[c, 1]], start[self._creases[c, 2]]
+            axis, p = sign * (last - first) / np.linalg.norm(last - first), self.parent[j + 1]
+            axes.append(turns[p] @ axis)
+            joints.append(turns[p] @ first + places[p])
+            angle, k = q[roots + j][:, None, None], np.cross(np.eye(3), axis)
+            turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
+            places.append(joints[-1] - turns[-1] @ first)
+        x = np.stack([turns[b] @ r + places[b] for b, r in zip(self.body_of, start, strict=True)])
+        by = np.zeros((roots + len(self.joints), *x.shape))
+        for k in range(roots):
+            by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
+        for j in range(len(self.joints)):
+            mine = np.isin(self.body_of, self.beyond(j + 1))
+            by[roots + j, mine] = np.cross(axes[j], x[mine] - joints[j])
+        return x, by
 
     def _root(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """How the root can move with its nodes held as they are.
@@ -260,7 +309,8 @@ class Topology:
                 moved = expm(FARTHER * twist)
                 basis = _within(basis, points @ moved[:3, :3].T + moved[:3, 3], held)
         if not np.any(held):
-            return np.eye(6)[:, :3], np.eye(6)[:, 3:], np.tile(centre, (6, 1)), True
+            free = np.eye(6) if np.ptp(model.position, axis=0).max() > 0 else np.eye(6)[3:]  # a point does not turn
+            return free[:, :3], free[:, 3:], np.tile(centre, (len(free), 1)), True
         if not len(basis):
             return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), False
         basis = _reduced(basis)
@@ -310,10 +360,15 @@ class Topology:
                     continue
             for n in model.creases[c, 1:3]:
                 add(int(n), one, other, range(3))
-        held = model.free == 0.0
+        held = (model.free == 0.0) & (self.body_of != 0)[:, None]
+        # what no motion of the tree violates, anywhere, such as a plane that all creases cross, needs no force
+        for angle in FARTHER * np.array([0.0, 1.0, -2.0]) if np.any(held) else ():
+            q = np.full((len(self.turns) + len(self.joints), 1), angle)
+            _, by = self.positions(model.position, q)
+            idle = np.abs(by[:, :, 0]).max(axis=0, initial=0.0) < 1e-9 * np.abs(by).max(initial=0.0)
+            violated = held & ~idle if angle == 0.0 else violated | (held & ~idle)
         for n in np.flatnonzero(held.any(axis=1)):
-            if self.body_of[n] != 0:
-                add(int(n), int(self.body_of[n]), -1, np.flatnonzero(held[n]))
+            add(int(n), int(self.body_of[n]), -1, np.flatnonzero(violated[n]))
         return (
             np.array(nodes, np.int32),
             np.array(pairs, np.int32).reshape(-1, 2),

@@ -25,6 +25,7 @@ from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.rigid_statics import RigidSystem
 
 STEP = 2e-4
 """Step of the differences over the smallest length of the elements at a node."""
@@ -63,14 +64,15 @@ class Equilibrium:
     Attributes:
         state: one world at rest, from which a simulation can start.
         angles: [C + Q] continuous hinge angles, creases first [rad].
-        residual: largest unbalanced force on a free node's axis [N]. tolerance: what was asked for [N].
+        residual: largest unbalanced force on a free node's axis [N], of rigid panels moment of a coordinate [N m].
+        tolerance: what was asked for [N], [N m].
         iterations: tangents evaluated. history: residual before each of them [N].
         converged: whether the residual is below the tolerance.
         stable: whether every eigenvalue of the tangent on the free axes is positive or zero.
-        eigenvalues: lowest eigenvalues of the tangent [N/m], ascending (its real parts if it is unsymmetric).
+        eigenvalues: lowest eigenvalues of the tangent [N/m], of rigid panels all [N m/rad], ascending (its real parts if it is unsymmetric).
         neutral: how many of them are zero: rigid motions, mechanisms, the edge of stability.
         mode: [N, 3] shape of the lowest one, largest component 1.
-        reactions: [N, 3] forces that the supports exert on held axes [N].
+        reactions: [N, 3] forces that the supports exert on held axes [N]; nan for rigid panels, which share them.
         message: what happened, in a sentence. wall: time that it took [s].
     """
 
@@ -185,8 +187,12 @@ def equilibrium(
     """
     _positive(tolerance=tolerance, max_iterations=max_iterations)
     began = clock.perf_counter()
-    system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
-    found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    if model.panels == "rigid":
+        given = _one_world(model, parameters, drive or Drive(), time, state, world)
+        found = Equilibrium(**RigidSystem(*given).settle(time, tolerance, max_iterations, unstable))
+    else:
+        system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
+        found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
     found.wall = clock.perf_counter() - began
     return found
 
@@ -226,6 +232,8 @@ def continuation(
     Raises:
         InputError: numbers that are not positive, start equal to end, factors beyond 1e4, no such world.
     """
+    if model.panels == "rigid":
+        raise InputError("paths of equilibria are followed with bars", field="panels", value="rigid", allowed="elastic")
     began = clock.perf_counter()
     span = abs(end - start)
     if not (span > 0 and max(abs(start), abs(end)) < FURTHEST):
@@ -252,6 +260,12 @@ def _positive(**values):
 
 def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_System", np.ndarray, np.ndarray]:
     """The system of one world, and its positions [N, 3] and angles [H] to start from."""
+    given = _one_world(model, parameters, drive, time, state, world, fixed)
+    return _System(*given), given[3].x[:, 0], given[3].angles[:, 0]
+
+
+def _one_world(model, parameters, drive, time, state, world, fixed=None) -> tuple[Model, Parameters, Drive, State]:
+    """Model, parameters, held drive and state of one world."""
     worlds = max(parameters.worlds, drive.worlds, state.worlds if state else 1)
     if not 0 <= world < worlds:
         raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
@@ -261,13 +275,12 @@ def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["_
         raise InputError("a position must be finite", field="state.x", value=float("nan"))
     if not np.any(model.free):
         raise InputError("statics needs a node that is free to move", field="free", value=0)
-    system = _System(
+    return (
         model,
         parameters.world(world if parameters.worlds > 1 else 0),
         fixed or _fixed(distorted(model, parameters, drive, time), time, world),
         one,
     )
-    return system, one.x[:, 0], one.angles[:, 0]
 
 
 def _resting(state: State, x: np.ndarray, angles: np.ndarray) -> State:

@@ -8,7 +8,7 @@ from effects.kit import slope
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from origami_sim import Drive, Sheet, grid, simulate, strip
+from origami_sim import Drive, Sheet, equilibrium, grid, miura, simulate, strip, waterbomb
 from origami_sim.articulation import Articulation
 from origami_sim.bodies import body_of, mass_points, rigid
 from origami_sim.errors import InputError
@@ -319,3 +319,55 @@ def test_held_panels_are_carried_for_the_memory_of_their_laws():
     batch.carry(path[:, :, None], 0.01)
     assert np.abs(batch.state().memory).max() > 0
     assert batch.state().x[:, 0] == pytest.approx(path[-1], abs=1e-12)
+
+
+def test_rigid_panels_rest_where_moments_balance():
+    """One magnetic crease, K theta = m B cos theta; and a chain that hangs with rest angles, at rest from there on."""
+    sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1e-3, panels="rigid").fix(panels=[0]).crease(stiffness=0.02)
+    sheet.magnetise(1, remanence=0.13, volume=0.02 * 0.02 * 0.003, poling=(1, 0, 0))
+    model, parameters = sheet.build()
+    found = equilibrium(model, parameters, Drive(field=(0, 0, 0.2)))
+    assert found.converged and found.stable
+    assert np.degrees(found.angles[0]) == pytest.approx(47.788428, abs=1e-6)
+
+    chain = hanging().crease(stiffness=0.05, rest_angle=np.array([0.5, -0.3]))
+    model, parameters = chain.build()
+    found = equilibrium(model, parameters)
+    run = simulate(model, parameters, duration=0.3, rate=50.0, state=found.state)
+    assert np.abs(found.angles).min() > 0.01
+    assert np.abs(run.creases - run.creases[0]).max() < 1e-9
+    model, parameters = hanging().crease(stiffness=1e-4).build()
+    upside_down = equilibrium(model, parameters, state=folded(model, [np.pi - 0.02, 0.01]), unstable=True)
+    assert upside_down.converged and not upside_down.stable
+
+
+@pytest.mark.parametrize("pattern", [miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.8), waterbomb(0.06, fold_angle=0.6)])
+def test_closed_loops_stay_closed_and_keep_their_energy(pattern):
+    sheet = Sheet(pattern, thickness=5e-4, panels="rigid").crease(stiffness=1e-3)
+    model, parameters = sheet.build()
+    parameters.set("crease", "rest_angle", 1.2 * parameters["crease", "rest_angle"])
+    run = simulate(model, parameters, duration=0.5, rate=100.0)
+    assert not run.failures and np.ptp(run.creases) > 0.1
+    corners = model.triangles
+    sides = [np.linalg.norm(x[corners] - x[np.roll(corners, 1, axis=1)], axis=-1) for x in run.x[:, :, 0]]
+    assert np.ptp(np.array(sides), axis=0).max() < 1e-10
+    assert np.ptp(run.energy_balance()) < 1e-6 * run.energies["kinetic"].max()
+
+
+def test_a_miura_vertex_folds_as_its_closed_form_says():
+    """Flat-foldable vertices of degree four: tan of half of one fold over tan of half of the other is constant."""
+    model, parameters = (
+        Sheet(miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.8), thickness=5e-4, panels="rigid").crease(stiffness=1e-3).build()
+    )
+    parameters.set("crease", "rest_angle", 1.3 * parameters["crease", "rest_angle"])
+    run = simulate(model, parameters, duration=0.3, rate=100.0)
+    half = np.abs(np.tan(0.5 * run.creases[:, :, 0]))
+    ratio = half.min(axis=1) / half.max(axis=1)
+    assert np.ptp(half[:, 0]) > 0.05
+    assert ratio == pytest.approx(ratio[0], rel=1e-9)
+
+
+def test_statics_of_loops_are_refused_with_a_sentence():
+    model, parameters = Sheet(waterbomb(0.06, fold_angle=0.6), thickness=5e-4, panels="rigid").crease(stiffness=1e-3).build()
+    with pytest.raises(InputError, match="close a loop"):
+        equilibrium(model, parameters)
