@@ -40,7 +40,7 @@ def mass_points(mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.ndar
 
 
 def triangle(corners: np.ndarray, mass: float, thickness: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, centre (3,) and second moments [3, 3] about the origin of a uniform triangular prism about its mid-plane."""
+    """Mass, centre (3,) and second moments [3, 3] about the origin of a uniform triangular prism."""
     centre = corners.mean(axis=0)
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal = normal / np.linalg.norm(normal)
@@ -59,8 +59,7 @@ def rectangle(
     if np.argmin(np.abs(normal[:2])) == 1:
         along, across = across, along
     spread = sum(
-        length**2 / 12 * np.outer(e, e)
-        for length, e in ((size[0], along), (size[1], across), (thickness, normal))
+        length**2 / 12 * np.outer(e, e) for length, e in ((size[0], along), (size[1], across), (thickness, normal))
     )
     return mass, centre, mass * (spread + np.outer(centre, centre))
 
@@ -99,7 +98,10 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     bending = [n for n in model.effects if get(n).family in ("bar", "bend") and n not in ELASTIC]
     if bending:
         raise InputError(
-            "rigid panels neither bend nor stretch", field="panels", value=", ".join(bending), allowed="panels='elastic'"
+            "rigid panels neither bend nor stretch",
+            field="panels",
+            value=", ".join(bending),
+            allowed="panels='elastic'",
         )
     stated = {n: v for n, v in parameters.of("body").items()}
     mass = stated["mass"]

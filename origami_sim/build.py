@@ -248,8 +248,8 @@ class Sheet:
         that masses at their nodes can make, with its centre of mass in their plane.
 
         Args:
-            centre: in the reference state, anywhere. inertia: about the centre of mass, [3, 3] in the reference axes, or
-                the three principal moments along x, y and z.
+            centre: in the reference state, anywhere.
+            inertia: about the centre of mass, [3, 3] in the reference axes, or the principal moments along x, y and z.
 
         Raises:
             InputError: no such panel, a mass or an inertia that no body has.
@@ -259,7 +259,8 @@ class Sheet:
         tensor = np.diag(tensor) if tensor.shape == (3,) else tensor
         check_body(mass, tensor, f"body of panel {panel}")
         if middle.shape != (3,) or not np.all(np.isfinite(middle)):
-            raise InputError("a centre is a place", field=f"body of panel {panel}.centre", value=centre, allowed="x, y, z")
+            field = f"body of panel {panel}.centre"
+            raise InputError("a centre is a place", field=field, value=centre, allowed="x, y, z")
         self._stated[panel] = (mass, middle, tensor)
         return self
 
@@ -486,7 +487,7 @@ class Sheet:
         return out
 
     def _bodies(self) -> dict[str, np.ndarray]:
-        """Mass, centre of mass and inertia of each panel with its patches and point masses, as `model.BODY` names them."""
+        """Mass, centre of mass and inertia of each panel with patches and point masses, as `model.BODY` names them."""
         x, left, rows = self.mesh.vertices, self._extra_mass.copy(), []
         for panel in range(self.pattern.face_count):
             nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
@@ -495,7 +496,7 @@ class Sheet:
             parts = []  # mass, centre, second moments about the origin
             if panel in self._stated:
                 mass, centre, tensor = self._stated[panel]
-                parts.append((mass, centre, 0.5 * np.trace(tensor) * np.eye(3) - tensor + mass * np.outer(centre, centre)))
+                parts.append((mass, centre, second_moments(tensor) + mass * np.outer(centre, centre)))
             elif panel in self._lumps:
                 mass, centre, inertia = self._lumps[panel]
                 e1, e2 = self._frame(panel, normal)

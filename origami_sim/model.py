@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
 
-
 BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Numbers of a rigid body: mass, centre of mass, inertia tensor about it."""
 

@@ -16,7 +16,7 @@ import warp as wp
 
 from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, Effect, get
-from origami_sim.solve import articulated, templates
+from origami_sim.solve import articulated, runge_kutta, templates
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
@@ -133,6 +133,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "magnetostatics": magnetostatics,
         "wave": wave,
         "articulated": articulated,
+        "runge_kutta": runge_kutta,
         "NATURAL": NATURAL,
     }
     for e in effects:

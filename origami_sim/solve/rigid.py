@@ -12,6 +12,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve import articulated
 from origami_sim.solve.batch import _FIRST, Batch
+from origami_sim.solve.runge_kutta import TABLEAU
 
 TOLERANCE = 1e-10
 """Largest error of one step [rad], or part of the device's size; ten times less costs 1.6 times the steps."""
@@ -27,20 +28,6 @@ STABILISATION = 100.0
 
 SOFTNESS = 1e-10
 """Softness of loop constraints, relative to the mobility of their nodes: redundant ones share the load."""
-
-TABLEAU = np.array(
-    [
-        [0, 0, 0, 0, 0, 0, 0, 0],
-        [1 / 5, 1 / 5, 0, 0, 0, 0, 0, 0],
-        [3 / 10, 3 / 40, 9 / 40, 0, 0, 0, 0, 0],
-        [4 / 5, 44 / 45, -56 / 15, 32 / 9, 0, 0, 0, 0],
-        [8 / 9, 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0, 0],
-        [1, 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0, 0],
-        [1, 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0],
-        [0, 71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
-    ]
-)
-"""Times and weights of the stages (Dormand & Prince 1980, order 5), and the weights of the error (5 less 4)."""
 
 
 class RigidBatch(Batch):
@@ -58,7 +45,9 @@ class RigidBatch(Batch):
             inertia; loops that the model's creases cannot close.
     """
 
-    def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options):
+    def __init__(
+        self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options
+    ):
         super().__init__(model, parameters, drive, state, **options)
         self.tolerance = tolerance
         self.tree_of = Topology(model)
@@ -330,16 +319,14 @@ class Topology:
         translations = basis[np.linalg.norm(turns, axis=1) < 1e-9, 3:]
         span = translations.T @ np.linalg.pinv(translations.T) if len(translations) else np.zeros((3, 3))
         # a turn may be taken about the centre wherever that is, if every shift of its pivot is a motion, too
-        follows = all(
-            np.allclose(span @ side, side, atol=1e-9) for t in turns for side in np.cross(t, np.eye(3))
-        )
+        follows = all(np.allclose(span @ side, side, atol=1e-9) for t in turns for side in np.cross(t, np.eye(3)))
         if follows:
             kept = np.linalg.norm(turns, axis=1) > 1e-9
             moves = np.where(kept[:, None], moves - moves @ span.T, moves)
         return turns, moves * size, np.tile(centre, (len(basis), 1)), follows
 
     def _loops(self, model: Model, arm: Articulation, body: dict[int, int]):
-        """Rows of the constraints: both ends of creases that close loops, and held nodes of panels other than the root."""
+        """Rows of the constraints: ends of creases that close loops, and held nodes of other panels than the root."""
         nodes, pairs, axes = [], [], []
 
         def add(node: int, one: int, other: int, directions):
@@ -362,11 +349,12 @@ class Topology:
                 add(int(n), one, other, range(3))
         held = (model.free == 0.0) & (self.body_of != 0)[:, None]
         # what no motion of the tree violates, anywhere, such as a plane that all creases cross, needs no force
+        violated = np.zeros_like(held)
         for angle in FARTHER * np.array([0.0, 1.0, -2.0]) if np.any(held) else ():
             q = np.full((len(self.turns) + len(self.joints), 1), angle)
             _, by = self.positions(model.position, q)
             idle = np.abs(by[:, :, 0]).max(axis=0, initial=0.0) < 1e-9 * np.abs(by).max(initial=0.0)
-            violated = held & ~idle if angle == 0.0 else violated | (held & ~idle)
+            violated |= held & ~idle
         for n in np.flatnonzero(held.any(axis=1)):
             add(int(n), int(self.body_of[n]), -1, np.flatnonzero(violated[n]))
         return (

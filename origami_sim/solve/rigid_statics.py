@@ -45,7 +45,9 @@ class RigidSystem:
 
     def moments(self, q: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Moments (m,), their tangent [m, m] (minus the derivative), nodes [N, 3] and fold angles [C] at q (m,)."""
-        near = np.concatenate([np.zeros((self.count, 1)), STEP * np.eye(self.count), -STEP * np.eye(self.count)], axis=1)
+        near = np.concatenate(
+            [np.zeros((self.count, 1)), STEP * np.eye(self.count), -STEP * np.eye(self.count)], axis=1
+        )
         x, by = self.tree.positions(self.x, q[:, None] + near)
         angles = dihedral_angles(x, self.model.creases)
         angles += 2 * np.pi * np.round((self._angles(q)[:, None] - angles) / (2 * np.pi))

@@ -69,7 +69,8 @@ class Equilibrium:
         iterations: tangents evaluated. history: residual before each of them [N].
         converged: whether the residual is below the tolerance.
         stable: whether every eigenvalue of the tangent on the free axes is positive or zero.
-        eigenvalues: lowest eigenvalues of the tangent [N/m], of rigid panels all [N m/rad], ascending (its real parts if it is unsymmetric).
+        eigenvalues: lowest eigenvalues of the tangent [N/m], ascending (its real parts if it is unsymmetric); of rigid
+            panels all of them [N m/rad].
         neutral: how many of them are zero: rigid motions, mechanisms, the edge of stability.
         mode: [N, 3] shape of the lowest one, largest component 1.
         reactions: [N, 3] forces that the supports exert on held axes [N]; nan for rigid panels, which share them.

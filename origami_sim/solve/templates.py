@@ -128,7 +128,7 @@ def rigid({arguments}
         clock = scalar(0.0)
         going = int(1)
         while going == 1:
-            step = articulated.step_of(tree, clock, dt, tolerance, w)
+            step = runge_kutta.step_of(tree, clock, dt, tolerance, w)
             ends = int(0)
             if step == dt - clock:
                 ends = int(1)
@@ -136,10 +136,10 @@ def rigid({arguments}
             if s < 0:
                 step = scalar(0.0)
                 first_stage = final
-            articulated.begin(tree, angles, memory, power, w)
+            runge_kutta.begin(tree, angles, memory, power, w)
             for stage in range(first_stage, final + 1):
                 if s >= 0:
-                    articulated.go(tree, stage, step, w)
+                    runge_kutta.go(tree, stage, step, w)
                 h = tree.tableau[stage, 0] * step
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
                 weighs = tree.tableau[final, 1 + stage]
@@ -153,22 +153,22 @@ def rigid({arguments}
             error = scalar(0.0)
             longer = dt
             if s >= 0:
-                error = articulated.error_of(tree, step, size, w)
+                error = runge_kutta.error_of(tree, step, size, w)
             if error <= allowed:
-                articulated.carry_over(tree, work, step, w)
+                runge_kutta.carry_over(tree, work, step, w)
                 clock += step
                 if s < 0 or ends == 1:
                     going = int(0)
                 if s >= 0 and tolerance > scalar(0.0):
-                    longer = articulated.lengthen(tree, step, error / allowed, ends, w)
+                    longer = runge_kutta.lengthen(tree, step, error / allowed, ends, w)
             else:
-                articulated.go_back(tree, angles, memory, power, w)
+                runge_kutta.go_back(tree, angles, memory, power, w)
                 longer = scalar(0.0)
                 if tolerance > scalar(0.0):
-                    longer = articulated.lengthen(tree, step, error / allowed, 0, w)
+                    longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
             if longer < finest:
                 status[0, w] = first_step + s + 1
-                status[1, w] = articulated.fastest(V, w)
+                status[1, w] = runge_kutta.fastest(V, w)
                 going = int(0)
         if status[0, w] >= 0:
             break

@@ -12,6 +12,9 @@ from origami_sim.model import Model, Parameters
 SAFETY = 0.8
 """Fraction of the stability limit that is used unless a step is given."""
 
+RIGID = "rigid panels"
+"""Cause of a step that has no bound, because the solver adapts it."""
+
 SCALINGS, SETTLED = 20, 0.01
 """Scalings of the nodes that are tried at most for a closer bound; relative gain below which there are enough."""
 
@@ -32,6 +35,8 @@ class TimeStep:
     cause: str
 
     def __str__(self):
+        if self.cause == RIGID:
+            return f"each step by its error ({RIGID})"
         if np.isinf(self.limit):
             return "nothing limits the time step"
         limit = f"{SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause}"
@@ -78,7 +83,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
     """
     n, worlds = len(model.position), parameters.worlds
     if model.panels == "rigid":  # the solver takes its steps by the error that it makes
-        return TimeStep(np.inf, np.inf, 0, "nothing")
+        return TimeStep(np.inf, np.inf, 0, RIGID)
     for owner, name in parameters:
         if (given := parameters[owner, name].shape[1]) not in (1, worlds):
             raise InputError(

@@ -109,7 +109,7 @@ def test_a_free_body_tumbles_as_eulers_equations_say():
     centre, inertia = body_of(parameters, 0)
     omega = np.array([0.02, 9.0, 0.05]) if inertia[0, 0] < inertia[1, 1] else np.array([9.0, 0.02, 0.05])
     state = State.at_rest(model)
-    state.v[:, 0] = np.cross(omega, model.position - centre) + [0.3, 0.0, 0.1]
+    state.v[:, 0] = np.cross(omega, model.position - centre) + np.array([0.3, 0.0, 0.1])
     run = simulate(model, parameters, duration=3.0, rate=50.0, state=state, tolerance=1e-12)
 
     def rates(_, y):
@@ -133,7 +133,7 @@ def test_a_free_chain_keeps_momentum_angular_momentum_and_energy():
     sheet.patch(2, thickness=3e-3).crease(stiffness=np.array([3e-3, 2e-3]))
     model, parameters = sheet.build()
     state = folded(model, [0.6, -0.9], [3.0, -5.0])
-    state.v[:] += np.cross([1.0, 2.0, -1.5], state.x) + [0.2, 0.1, 0.4]
+    state.v[:] += np.cross([1.0, 2.0, -1.5], state.x) + np.array([0.2, 0.1, 0.4])
     run = simulate(model, parameters, duration=2.0, rate=20.0, state=state, tolerance=1e-12)
     mass = parameters["inertia", "mass"][:, 0, None]
     for f in range(len(run.times)):
@@ -147,7 +147,7 @@ def test_a_free_chain_keeps_momentum_angular_momentum_and_energy():
 
 
 def test_a_body_hangs_from_its_crease_by_its_own_inertia_off_the_plane():
-    """Small swings of a plate with a heavy patch on one side: period of a physical pendulum about its own rest angle."""
+    """Small swings of a plate that is heavy on one side: a physical pendulum about its own rest angle."""
     sheet = hanging((0.04, 0.1)).body(1, mass=0.05, centre=(0.03, 0.0, -0.11), inertia=(9e-5, 8e-5, 3e-5))
     model, parameters = sheet.build()
     arm = np.hypot(0.03, 0.07)
@@ -205,7 +205,9 @@ def test_creases_with_memory_move_as_in_bars():
         model, parameters = sheet.build()
         runs[panels] = simulate(model, parameters, duration=0.6, rate=100.0, state=folded(model, [1.0]))
     assert runs["rigid"].creases == pytest.approx(runs["elastic"].creases, abs=2e-4)
-    assert runs["rigid"].work["crease_friction"][-1] == pytest.approx(runs["elastic"].work["crease_friction"][-1], rel=1e-3)
+    assert runs["rigid"].work["crease_friction"][-1] == pytest.approx(
+        runs["elastic"].work["crease_friction"][-1], rel=1e-3
+    )
     assert np.ptp(runs["rigid"].energy_balance()) < 1e-6
 
 
@@ -273,7 +275,9 @@ def test_a_panel_is_the_slab_that_it_is():
     expected = np.zeros((3, 3))
     for m, x, (a, b, c) in ((slab, x1, (0.1, 0.06, 4e-3)), (patch, x2, (0.02, 0.04, 2e-3))):
         r = x - middle
-        expected += m / 12 * np.diag([b**2 + c**2, a**2 + c**2, a**2 + b**2]) + m * ((r @ r) * np.eye(3) - np.outer(r, r))
+        expected += m / 12 * np.diag([b**2 + c**2, a**2 + c**2, a**2 + b**2]) + m * (
+            (r @ r) * np.eye(3) - np.outer(r, r)
+        )
     assert inertia == pytest.approx(expected, abs=1e-12)
 
 
@@ -286,7 +290,9 @@ def test_forces_are_those_of_the_same_nodes_in_bars():
     f = Batch(other, own, Drive(), state).evaluate(0.0).forces
     elastic = folded(model, [0.5, 0.3])
     g = Batch(model, parameters, Drive(), elastic).evaluate(0.0).forces
-    by_bars = Articulation(model).jacobian(replace(Articulation(model).reference(), angles=np.array([[0.5], [0.3]])), elastic.x)
+    by_bars = Articulation(model).jacobian(
+        replace(Articulation(model).reference(), angles=np.array([[0.5], [0.3]])), elastic.x
+    )
     for name in ("gravity", "crease"):
         one, two = np.einsum("mnwa,nwa->m", by, f[name]), np.einsum("mnwa,nwa->m", by_bars, g[name])
         assert one == pytest.approx(two, rel=1e-9)
@@ -357,7 +363,9 @@ def test_closed_loops_stay_closed_and_keep_their_energy(pattern):
 def test_a_miura_vertex_folds_as_its_closed_form_says():
     """Flat-foldable vertices of degree four: tan of half of one fold over tan of half of the other is constant."""
     model, parameters = (
-        Sheet(miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.8), thickness=5e-4, panels="rigid").crease(stiffness=1e-3).build()
+        Sheet(miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.8), thickness=5e-4, panels="rigid")
+        .crease(stiffness=1e-3)
+        .build()
     )
     parameters.set("crease", "rest_angle", 1.3 * parameters["crease", "rest_angle"])
     run = simulate(model, parameters, duration=0.3, rate=100.0)
@@ -368,6 +376,8 @@ def test_a_miura_vertex_folds_as_its_closed_form_says():
 
 
 def test_statics_of_loops_are_refused_with_a_sentence():
-    model, parameters = Sheet(waterbomb(0.06, fold_angle=0.6), thickness=5e-4, panels="rigid").crease(stiffness=1e-3).build()
+    model, parameters = (
+        Sheet(waterbomb(0.06, fold_angle=0.6), thickness=5e-4, panels="rigid").crease(stiffness=1e-3).build()
+    )
     with pytest.raises(InputError, match="close a loop"):
         equilibrium(model, parameters)
