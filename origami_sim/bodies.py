@@ -139,7 +139,7 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
             if owner == "inertia":
                 new[:n], new[n:] = 0.0, np.repeat(mass, 4, axis=0) / 4
             elif "mass" in get(owner).arguments:  # laws of the mass act where the mass is
-                new[n:] = old[[int(np.flatnonzero(_of_panel(model, p))[0]) for p in carriers]]
+                new[n:] = old[[int(np.flatnonzero(_of_panel(model, int(p)))[0]) for p in carriers]]
         elif family == "bend":
             new = old[:0]
         else:

@@ -514,8 +514,8 @@ class Sheet:
                 parts.append((left[n], x[n], left[n] * np.outer(x[n], x[n])))
                 left[n] = 0.0
             mass = sum(m for m, *_ in parts)
-            centre = sum(m * c for m, c, _ in parts) / mass
-            tensor = inertia_tensor(sum(s for *_, s in parts) - mass * np.outer(centre, centre))
+            centre = np.sum([m * c for m, c, _ in parts], axis=0) / mass
+            tensor = inertia_tensor(np.sum([s for *_, s in parts], axis=0) - mass * np.outer(centre, centre))
             rows.append([mass, *centre, *(tensor[k] for k in SYMMETRIC)])
         return dict(zip(BODY, np.array(rows).T, strict=True))
 

@@ -358,14 +358,14 @@ def _extended(build: Callable) -> Callable:
 
     @functools.wraps(build)
     def extended(s: Settings, **options):
-        built = build(s, **options)
+        model, parameters, *rest = build(s, **options)
         if s.panels == "rigid":
-            built = (*rigid(*built[:2]), *built[2:])
-        if not s.effects:
-            return built
-        from origami_sim.diagnose.patch import switched_on
+            model, parameters = rigid(model, parameters)
+        if s.effects:
+            from origami_sim.diagnose.patch import switched_on
 
-        return (*switched_on(s.effects, *built[:2], file=s.file), *built[2:])
+            model, parameters = switched_on(s.effects, model, parameters, file=s.file)
+        return (model, parameters, *rest)
 
     return extended
 

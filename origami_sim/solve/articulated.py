@@ -102,9 +102,9 @@ class Tree:
 
 
 PARTS = tuple(
-    "reference middle axis pivot start mass centre inertia y u y0 u0 dy du span angles0 memory0 feet feet0 "
-    "power0 spent turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor jacobian solved "
-    "gram pull".split()
+    "reference middle axis pivot start mass centre inertia y u y0 u0 dy du span angles0 memory0 feet feet0 power0 "
+    "spent turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor jacobian "
+    "solved gram pull".split()
 )
 """Parts of a world's stretch, in order."""
 

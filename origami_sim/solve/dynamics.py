@@ -174,8 +174,8 @@ def simulate(
             threads=threads,
         )
     else:
-        error = {} if model.panels != "rigid" else {"tolerance": 0.0 if dt is not None else tolerance or RIGID}
-        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, **error)
+        error = 0.0 if dt is not None else tolerance or RIGID
+        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, tolerance=error)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 

@@ -54,7 +54,7 @@ class RigidBatch(Batch):
         self._fresh = 1
         self._tree = self._made(state)
 
-    def _made(self, state: State) -> articulated.Tree:
+    def _made(self, state: State):
         """The tree on the device, its bodies shaped and placed as in a state."""
         t, model, w, x = self.tree_of, self.model, self.worlds, state.x
         joints, rates = len(t.joints), len(t.joints) + len(t.turns)
@@ -402,17 +402,24 @@ def contact_points(model: Model, x: np.ndarray) -> np.ndarray:
 
 
 def batch_of(
-    model: Model, parameters: Parameters, drive: Drive, state: State, *, among: Sequence[str] = (), **options
+    model: Model,
+    parameters: Parameters,
+    drive: Drive,
+    state: State,
+    *,
+    among: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
+    **options,
 ) -> Batch:
     """A batch of worlds of whichever kind the model's panels ask for.
 
-    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path.
+    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance` is of
+    rigid panels, see `RigidBatch`; the rest is as for `Batch`.
     """
     if model.panels != "rigid":
         return Batch(model, parameters, drive, state, among=among, **options)
     if not np.any(model.free):
         unit = parameters.copy()
         unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
-        options.pop("tolerance", None)
         return Batch(model, unit, drive, state, among=among, **options)
-    return RigidBatch(model, parameters, drive, state, among=among, **options)
+    return RigidBatch(model, parameters, drive, state, among=among, tolerance=tolerance, **options)

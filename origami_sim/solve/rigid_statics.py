@@ -93,12 +93,13 @@ class RigidSystem:
             shift = 0.0 if unstable else max(0.0, -1.5 * float(values[0]), 1e-9 * largest)
             step = np.linalg.lstsq(k + shift * np.eye(self.count), f, rcond=None)[0]
             share = min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
+            new = self.moments(q + share * step, time)
             for _ in range(30):
-                new = self.moments(q + share * step, time)
                 # along the way the moment must not have turned against the step by half of what it was
                 if unstable or (np.all(np.isfinite(new[0])) and step @ new[0] >= -0.5 * abs(step @ f)):
                     break
                 share *= 0.5
+                new = self.moments(q + share * step, time)
             q = q + share * step
             f, k, x, angles = new
         neutral = int((np.abs(values) <= NEUTRAL * np.abs(values).max(initial=1e-300)).sum())
