@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from origami_sim.results import format_table, load_run, save_run
     from origami_sim.scene import read_calibration, scene_module
     from origami_sim.solve.dynamics import Trajectory, simulate
+    from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
     from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
     from origami_sim.solve.timestep import stable_step
 
@@ -57,6 +58,7 @@ _HOMES = {
     "results": "format_table load_run save_run",
     "scene": "read_calibration scene_module",
     "solve.dynamics": "Trajectory simulate",
+    "solve.quasistatic": "QuasiStatic quasistatic",
     "solve.statics": "Equilibrium Path continuation equilibrium",
     "solve.timestep": "stable_step",
 }
@@ -70,7 +72,8 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     # a model and what drives it
     "Model", "Parameters", "State", "rigid", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
     # solutions
-    "simulate", "Trajectory", "stable_step", "equilibrium", "Equilibrium", "continuation", "Path",
+    "simulate", "Trajectory", "stable_step", "quasistatic", "QuasiStatic",
+    "equilibrium", "Equilibrium", "continuation", "Path",
     # results
     "save_run", "load_run", "format_table", "write_replay", "open_replay", "screenshot",
     # recordings and scenes

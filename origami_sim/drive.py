@@ -170,6 +170,16 @@ class Drive:
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
         self.signals = {n: as_signal(v) for n, v in zip(names, values, strict=True)}
 
+    grid: np.ndarray | None = None
+    """Instants at which what distorts the drive samples it [s]; None: as finely as a motion asks for."""
+
+    def on(self, grid: np.ndarray) -> "Drive":
+        """The same drive for a slow motion, which is sampled at these instants [s] and eight times in between."""
+        out = self.replace()
+        fine = np.interp(np.arange(8 * (len(grid) - 1) + 1) / 8, np.arange(len(grid)), grid)
+        out.grid = fine if len(fine) > 1 else np.array([grid[0], grid[0] + 1.0])
+        return out
+
     def __getitem__(self, channel: str) -> Signal:
         return self.signals[channel]
 
@@ -178,8 +188,10 @@ class Drive:
         return np.stack(np.broadcast_arrays(*(self.signals[c](t) for c in CHANNELS[:3])))
 
     def series(self, channels: Sequence[str], duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Common times (n,) up to `duration` [s] and these channels there [channel, n, world]."""
-        times = np.unique(np.concatenate([self.signals[c].sampled(duration) for c in channels]))
+        """Common times (n,) up to `duration` [s], or the grid, and these channels there [channel, n, world]."""
+        times = self.grid
+        if times is None:
+            times = np.unique(np.concatenate([self.signals[c].sampled(duration) for c in channels]))
         values = [np.asarray(self.signals[c](times[:, None])).reshape(len(times), -1) for c in channels]
         return times, np.stack(np.broadcast_arrays(*values))
 
@@ -203,6 +215,7 @@ class Drive:
             if name not in self.signals:
                 raise InputError("no such drive channel", field="channel", value=name, allowed=", ".join(self.signals))
         out.signals = {n: as_signal(signals.get(n, s)) for n, s in self.signals.items()}
+        out.grid = self.grid
         return out
 
     @property

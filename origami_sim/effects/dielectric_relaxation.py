@@ -4,6 +4,7 @@ import warp as wp
 
 from origami_sim.effects import maxwell_stress as nominal
 from origami_sim.effects._effect import Effect, Memory, Parameter, scalar
+from origami_sim.effects._lag import following
 from origami_sim.effects._stack import STACK
 
 
@@ -12,6 +13,7 @@ def moment(
     dt: scalar,
     voltage: scalar,
     slow_moment: scalar,
+    full_moment: scalar,
     permittivity: scalar,
     layer_thickness: scalar,
     layers: scalar,
@@ -23,15 +25,15 @@ def moment(
     polarisation_time: scalar,
 ):
     full = nominal.moment(voltage, permittivity, layer_thickness, layers, lever, width, constraint, side)
-    now = full + (slow_moment - full) * wp.exp(-dt / polarisation_time)
-    return slow_share * now, now
+    now = following(slow_moment, full_moment, full, dt, polarisation_time)
+    return slow_share * now, now, full
 
 
 EFFECT = Effect(
     name="dielectric_relaxation",
     family="crease",
     force=moment,
-    memory=(Memory("slow_moment"),),
+    memory=(Memory("slow_moment"), Memory("full_moment")),
     parameters=(
         *STACK,
         Parameter("slow_share", "d", "-", 0.0, (0.0, 1.0), "slow share, beyond the permittivity given", typical=0.1),

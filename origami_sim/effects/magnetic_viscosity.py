@@ -4,13 +4,8 @@ import warp as wp
 
 from origami_sim.effects import magnetic_torque as nominal
 from origami_sim.effects._effect import Effect, Memory, Parameter, scalar
+from origami_sim.effects._lag import following
 from origami_sim.effects._magnet import MAGNET, along_poling
-
-
-@wp.func
-def branch(q: scalar, target: scalar, dt: scalar, time: scalar):
-    # exact for a constant target
-    return target + (q - target) * wp.exp(-dt / time)
 
 
 @wp.func
@@ -23,6 +18,7 @@ def force(
     q1: scalar,
     q2: scalar,
     q3: scalar,
+    before: scalar,
     remanence: scalar,
     volume: scalar,
     poling_1: scalar,
@@ -35,18 +31,18 @@ def force(
     b = along_poling(x1, x2, x3, field, poling_1, poling_2, poling_n)
     target = wp.tanh(b / reversing_field)
     ten = scalar(10.0)
-    p1 = branch(q1, target, dt, shortest_time)
-    p2 = branch(q2, target, dt, ten * shortest_time)
-    p3 = branch(q3, target, dt, ten * ten * shortest_time)
+    p1 = following(q1, before, target, dt, shortest_time)
+    p2 = following(q2, before, target, dt, ten * shortest_time)
+    p3 = following(q3, before, target, dt, ten * ten * shortest_time)
     extra = after_effect * wp.abs(remanence) * (p1 + p2 + p3)
-    return nominal.force(x1, x2, x3, field, extra, volume, poling_1, poling_2, poling_n), p1, p2, p3
+    return nominal.force(x1, x2, x3, field, extra, volume, poling_1, poling_2, poling_n), p1, p2, p3, target
 
 
 EFFECT = Effect(
     name="magnetic_viscosity",
     family="triangle",
     force=force,
-    memory=(Memory("q1"), Memory("q2"), Memory("q3")),
+    memory=(Memory("q1"), Memory("q2"), Memory("q3"), Memory("before")),
     parameters=(
         *MAGNET,
         Parameter("after_effect", "S", "-", 0.0, (0.0, 0.3), "share of the moment per decade of time", typical=0.02),

@@ -1,0 +1,367 @@
+"""Equilibria of many worlds at the end of a step of given length, within which laws with memory advance.
+
+Nodes are led from where a step begins to where it may end, evenly, by the time loop that `simulate` runs; so every law
+advances its memory as its own file says, exactly where angles change evenly. The forces are those of the end, with the
+memory of the end, and at rest: laws of the rate are silent. The tangent sees the same, so that Newton's method knows
+how stiff a crease is that has no time to relax.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
+from origami_sim.solve.batch import Batch, Evaluation
+from origami_sim.solve.rigid import Topology
+from origami_sim.solve.rigid_statics import NEUTRAL
+from origami_sim.solve.rigid_statics import STEP as TURN
+from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
+
+CLOSE = 1e-10
+"""A Newton step shorter than this part of the device ends the search for an equilibrium."""
+
+FAR = 0.1
+"""Longest Newton step, as a part of the device, or of a radian times two."""
+
+ROUNDS = 12
+ITERATIONS = 12
+"""Tangents of a step, and Broyden's iterations with each."""
+
+PATIENT = 60
+"""Tangents of a world that has lost its equilibrium: so many cover the device from end to end several times."""
+
+
+class Held:
+    """Worlds of which the nodes are led, and what the laws then give.
+
+    Args:
+        drive: one level of every channel for each world, see `levels`. The rest as for `Batch`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        parameters: Parameters,
+        drive: Drive,
+        state: State,
+        *,
+        among: Sequence[str] = (),
+        threads: int | None = None,
+    ):
+        still = replace(model, free=np.zeros_like(model.free))
+        self.batch = Batch(still, parameters, drive, state, among=among, threads=threads)
+        self.remembers = any(get(e).memory for e in model.laws)
+
+    def force(self, start: State, x: np.ndarray, dt: float, time: float) -> np.ndarray:
+        """Forces [N, W, 3] at positions x [N, W, 3], reached from a state within dt [s], at a time [s]."""
+        b = self.batch
+        if self.remembers:
+            self.lead(start, x, dt)
+            b._overwrite(b._x, x)  # without the rounding of the way there
+        else:
+            b.place(x, start.angles)
+        return b.total_force(time)
+
+    def lead(self, start: State, x: np.ndarray, dt: float):
+        """Leads the nodes from a state to positions within dt [s]; memory advances, and they are then at rest."""
+        b = self.batch
+        b.place(start.x, start.angles, start.memory)
+        b._overwrite(b._v, (x - start.x) / dt)
+        b._a.zero_()
+        b._status.fill_(-1)
+        b.advance(1, dt, np.inf)
+        b._v.zero_()
+
+    def at(self, state: State, time: float, velocity: np.ndarray | None = None) -> Evaluation:
+        """Forces and energies by effect in a state, at rest or at a velocity [N, W, 3]."""
+        b = self.batch
+        b.place(state.x, state.angles, state.memory)
+        b._overwrite(b._v, np.zeros_like(state.x) if velocity is None else velocity)
+        return b.evaluate(time)
+
+
+class Settling(ABC):
+    """Equilibria of all worlds, step after step.
+
+    Args:
+        model: for the couplings. worlds: model and parameters of each world, alike but for geometry and numbers.
+        drive: one level of every channel for each world. state: one world each, for their number and memory.
+        among: effects of the program, see `Batch`.
+    """
+
+    far = FAR
+
+    def __init__(
+        self,
+        worlds: Sequence[tuple[Model, Parameters]],
+        drive: Drive,
+        state: State,
+        *,
+        among: Sequence[str] = (),
+        threads: int | None = None,
+    ):
+        self.worlds, self.among, self.threads = worlds, among, threads
+        self.model = worlds[0][0]
+        self.drive, self.start, self.dt, self.time = drive, state, 1.0, 0.0
+        self.levels = levels(drive, 0.0, state.worlds)
+        parameters = Parameters.join([p for _, p in worlds])
+        every = 1 if state.worlds < 64 else threads
+        self.held = Held(self.model, parameters, per_world(drive, self.levels), state, among=among, threads=every)
+        self._copied: dict[int, Held] = {}
+
+    def settle(
+        self,
+        level: np.ndarray,
+        start: State,
+        guess: np.ndarray,
+        wanted: np.ndarray,
+        *,
+        dt: float,
+        time: float,
+        search: bool = True,
+    ) -> tuple[State, np.ndarray]:
+        """The state at the equilibria at the end of a step, and which of the worlds wanted have one [W].
+
+        Args:
+            level: [channels, W] of the drive at the end. start: where the step begins. guess: [N, W, 3] positions.
+            dt: length of the step [s]. time: its end [s].
+            search: also look far away for worlds whose equilibrium ceased to exist.
+        """
+        self.start, self.dt, self.time, self.levels = start, dt, time, level
+        self.held.batch.hold(level)
+        x, done = self._newton(guess, wanted, ROUNDS)
+        lost = wanted & ~done
+        if np.any(lost) and search:
+            x, again = self._newton(np.where(lost[None, :, None], start.x, x), lost, PATIENT)
+            done |= again
+            lost &= ~again
+        if np.any(lost) and search:
+            x, found = self._searched(x, lost)
+            if self.held.remembers and np.any(found):  # found with the memory of the step's beginning
+                x, found = self._newton(x, found, ROUNDS)
+            done |= found
+        done &= wanted
+        self.held.force(start, np.where(done[None, :, None], x, start.x), dt, time)
+        out = self.held.batch.state()
+        out.v[:], out.a[:] = 0.0, 0.0
+        out.step, out.status = -1, np.full_like(out.status, -1)
+        return out, done
+
+    def _newton(self, x: np.ndarray, wanted: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
+        """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
+        done = np.zeros(len(wanted), bool)
+        for _ in range(rounds):
+            factors, stable = self._factors(x, wanted & ~done)
+            going = np.array([f is not None for f in factors])
+            if not np.any(going):
+                break
+            s = self._solved(factors, x, going)
+            past, before = [s], np.full(len(wanted), np.inf)
+            for _ in range(ITERATIONS):
+                large = np.abs(s).max(axis=0, initial=0.0)
+                going &= large < 0.5 * before  # else a new tangent serves better; false for nan
+                before = large
+                far = going & (large > self.far * self.size)
+                if np.any(far):  # no further than this without a new tangent
+                    x = self._moved(x, np.where(far, s * _over(np.full_like(large, self.far * self.size), large), 0.0))
+                    going &= ~far
+                x = self._moved(x, np.where(going, s, 0.0))
+                close = going & (large < CLOSE * self.size)
+                done |= close & stable
+                going &= ~close
+                if not np.any(going):
+                    break
+                z = self._solved(factors, x, going)
+                with np.errstate(all="ignore"):  # of worlds that go no further
+                    for a, b in pairwise(past):  # Broyden's first method (Kelley 1995, ch. 7)
+                        z = z + b * _over(np.sum(a * z, axis=0), np.sum(a * a, axis=0))
+                    last = past[-1]
+                    s = z / (1.0 - _over(np.sum(last * z, axis=0), np.sum(last * last, axis=0)))
+                past.append(s)
+        return x, done
+
+    def _searched(self, x: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Equilibria of these worlds by a search of their own, from where the last step left them; which have one."""
+        x, found = x.copy(), np.zeros_like(lost)
+        model = self.model.with_effects(without=tuple(e for e in self.model.effects if e not in self.model.laws))
+        for w in np.flatnonzero(lost):
+            drive = self.drive.replace(**dict(zip(self.drive.signals, self.levels[:, w].tolist(), strict=True)))
+            state = self.start.select(np.array([w]))
+            one = equilibrium(model, self.worlds[int(w)][1].for_model(model), drive, state=state, time=self.time)
+            if one.converged:
+                x[:, w], found[w] = one.x, True
+        return x, found
+
+    def _solved(self, factors, x: np.ndarray, going: np.ndarray) -> np.ndarray:
+        f = self._unbalanced(x)
+        out = np.zeros_like(f)
+        for w in np.flatnonzero(going):
+            out[:, w] = factors[w].solve(f[:, w])
+        return out
+
+    def _copies(self, w: int, count: int) -> Held:
+        """Copies of a world, from whose differences its tangent comes."""
+        if w not in self._copied:
+            threads = 1 if count * len(self.model.position) < THREADED else self.threads
+            drive, state = per_world(self.drive, self.levels[:, [w]]), self.start.select(np.full(count, w))
+            self._copied[w] = Held(self.model, self.worlds[w][1], drive, state, among=self.among, threads=threads)
+        self._copied[w].batch.hold(self.levels[:, [w]])
+        return self._copied[w]
+
+    @property
+    @abstractmethod
+    def size(self) -> float:
+        """What Newton's steps are compared with."""
+
+    @abstractmethod
+    def _unbalanced(self, x: np.ndarray) -> np.ndarray:
+        """Generalised forces [m, W] at positions [N, W, 3]."""
+
+    @abstractmethod
+    def _moved(self, x: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Positions [N, W, 3] after a change s [m, W] of the coordinates."""
+
+    @abstractmethod
+    def _factors(self, x: np.ndarray, wanted: np.ndarray) -> tuple[list, np.ndarray]:
+        """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
+
+
+class SettlingBars(Settling):
+    """Equilibria of bars: the coordinates are the free axes of the nodes."""
+
+    def __init__(self, worlds, drive: Drive, state: State, *, system: _System | None = None, **options):
+        super().__init__(worlds, drive, state, **options)
+        self.system = system or coupled(self.model, worlds[0][1], drive)
+        self.free = self.system.free
+
+    @property
+    def size(self) -> float:
+        return self.system.size
+
+    def _unbalanced(self, x):
+        f = self.held.force(self.start, x, self.dt, self.time)
+        return np.moveaxis(f, 1, 2).reshape(-1, x.shape[1])[self.free]
+
+    def _moved(self, x, s):
+        out = np.zeros((self.model.position.size, s.shape[1]))
+        out[self.free] = s
+        return x + np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
+
+    def _factors(self, x, wanted):
+        y = self.system
+        count = y.moves.shape[1]
+        out: list[_Cholesky | _Factor | None] = [None] * x.shape[1]
+        stable = np.zeros(x.shape[1], bool)
+        for w in np.flatnonzero(wanted):
+            start = self.start.select(np.full(count, w))
+            k = y.assembled(self._copies(int(w), count).force(start, x[:, w, None] + y.moves, self.dt, self.time))
+            if not np.all(np.isfinite(k.data)):
+                continue
+            largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
+            out[w], shift = y.definite(k, largest, 0.0)
+            stable[w] = shift <= NULL_SHIFT * largest * (1 + 1e-9)
+        return out, stable
+
+
+class _Small:
+    """A dense tangent of any symmetry, shifted."""
+
+    def __init__(self, k: np.ndarray, shift: float):
+        self._k = k + shift * np.eye(len(k))
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        return np.linalg.lstsq(self._k, right, rcond=None)[0]
+
+
+class SettlingPanels(Settling):
+    """Equilibria of rigid panels: the coordinates are fold angles and the pose of the root.
+
+    Raises:
+        InputError: panels that close loops, or what `Topology` refuses.
+    """
+
+    far = 2 * FAR
+
+    def __init__(self, worlds, drive: Drive, state: State, **options):
+        super().__init__(worlds, drive, state, **options)
+        self.tree = t = Topology(self.model)
+        if len(t.row_node):
+            raise InputError(
+                "equilibria of rigid panels that close a loop are not found",
+                field="panels",
+                value="rigid",
+                allowed="panels='elastic', or a motion with losses",
+            )
+        self.count = len(t.turns) + len(t.joints)
+        if not self.count:
+            raise InputError("statics needs a panel that is free to move", field="free", value=0)
+
+    @property
+    def size(self) -> float:
+        return 1.0
+
+    def _unbalanced(self, x):
+        f = self.held.force(self.start, x, self.dt, self.time)
+        by = [self.tree.positions(x[:, w], np.zeros((self.count, 1)))[1][:, :, 0] for w in range(x.shape[1])]
+        return np.einsum("wmna,nwa->mw", np.stack(by), f)
+
+    def _moved(self, x, s):
+        out = x.copy()
+        for w in np.flatnonzero(np.any(s != 0.0, axis=0)):
+            out[:, w] = self.tree.positions(x[:, w], s[:, [w]])[0][:, 0]
+        return out
+
+    def _factors(self, x, wanted):
+        m = self.count
+        near = TURN * np.concatenate([np.eye(m), -np.eye(m)], axis=1)
+        out: list[_Small | None] = [None] * x.shape[1]
+        stable = np.zeros(x.shape[1], bool)
+        for w in np.flatnonzero(wanted):
+            moved, by = self.tree.positions(x[:, w], near)
+            start = self.start.select(np.full(2 * m, w))
+            f = self._copies(int(w), 2 * m).force(start, moved, self.dt, self.time)
+            moments = np.einsum("mnwa,nwa->mw", by, f)
+            k = (moments[:, m:] - moments[:, :m]) / (2 * TURN)
+            if not np.all(np.isfinite(k)):
+                continue
+            values = np.linalg.eigvalsh(0.5 * (k + k.T))
+            largest = float(np.abs(values).max(initial=0.0)) or 1.0
+            stable[w] = not m or values[0] >= -NEUTRAL * largest
+            out[w] = _Small(k, 0.0 if stable[w] else -1.5 * float(values[0]))
+        return out, stable
+
+
+def settling(worlds, drive: Drive, state: State, **options) -> Settling:
+    """The search for whichever kind the model's panels ask for."""
+    if worlds[0][0].panels == "rigid":
+        options.pop("system", None)
+        return SettlingPanels(worlds, drive, state, **options)
+    return SettlingBars(worlds, drive, state, **options)
+
+
+def coupled(model: Model, parameters: Parameters, drive: Drive) -> _System:
+    """Couplings and colours of a model, which depend on its effects only."""
+    one = parameters.world(0) if parameters.worlds > 1 else parameters
+    return _System(model, one, per_world(drive, levels(drive, 0.0, 1)), State.at_rest(model))
+
+
+def levels(drive: Drive, time: float, worlds: int) -> np.ndarray:
+    """What a drive gives at a time in each world [channels, W]; of the first world where fewer are asked for."""
+    values = [np.atleast_1d(np.squeeze(s(time))) for s in drive.signals.values()]
+    return np.stack([np.broadcast_to(v if len(v) in (1, worlds) else v[:worlds], (worlds,)) for v in values])
+
+
+def per_world(drive: Drive, level: np.ndarray) -> Drive:
+    """The drive held at a level [channels, W] in each world."""
+    return drive.replace(**dict(zip(drive.signals, np.array(level), strict=True)))
+
+
+def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a / b, 0 where b is 0."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
