@@ -1,9 +1,11 @@
 """A batch of worlds on a device: the arrays behind the kernels, and the three things asked of them."""
 
+import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -13,6 +15,12 @@ from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets
 from origami_sim.solve.compose import BITS, compose
+
+APART = 128
+"""Bytes between the worlds' stretches of memory on the CPU: two cache lines, because processors fetch them in pairs.
+
+With half of it a thread's last world and the next thread's first may share a pair; twice as much gains nothing.
+"""
 
 
 @dataclass(frozen=True)
@@ -73,10 +81,8 @@ class Batch:
         self.model, self.program = model, compose(tuple(dict.fromkeys(every)), bool(among))
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
-        # rows a multiple of 4 KiB apart would all fall into one cache set
         self._pool: ThreadPoolExecutor | None = None
         self._total: wp.Launch | None = None
-        self._stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
         self.step = state.step
 
         def constant(a, dtype):
@@ -133,7 +139,7 @@ class Batch:
             self._upload(self._acting(parameters) if among else np.zeros((1, self.worlds), np.int64), wp.int64),
         ]
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
-        self._f = wp.zeros_like(self._x)
+        self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)
         self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))
         self._work, self._power = (self._upload(self._spread(s), wp.float64) for s in (state.work, state.power))
         self._status = self._upload(state.status, wp.int32)
@@ -180,8 +186,9 @@ class Batch:
                     value=worlds,
                     allowed=f"1 or {self.worlds}",
                 )
-            blocks.append(np.ascontiguousarray(a, float).ravel())
-            layout.append((offset, worlds * knots, knots if worlds > 1 else 0))
+            blocks.append(self._arranged(a))
+            entity, world = (worlds * knots, knots) if self.device.is_cuda else (knots, len(a) * knots)
+            layout.append((offset, entity, world if worlds > 1 else 0))
             offset += a.size
         return np.concatenate(blocks), np.array(layout, np.int32)
 
@@ -191,11 +198,39 @@ class Batch:
         out[self._places] = a
         return out
 
+    def _arranged(self, a: np.ndarray) -> np.ndarray:
+        """Numbers [E, W, ...] in the order in which they lie in the buffer: on the CPU world after world."""
+        return np.ascontiguousarray(a if self.device.is_cuda else np.swapaxes(a, 0, 1), float).ravel()
+
+    def _room(self, *shape: int, dtype, fill: Any = 0) -> wp.array:
+        """An array [*shape, W].
+
+        On a GPU the same entity of neighbouring worlds lies side by side, for threads that read together; on the CPU
+        each world has a stretch of its own, for threads that must not write into each other's cache lines.
+        """
+        if self.device.is_cuda:
+            # rows a multiple of 4 KiB apart would all fall into one cache set
+            stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
+            return wp.full((*shape, stride), fill, dtype=dtype, device=self.device)
+        size = wp.types.type_size_in_bytes(dtype)
+        count = math.prod(shape)
+        length = count + -(-APART // size)
+        whole = wp.full((self.worlds, length), fill, dtype=dtype, device=self.device)
+        strides = (*(size * math.prod(shape[i + 1 :]) for i in range(len(shape))), size * length)
+        shape = (*shape, self.worlds)
+        out = wp.array(ptr=whole.ptr, dtype=dtype, shape=shape, strides=strides, device=self.device, copy=False)
+        out._ref = whole  # keeps the memory
+        return out
+
     def _upload(self, a: np.ndarray, dtype) -> wp.array:
-        tail = a.shape[2:]
-        padded = np.zeros((max(len(a), 1), self._stride, *tail), a.dtype)
-        padded[: len(a), : self.worlds] = a
-        return wp.array(padded, dtype=dtype, device=self.device)
+        out = self._room(max(len(a), 1), dtype=dtype)
+        if self.device.is_cpu:
+            out.numpy()[: len(a)] = a
+        else:
+            padded = np.zeros((*out.shape, *a.shape[2:]), a.dtype)
+            padded[: len(a), : self.worlds] = a
+            out.assign(padded)
+        return out
 
     def _download(self, a: wp.array, rows: int) -> np.ndarray:
         return a.numpy()[:rows, : self.worlds].copy()
@@ -228,9 +263,8 @@ class Batch:
         Returns: positions [F, N, W, 3] [m] and hinge angles [F, C + Q, W] [rad]; nan after a world has stopped.
         """
         n, rows = len(self.model.position), len(self.model.creases) + len(self.model.bends)
-        size = (frames, max(n, 1), self._stride)
-        film = wp.full(size, wp.vec3d(np.nan), dtype=wp.vec3d, device=self.device)
-        angles = wp.full((frames, max(rows, 1), self._stride), np.nan, dtype=wp.float64, device=self.device)
+        film = self._room(frames, max(n, 1), dtype=wp.vec3d, fill=wp.vec3d(np.nan))
+        angles = self._room(frames, max(rows, 1), dtype=wp.float64, fill=np.nan)
         self._run(frames * steps, dt, speed_limit, steps, film, angles, self._nothing)
         return film.numpy()[:, :n, : self.worlds], angles.numpy()[:, :rows, : self.worlds]
 
@@ -283,9 +317,9 @@ class Batch:
         """Forces and energies by effect at time [s]."""
         m, effects = self.model, self.program.effects
         n, k = len(m.position), len(m.contacts)
-        forces = wp.zeros((len(effects), n, self._stride), dtype=wp.vec3d, device=self.device)
-        energies = wp.zeros((len(effects), self._stride), dtype=wp.float64, device=self.device)
-        gaps = wp.full((max(k, 1), self._stride), np.inf, dtype=wp.float64, device=self.device)
+        forces = self._room(len(effects), n, dtype=wp.vec3d)
+        energies = self._room(len(effects), dtype=wp.float64)
+        gaps = self._room(max(k, 1), dtype=wp.float64, fill=np.inf)
         self._launch(self.program.evaluate, [forces, energies, gaps, _FIRST, wp.float64(time)])
         f, v = forces.numpy()[:, :, : self.worlds], self._download(self._v, n)
         e = self._download(energies, len(effects))
@@ -321,7 +355,7 @@ class Batch:
             levels: [channels, 1 or W], as many columns as the drive had that the batch was made with.
         """
         first, size = self._levels
-        host = np.ascontiguousarray(levels, float).ravel()
+        host = self._arranged(np.asarray(levels, float))
         assert len(host) == size
         if self.device.is_cpu:
             self._buffer.numpy()[first : first + len(host)] = host

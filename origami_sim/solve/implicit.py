@@ -175,7 +175,8 @@ class _Copies(Batch):
         one, two = scheme.points
         self.shares, others = (np.array(at)[which] for at in ((one, two, 1.0), (two, one, 1.0)))
         super().__init__(model, parameters, drive, state.select(np.zeros(len(self.shares), int)), threads=threads)
-        own = [wp.array(state.x[:, 0], dtype=wp.vec3d, device=self.device), wp.empty_like(self._x)]
+        own = [wp.array(state.x[:, 0], dtype=wp.vec3d, device=self.device)]
+        own.append(self._room(max(len(state.x), 1), dtype=wp.vec3d))
         own += [wp.array(a, dtype=wp.float64, device=self.device) for a in (self.shares, others, np.zeros(2))]
 
         def view(a: wp.array, rows: int) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 from effects.kit import HINGE, hinge, lengths, make_model, quiet, slope, start, strip
 from scipy.integrate import quad
 
@@ -637,6 +638,20 @@ def test_gpu_follows_the_cpu(cuda):
     assert np.abs(a.x - b.x).max() <= 1e-9 * size
     assert np.abs(a.angles - b.angles).max() <= 1e-9 * np.abs(a.angles).max()
     same(b, simulate(model, p, drive, **options, device=cuda))
+
+
+def test_on_the_cpu_no_two_worlds_share_a_cache_line():
+    """Threads that write into one line take it from each other at every step."""
+    model, p, drive = busy(3)
+    batch = Batch(model, p, drive, State.at_rest(model, 3))
+    written = [a for a in vars(batch).values() if isinstance(a, wp.array) and a.ndim == 2 and a.shape[-1] == 3]
+    assert len(written) == 9  # x, v, a, f, angles, memory, work, power, status
+    for a in written:
+        world = [a.numpy()[:, w] for w in range(3)]
+        first, last = np.array([np.lib.array_utils.byte_bounds(x) for x in world]).T
+        assert np.all(first[1:] - last[:-1] >= 64)
+        a.numpy()[:] = 1  # a view: what is set on the host is what the kernels see
+        assert np.all(a.numpy() == 1)
 
 
 def test_models_that_share_a_program_move_as_with_their_own():
