@@ -159,7 +159,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     every = slice(None, None, 10)
     table = {"time_s": motion.times[every], "height_m": centre[every, 2], "lowest_m": motion.gaps[every, :, 0].min(1)}
     lengths = np.linalg.norm(np.diff(motion.x[:, model.bars], axis=2)[:, :, 0, 0], axis=-1)
-    strain = float(np.abs(lengths / parameters["bars", "rest_length"][:, 0] - 1).max())
+    strain = float(np.abs(lengths / lengths[0] - 1).max(initial=0.0))
     balance = float(np.ptp(motion.energy_balance()[:, 0]))
     return Outcome(
         motion,

@@ -67,7 +67,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     error = np.degrees(final - target)
     lengths = np.linalg.norm(model.position[model.bars[:, 1]] - model.position[model.bars[:, 0]], axis=1)
     now = np.linalg.norm(motion.x[-1, model.bars[:, 1], 0] - motion.x[-1, model.bars[:, 0], 0], axis=1)
-    strain = float(np.abs(now / lengths - 1).max())
+    strain = float(np.abs(now / lengths - 1).max(initial=0.0))
     table = {"crease": np.arange(len(target)), "target_deg": np.degrees(target), "angle_deg": np.degrees(final)}
     return Outcome(
         motion,

@@ -52,6 +52,7 @@ Products and sums are fused across statements, as on CUDA. The other kernels rou
 strength adds exactly nothing.
 """
 
+
 class _Text:
     """Lines of source at a current depth."""
 

@@ -242,12 +242,13 @@ class Topology:
         """A body and all that it carries."""
         return self._beyond[body]
 
-    def positions(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def positions(self, start: np.ndarray, q: np.ndarray, points=None, bodies=None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
 
         Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size) and turns of the root, then
-        changes of fold angles [rad].
+        changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that `bodies` [N] carry (-1: none).
         """
+        points, bodies = (start, self.body_of) if points is None or bodies is None else (points, np.asarray(bodies))
         w, roots, size = q.shape[1], len(self.turns), float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
         centre = start[self.root_nodes].mean(axis=0)
         pivots = np.tile(centre, (roots, 1)) if self.follows else self.pivots
@@ -268,14 +269,26 @@ class Topology:
             angle, k = q[roots + j][:, None, None], np.cross(np.eye(3), axis)
             turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
             places.append(joints[-1] - turns[-1] @ first)
-        x = np.stack([turns[b] @ r + places[b] for b, r in zip(self.body_of, start, strict=True)])
+        turns.append(np.tile(np.eye(3), (w, 1, 1)))  # of what no body carries
+        places.append(np.zeros((w, 3)))
+        x = np.stack([turns[b] @ r + places[b] for b, r in zip(bodies, points, strict=True)])
         by = np.zeros((roots + len(self.joints), *x.shape))
         for k in range(roots):
             by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
+            by[k, bodies < 0] = 0.0
         for j in range(len(self.joints)):
-            mine = np.isin(self.body_of, self.beyond(j + 1))
+            mine = np.isin(bodies, self.beyond(j + 1))
             by[roots + j, mine] = np.cross(axes[j], x[mine] - joints[j])
         return x, by
+
+    def closures(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W]."""
+        gap, slope = 0.0, 0.0
+        for sign, bodies in zip((1.0, -1.0), self.row_body.T, strict=True):
+            x, by = self.positions(start, q, start[self.row_node], bodies)
+            gap = gap + sign * np.einsum("rwa,ra->rw", x, self.row_axis)
+            slope = slope + sign * np.einsum("mrwa,ra->mrw", by, self.row_axis)
+        return np.asarray(gap), np.asarray(slope)
 
     def _root(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """How the root can move with its nodes held as they are.

@@ -1,9 +1,8 @@
-"""Equilibria of rigid panels: Newton's method on hinge angles and the pose of the root."""
+"""Equilibria of rigid panels: Newton's method on hinge angles and the pose of the root, with loops kept closed."""
 
 import numpy as np
 
 from origami_sim.drive import Drive
-from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import Topology
@@ -17,34 +16,38 @@ LONGEST = 0.5
 NEUTRAL = 1e-9
 """Part of the largest eigenvalue below which a stiffness is taken for zero."""
 
+CLOSED = 1e-11
+"""Gap of a loop, in units of the device's size, below which it is closed."""
+
+REDUNDANT = 1e-7
+"""Part of the largest singular value of the loops' Jacobian below which a constraint repeats others: the flat state of
+a sheet has such constraints, and so has every symmetric one; above by 10^4 where measured on folded sheets."""
+
 
 class RigidSystem:
     """Moments of one world as functions of its coordinates: shifts and turns of the root, then fold angles [rad].
 
-    Shifts are in units of the device's size. Coordinates are zero in the state that the system is made with.
-
-    Raises:
-        InputError: panels that close loops.
+    Shifts are in units of the device's size. Coordinates are zero in the state that the system is made with. Loops
+    are constraints: all states are on their manifold, and moments are those along it.
     """
 
     def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State):
         self.model, self.state = model, state
         self.tree = t = Topology(model)
-        if len(t.row_node):
-            raise InputError(
-                "equilibria of rigid panels that close a loop are not found",
-                field="panels",
-                value="rigid",
-                allowed="panels='elastic', or a motion with losses",
-            )
         self.x = state.x[:, 0]
+        self.size = float(np.ptp(self.x, axis=0).max(initial=0.0)) or 1.0
         self.count = len(t.turns) + len(t.joints)
         worlds = 2 * self.count + 1
         self._batch = Batch(model, parameters, drive, state.select(np.zeros(worlds, int)))
         self._worlds = worlds
 
-    def moments(self, q: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Moments (m,), their tangent [m, m] (minus the derivative), nodes [N, 3] and fold angles [C] at q (m,)."""
+    def moments(self, q: np.ndarray, time: float) -> tuple:
+        """Moments and stiffness along the loops' manifold at coordinates q (m,).
+
+        Returns:
+            moments (d,), their tangent [d, d] (minus the derivative), directions [m, d] in which all loops stay closed,
+            nodes [N, 3] and fold angles [C].
+        """
         near = np.concatenate(
             [np.zeros((self.count, 1)), STEP * np.eye(self.count), -STEP * np.eye(self.count)], axis=1
         )
@@ -53,8 +56,33 @@ class RigidSystem:
         angles += 2 * np.pi * np.round((self._angles(q)[:, None] - angles) / (2 * np.pi))
         self._batch.place(x, angles)
         found = np.einsum("mnwa,nwa->mw", by, self._batch.total_force(time))
+        along = np.eye(self.count)
+        if len(self.tree.row_node):
+            slopes = self.tree.closures(self.x, q[:, None] + near)[1]
+            left, values, right = np.linalg.svd(slopes[:, :, 0])
+            rank = int((values > REDUNDANT * values.max(initial=0.0)).sum())
+            along = left[:, rank:]
+            # the loops' forces balance what moments would open them; they turn as the loops' directions do
+            pull = right[:rank].T @ (left[:, :rank].T @ -found[:, 0] / values[:rank])
+            found = found + np.einsum("mrw,r->mw", slopes, pull)
         slope = (found[:, self.count + 1 :] - found[:, 1 : self.count + 1]) / (2 * STEP)
-        return found[:, 0], slope, x[:, 0], angles[:, 0]
+        return along.T @ found[:, 0], along.T @ slope @ along, along, x[:, 0], angles[:, 0]
+
+    def closed(self, q: np.ndarray) -> np.ndarray | None:
+        """The nearest coordinates (m,) at which all loops are closed; None if they are not found."""
+        if not len(self.tree.row_node):
+            return q
+        for _ in range(20):
+            gap, slope = self.tree.closures(self.x, q[:, None])
+            if np.abs(gap).max(initial=0.0) <= CLOSED * self.size:
+                return q
+            q = q - np.linalg.lstsq(slope[:, :, 0].T, gap[:, 0], rcond=REDUNDANT)[0]
+        return None
+
+    def _stepped(self, q: np.ndarray, step: np.ndarray, time: float) -> tuple | None:
+        """Coordinates a step away with all loops closed, and the moments there; None where loops do not close."""
+        moved = self.closed(q + step)
+        return None if moved is None else (moved, *self.moments(moved, time))
 
     def _angles(self, q: np.ndarray) -> np.ndarray:
         """Fold angles [C] at q, not wrapped."""
@@ -68,7 +96,7 @@ class RigidSystem:
         q, shift, pushes, history, message = np.zeros(self.count), 0.0, 0, [], ""
         converged, values, mode = False, np.full(1, np.nan), np.zeros(self.count)
         scale = target = 0.0
-        f, k, x, angles = self.moments(q, time)
+        f, k, along, x, angles = self.moments(q, time)
         while True:
             history.append(float(np.abs(f).max(initial=0.0)))
             scale = max(scale, history[-1], float(np.abs(k).max(initial=0.0)))
@@ -79,29 +107,32 @@ class RigidSystem:
             values, modes = np.linalg.eigh(0.5 * (k + k.T))
             largest = float(np.abs(values).max(initial=0.0)) or 1.0
             if history[-1] <= target:
-                mode = modes[:, 0] if len(values) else mode
+                mode = along @ modes[:, 0] if len(values) else mode
                 if unstable or not len(values) or values[0] >= -NEUTRAL * largest or pushes == 4:
                     converged = True
                     break
                 pushes += 1
-                q = q + 0.02 * mode
-                f, k, x, angles = self.moments(q, time)
-                continue
-            if len(history) >= max_iterations:
+                step = 0.02 * modes[:, 0]
+            elif len(history) >= max_iterations:
                 message = f"no equilibrium within {max_iterations} iterations"
                 break
-            shift = 0.0 if unstable else max(0.0, -1.5 * float(values[0]), 1e-9 * largest)
-            step = np.linalg.lstsq(k + shift * np.eye(self.count), f, rcond=None)[0]
-            share = min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
-            new = self.moments(q + share * step, time)
+            else:
+                shift = 0.0 if unstable else max(0.0, -1.5 * float(values[0]), 1e-9 * largest)
+                step = np.linalg.lstsq(k + shift * np.eye(len(k)), f, rcond=None)[0]
+                step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
+            work, step = step @ f, along @ step
+            new = self._stepped(q, step, time)
             for _ in range(30):
                 # along the way the moment must not have turned against the step by half of what it was
-                if unstable or (np.all(np.isfinite(new[0])) and step @ new[0] >= -0.5 * abs(step @ f)):
+                if new is not None and (unstable or history[-1] <= target or self._ahead(new, step, work)):
                     break
-                share *= 0.5
-                new = self.moments(q + share * step, time)
-            q = q + share * step
-            f, k, x, angles = new
+                step = 0.5 * step
+                work *= 0.5
+                new = self._stepped(q, step, time)
+            if new is None:
+                message = "loops of panels cannot close on the way"
+                break
+            q, f, k, along, x, angles = new
         neutral = int((np.abs(values) <= NEUTRAL * np.abs(values).max(initial=1e-300)).sum())
         stable = converged and bool(np.all(values >= -NEUTRAL * np.abs(values).max(initial=0.0)))
         if converged:
@@ -129,3 +160,9 @@ class RigidSystem:
             "reactions": np.full_like(x, np.nan),
             "message": message,
         }
+
+    @staticmethod
+    def _ahead(new: tuple, step: np.ndarray, work: float) -> bool:
+        """Whether moments after a step have not turned against it by half of the work that they promised."""
+        _, f, _, along, *_ = new
+        return bool(np.all(np.isfinite(f)) and (along.T @ step) @ f >= -0.5 * abs(work))

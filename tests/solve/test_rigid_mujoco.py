@@ -103,7 +103,7 @@ def sheets():
         yield name, box if free else box.fix(panels=[0]), [0.3, 0.9, -0.2, 1.4], (0, 0, -9.80665), free
 
 
-CASES = {name: rest for name, *rest in sheets()}
+CASES = {case[0]: case[1:] for case in sheets()}
 
 
 @pytest.mark.parametrize("name", CASES)
