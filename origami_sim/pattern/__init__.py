@@ -35,15 +35,20 @@ __all__ = [
 READERS = {".fold": read_fold, ".svg": read_svg, ".obj": read_mesh, ".stl": read_mesh}
 
 
-def read_pattern(path) -> Pattern:
+def read_pattern(path, *, size=None, scale=None) -> Pattern:
     """Read a crease pattern by the file's suffix, with the defaults of its reader.
 
+    Args:
+        path: FOLD, SVG, OBJ or STL file.
+        size: longest side of the pattern [m]. scale: length of one unit of the file [m], instead of `size`. Without
+            either, the file's own physical unit holds; FOLD and SVG without one become 0.2 m, meshes are in metres.
+
     Raises:
-        InputError: unknown suffix, missing file, or what the reader refuses.
+        InputError: unknown suffix, missing file, both size and scale, or what the reader refuses.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in READERS:
         raise InputError("unknown pattern format", file=path, field="suffix", value=suffix, allowed=", ".join(READERS))
     if not Path(path).is_file():
         raise InputError("no such file", file=path)
-    return READERS[suffix](path)
+    return READERS[suffix](path, size=size, scale=scale)

@@ -16,7 +16,9 @@ from .crease_pattern import ASSIGNMENTS, Pattern
 from .files import read_bytes, write_atomic
 from .fold_json import Frame, parse_json, resolve_frame
 from .planar import check_planar_graph, drop_holes, planar_faces
-from .topology import edge_key
+from .sizing import metres_of
+from .topology import edge_key, sides_of_edges
+from .triangulate import hinge_angles, triangulate
 from .units import metres_per
 
 OWN_KEYS = (
@@ -38,34 +40,45 @@ PLANARITY_TOLERANCE = 1e-4
 RADIANS_PER_DEGREE = np.pi / 180.0
 
 
-def read_fold(path, *, frame=0) -> Pattern:
+def read_fold(path, *, frame=0, size=None, scale=None) -> Pattern:
     """Read a FOLD file; what had to be defaulted or derived is told in `notes`.
 
     Args:
         path: the file.
         frame: 0 for the key frame, k for the k-th of `file_frames`, with inheritance.
+        size: longest side of the pattern [m]. scale: length of one unit of the file [m], instead of `size`. Without
+            either, `frame_unit` holds, and 0.2 m is the longest side if the file does not give it.
 
     Returns:
-        The pattern in metres and radians. Keys without a meaning here are kept in `extra`; `write_fold` writes them
-        back.
+        The pattern in metres and radians. Mountains and valleys without an angle fold to -180 and +180 degrees; in a
+        folded form, to the angle that it shows. Keys without a meaning here are kept in `extra`; `write_fold` writes
+        them back.
 
     Raises:
         InputError: naming the file, field, value and what is allowed.
     """
-    return fold_pattern(parse_json(read_bytes(path), file=path), frame=frame, file=path)
+    document = parse_json(read_bytes(path), file=path)
+    return fold_pattern(document, frame=frame, size=size, scale=scale, file=path)
 
 
-def fold_pattern(document: dict, *, frame=0, file=None) -> Pattern:
+def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -> Pattern:
     """Turn parsed FOLD into a `Pattern`; see `read_fold`. `file` is named in errors."""
     keys = resolve_frame(document, frame, file=file)
     data, notes = Frame(keys, file), []
     if keys.get("frame_unit") is None:
         keys["frame_unit"] = "unit"
+    stated = metres_per(keys["frame_unit"], file=file, field="frame_unit")
+    vertices = data.coordinates()
+    check_vertices(vertices, file=file)
+    extent = float(np.ptp(vertices, axis=0).max()) or 1.0
     if keys["frame_unit"] == "unit":
-        notes.append("frame_unit is not given: coordinates are taken as metres.")
-    scale = metres_per(keys["frame_unit"], file=file, field="frame_unit")
-
-    vertices = data.coordinates() * scale
+        keys["frame_unit"] = "m"
+        scale = metres_of(extent, size=size, scale=scale, notes=notes, file=file)
+    elif size is None and scale is None:
+        scale = stated
+    else:
+        scale = metres_of(extent, size=size, scale=scale, notes=notes, file=file)
+    vertices = vertices * scale
     check_vertices(vertices, file=file)
     edges, faces = data.loops("edges_vertices", size=2), data.loops("faces_vertices")
     if not edges and not faces:
@@ -100,7 +113,43 @@ def fold_pattern(document: dict, *, frame=0, file=None) -> Pattern:
         file=file,
     )
     _fit_extra(pattern, faces, count)
+    _default_angles(pattern)
     return pattern
+
+
+def _default_angles(pattern) -> None:
+    """Give mountains and valleys without an angle that of the shape, or half a turn where the pattern is flat."""
+    sides = {"M": -np.pi, "V": np.pi}
+    beside = sides_of_edges(pattern.faces)
+    open_ones = [
+        e
+        for e in pattern.edges_assigned("MV").tolist()
+        if np.isnan(pattern.fold_angles[e]) and len(beside[edge_key(*pattern.edges[e].tolist())]) == 2
+    ]
+    if not open_ones:
+        return
+    pattern.fold_angles[open_ones] = [sides[pattern.assignments[e]] for e in open_ones]
+    centred = pattern.vertices - pattern.vertices.mean(axis=0)
+    extent = np.linalg.norm(centred, axis=1).max()
+    if np.linalg.svd(centred, compute_uv=False)[-1] <= PLANARITY_TOLERANCE * extent * np.sqrt(len(centred)):
+        pattern.notes.append(f"{len(open_ones)} mountains and valleys without a fold angle: taken as 180 degrees.")
+        return
+    try:
+        split = triangulate(pattern, planarity_tolerance=0.1)
+    except InputError:  # no plane faces, so no angles between them; whoever builds the sheet will hear of it
+        return
+    shown = dict(zip(split.crease_edge.tolist(), hinge_angles(split.vertices, split.creases), strict=True))
+    clear = [e for e in open_ones if 0.05 < abs(shown[e]) < np.pi - 0.05]
+    turned = sum(np.sign(shown[e]) * sides[pattern.assignments[e]] for e in clear) < 0
+    if turned:  # the file looks at the other side of its faces
+        swap = {"M": "V", "V": "M"}
+        pattern.assignments[:] = [swap.get(letter, letter) for letter in pattern.assignments]
+        pattern.fold_angles *= -1.0
+        pattern.notes.append("mountains and valleys are seen from the other side of the faces: exchanged.")
+    for e in open_ones:
+        if abs(shown[e]) < np.pi - 0.05:  # a flat fold has no side of its own: the letter's
+            pattern.fold_angles[e] = shown[e]
+    pattern.notes.append(f"{len(open_ones)} mountains and valleys without a fold angle: taken from the folded form.")
 
 
 def _angles(data, field, count):
@@ -112,9 +161,6 @@ def _note_angles(letters, fold_angles, notes) -> None:
     if letters is None:
         return
     angles = np.full(len(letters), np.nan) if fold_angles is None else fold_angles
-    missing = sum(letter in ("M", "V") and np.isnan(angle) for letter, angle in zip(letters, angles, strict=True))
-    if missing:
-        notes.append(f"{missing} mountain or valley edges have no fold angle: left open.")
     for e, (letter, angle) in enumerate(zip(letters, angles, strict=True)):
         if (letter == "M" and angle > 0) or (letter == "V" and angle < 0):
             notes.append(f"edge {e} is '{letter}' but its fold angle is {np.degrees(angle):+g} deg: both kept.")

@@ -10,6 +10,7 @@ from .assemble import assemble
 from .crease_pattern import Pattern
 from .files import read_bytes, write_atomic
 from .polygon import clip_ears, project
+from .sizing import metres_of
 from .triangulate import hinge_angles, triangulate
 from .units import metres_per
 
@@ -18,7 +19,7 @@ COPLANAR = 1e-4
 """Fold angle [rad] below which two triangles are one flat panel (STL stores single precision)."""
 
 
-def read_mesh(path, *, unit="m") -> Pattern:
+def read_mesh(path, *, unit="m", size=None, scale=None) -> Pattern:
     """Read an OBJ or STL file as a pattern in its rest shape.
 
     Every triangle becomes a face. An edge between coplanar triangles is 'F'; any other one is 'U', with the signed
@@ -28,12 +29,13 @@ def read_mesh(path, *, unit="m") -> Pattern:
     Args:
         path: the file, .obj or .stl.
         unit: length unit of the coordinates, which the formats do not tell.
+        size: longest side of the mesh [m]. scale: length of one unit [m]. Either instead of `unit`.
 
     Raises:
         InputError: unreadable or empty mesh, unknown suffix or unit, or anything `checks` refuses.
     """
     suffix = _suffix(path)
-    scale = metres_per(unit)
+    stated = metres_per(unit)
     read_bytes(path)
     try:
         mesh = trimesh.load(str(path), file_type=suffix[1:], process=False, force="mesh", skip_materials=True)
@@ -47,7 +49,12 @@ def read_mesh(path, *, unit="m") -> Pattern:
     vertices, triangles = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
     if suffix == ".stl":
         vertices, triangles = _merged(vertices, triangles)
-    notes = [f"the format has no unit: coordinates are taken in '{unit}'."]
+    notes = []
+    if size is None and scale is None:
+        scale = stated
+        notes.append(f"the format has no unit: coordinates are taken in '{unit}'.")
+    else:
+        scale = metres_of(float(np.ptp(vertices, axis=0).max()) or 1.0, size=size, scale=scale, notes=notes, file=path)
     faces = [tuple(map(int, face)) for face in triangles]
     pattern = assemble(vertices * scale, faces, file=path)
     notes += [note for note in pattern.notes if "without an assignment" not in note]

@@ -48,10 +48,18 @@ def test_units(unit, metres):
 
 
 @pytest.mark.parametrize("unit", [None, "unit"])
-def test_missing_unit_is_metre_with_a_note(unit):
-    pattern = fold_pattern(square(frame_unit=unit))
-    assert pattern.vertices[1, 0] == 1.0
-    assert "metres" in pattern.notes[0]
+def test_without_a_unit_the_longest_side_is_a_hand_wide(unit, tmp_path):
+    document = square(frame_unit=unit)
+    pattern = fold_pattern(document)
+    assert pattern.vertices[1, 0] == pytest.approx(0.2)
+    assert "0.2 m" in pattern.notes[0]
+    assert fold_pattern(document, size=0.5).vertices[1, 0] == pytest.approx(0.5)
+    assert fold_pattern(document, scale=1.0).vertices[1, 0] == 1.0
+    assert fold_pattern(square(frame_unit="mm"), size=0.5).vertices[1, 0] == pytest.approx(0.5)
+    with pytest.raises(InputError, match="exclude each other"):
+        fold_pattern(document, size=0.5, scale=1.0)
+    write_fold(pattern, tmp_path / "a.fold")
+    assert read_fold(tmp_path / "a.fold").equals(pattern)
 
 
 def test_custom_edge_keys():
@@ -61,15 +69,36 @@ def test_custom_edge_keys():
     assert np.isnan(pattern.stiffness[:4]).all()
 
 
+def test_missing_angles_of_a_folded_form_are_those_it_shows():
+    """A square folded by 90 degrees on its diagonal; drawn from the other side, mountains and valleys change names."""
+    folded = [[0, 0, 0], [1, 0, 0], [0.5, 0.5, math.sqrt(0.5)], [0, 1, 0]]
+    for letter, read in (("V", "V"), ("M", "V")):
+        letters = [*"BBBB", letter]
+        document = square(
+            vertices_coords=folded,
+            edges_foldAngle=None,
+            edges_assignment=letters,
+            edges_vertices=[[0, 1], [1, 2], [2, 3], [3, 0], [1, 3]],
+            faces_vertices=[[0, 1, 3], [1, 2, 3]],
+            frame_unit="m",
+        )
+        pattern = fold_pattern(document)
+        assert pattern.assignments[4] == read
+        assert pattern.fold_angles[4] == pytest.approx(math.pi / 2)
+        assert any("exchanged" in note for note in pattern.notes) == (letter != read)
+
+
 def test_old_spelling_of_fold_angle():
     document = square(edges_foldAngle=None) | {"edges_foldAngles": [0, 0, 0, 0, 60]}
     assert fold_pattern(document).fold_angles[4] == pytest.approx(math.pi / 3)
 
 
-def test_missing_angles_open_for_valleys_zero_for_flat():
+def test_missing_angles_are_half_a_turn_and_zero_for_flat():
     pattern = fold_pattern(square(edges_foldAngle=None))
-    assert np.isnan(pattern.fold_angles).all()
-    assert any("no fold angle" in note for note in pattern.notes)
+    assert pattern.fold_angles[4] == pytest.approx(math.pi)
+    assert any("180 degrees" in note for note in pattern.notes)
+    mountain = fold_pattern(square(edges_foldAngle=None, edges_assignment=list("BBBBM")))
+    assert mountain.fold_angles[4] == pytest.approx(-math.pi)
     assert fold_pattern(square(edges_foldAngle=None, edges_assignment=list("BBBBF"))).fold_angles[4] == 0.0
 
 

@@ -168,7 +168,7 @@ def test_random_lines(folder, lines):
     body = "".join(f'<line x1="{a}" y1="{b}" x2="{c}" y2="{d}" stroke="{s}"/>' for a, b, c, d, s in lines)
     path = folder / "e.svg"
     path.write_text(f'<svg><rect width="6" height="6" stroke="black"/>{body}</svg>')
-    pattern = outcome(read_svg, path)
+    pattern = outcome(read_svg, path, scale=1e-3)
     if pattern is not None:
         split = triangulate(pattern)
         a, b, c = (split.vertices[split.triangles[:, n]] for n in range(3))

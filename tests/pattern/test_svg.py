@@ -7,6 +7,7 @@ import pytest
 
 from origami_sim.errors import InputError
 from origami_sim.pattern import read_svg
+from origami_sim.pattern.planar import split_segments
 
 BORDER = '<rect x="0" y="0" width="20" height="10" stroke="#000" fill="none"/>'
 
@@ -21,18 +22,17 @@ def test_split_merge_and_assign(tmp_path):
     body = (
         BORDER + '<line x1="10" y1="0" x2="10" y2="10" stroke="red" opacity="0.5"/><path d="M0 5h20" stroke="#0000FF"/>'
     )
-    pattern = read_svg(svg(tmp_path, body))
+    pattern = read_svg(svg(tmp_path, body), scale=1e-3)
     assert (pattern.vertex_count, pattern.edge_count, pattern.face_count) == (9, 12, 4)
     assert [pattern.assignments.count(letter) for letter in "BMV"] == [8, 2, 2]
     np.testing.assert_allclose(pattern.fold_angles[pattern.edges_assigned("M")], -math.pi / 2)
     np.testing.assert_allclose(pattern.fold_angles[pattern.edges_assigned("V")], math.pi)
     np.testing.assert_allclose(np.ptp(pattern.vertices, axis=0), [0.02, 0.01, 0])
-    assert "1 mm" in pattern.notes[0]
 
 
 def test_y_is_turned_upwards(tmp_path):
     body = '<path d="M0 0 L10 0 L0 10 Z" stroke="black"/>'
-    assert sorted(read_svg(svg(tmp_path, body)).vertices[:, 1].tolist()) == pytest.approx([-0.01, 0, 0])
+    assert sorted(read_svg(svg(tmp_path, body), scale=1e-3).vertices[:, 1].tolist()) == pytest.approx([-0.01, 0, 0])
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_transforms(tmp_path, transform):
     line = f'<g transform="{transform}"><line x1="0" y1="0" x2="0" y2="10" stroke="red"/></g>'
     if transform.startswith("rotate"):
         line = f'<g transform="translate(20,0)">{line}</g>'
-    pattern = read_svg(svg(tmp_path, BORDER + line))
+    pattern = read_svg(svg(tmp_path, BORDER + line), scale=1e-3)
     (e,) = pattern.edges_assigned("M")
     np.testing.assert_allclose(pattern.vertices[pattern.edges[e], 0], 0.01, atol=1e-9)
 
@@ -80,10 +80,94 @@ def test_all_shapes_and_relative_paths(tmp_path):
     assert pattern.assignments.count("M") == 6
 
 
-def test_physical_size(tmp_path):
-    pattern = read_svg(svg(tmp_path, BORDER, 'width="40mm" height="2cm" viewBox="0 0 20 10"'))
-    assert np.ptp(pattern.vertices[:, 0]) == pytest.approx(0.04)
-    assert np.ptp(read_svg(svg(tmp_path, BORDER), unit="in").vertices[:, 0]) == pytest.approx(20 * 0.0254)
+def test_size(tmp_path):
+    stated = svg(tmp_path, BORDER, 'width="40mm" height="2cm" viewBox="0 0 20 10"')
+
+    def width(**options):
+        return np.ptp(read_svg(stated, **options).vertices[:, 0])
+
+    assert width() == pytest.approx(0.04)
+    assert width(scale=0.0254) == pytest.approx(20 * 0.0254)
+    assert width(size=0.3) == pytest.approx(0.3)
+    in_pixels = svg(tmp_path, BORDER, 'width="2000px" height="1000" viewBox="0 0 20 10"')
+    pattern = read_svg(in_pixels)
+    assert np.ptp(pattern.vertices[:, 0]) == pytest.approx(0.2)
+    assert "0.2 m" in pattern.notes[0]
+    for wrong in ({"size": 0.0}, {"scale": -1.0}, {"size": 1.0, "scale": 1.0}):
+        with pytest.raises(InputError):
+            read_svg(in_pixels, **wrong)
+
+
+def test_a_doctype_is_passed_over_and_curves_are_cut_into_chords(tmp_path):
+    """A quarter circle as a Bezier curve and as an arc: chords within the flatness, ends and area kept."""
+    head = '<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/x.dtd">'
+    path = tmp_path / "a.svg"
+    box = '<path d="M0 0 H1 V1 H0 Z" stroke="black"/>'
+    for curve in ("M0 1 C0.5523 1 1 0.5523 1 0", "M0 1 A1 1 0 0 0 1 0"):
+        path.write_text(f'{head}<svg xmlns="http://www.w3.org/2000/svg">{box}<path d="{curve}" stroke="red"/></svg>')
+        pattern = read_svg(path, size=1.0, flatness=1e-3)
+        ends = pattern.edges[pattern.edges_assigned("M")]
+        middles = pattern.vertices[ends].mean(axis=1)  # y was turned upwards
+        assert pattern.face_count == 2
+        assert 7 <= len(ends) <= 20
+        radii = np.linalg.norm(middles, axis=1)
+        assert radii == pytest.approx(np.ones(len(ends)), abs=2.1e-3)
+        finer = read_svg(path, size=1.0, flatness=1e-5)
+        assert len(finer.edges_assigned("M")) == pytest.approx(10 * len(ends), rel=0.2)
+
+
+def test_opacities_of_groups_multiply_and_colours_near_the_six_count(tmp_path):
+    body = BORDER + (
+        '<g opacity="0.5"><g style="stroke:#ED1C24"><line x1="5" y1="0" x2="5" y2="10" opacity="0.5"/></g></g>'
+        '<line x1="10" y1="0" x2="10" y2="10" stroke="#2E3192" stroke-opacity="50%"/>'
+    )
+    pattern = read_svg(svg(tmp_path, body))
+    assert pattern.fold_angles[pattern.edges_assigned("M")] == pytest.approx(-math.pi / 4)
+    assert pattern.fold_angles[pattern.edges_assigned("V")] == pytest.approx(math.pi / 2)
+
+
+def test_clones_are_drawn_and_endless_ones_refused(tmp_path):
+    line = '<defs><line id="l" x1="5" y1="0" x2="5" y2="10" stroke="red"/></defs>'
+    pattern = read_svg(svg(tmp_path, BORDER + line + '<use href="#l"/><use href="#l" x="10"/>'))
+    assert pattern.assignments.count("M") == 2
+    bomb = '<line id="u0" x1="0" y1="0" x2="9" y2="9" stroke="red"/>' + "".join(
+        f'<g id="u{n}">' + f'<use href="#u{n - 1}"/>' * 10 + "</g>" for n in range(1, 9)
+    )
+    with pytest.raises(InputError, match="too many elements"):
+        read_svg(svg(tmp_path, bomb))
+    with pytest.raises(InputError, match="refers to itself"):
+        read_svg(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
+
+
+def test_thousands_of_crossing_lines_are_refused_in_one_sentence(tmp_path):
+    rng = np.random.default_rng(3)
+    ends = rng.uniform(0, 100, (3000, 4))
+    body = "".join(f'<line x1="{a}" y1="{b}" x2="{c}" y2="{d}" stroke="red"/>' for a, b, c, d in ends.tolist())
+    with pytest.raises(InputError, match="cross too often"):
+        read_svg(svg(tmp_path, body))
+
+
+def test_crossings_of_a_grid(tmp_path):
+    """60 x 60 crossing lines: 3600 crossings, 61 x 61 faces inside the border."""
+    marks = np.arange(1, 61) / 61
+    lines = [((0, m), (1, m)) for m in marks] + [((m, 0), (m, 1)) for m in marks]
+    lines += [((0, 0), (1, 0)), ((1, 0), (1, 1)), ((1, 1), (0, 1)), ((0, 1), (0, 0))]
+    starts, ends = np.array(lines).transpose(1, 0, 2)
+    points, pieces = split_segments(starts, ends, 1e-6)
+    assert len(points) == 62 * 62
+    assert len(pieces) == 2 * 62 * 61
+
+
+def test_hand_drawn_gaps_are_closed_and_fine_pleats_kept(tmp_path):
+    """Ends that miss by up to 0.15 % of the sheet are joined; pleats of 0.5 % beside exact ends stay."""
+    rng = np.random.default_rng(1)
+    body = BORDER
+    for x in range(2, 20, 2):
+        top, bottom = rng.uniform(-0.015, 0.015, 2)
+        body += f'<line x1="{x}" y1="{top}" x2="{x}" y2="{10 + bottom}" stroke="red"/>'
+    assert read_svg(svg(tmp_path, body)).face_count == 10
+    pleats = "".join(f'<line x1="{x}" y1="0" x2="{x}" y2="10" stroke="red"/>' for x in (5, 5.1, 10, 10.1))
+    assert read_svg(svg(tmp_path, BORDER + pleats)).face_count == 5
 
 
 def test_near_ends_merge(tmp_path):
@@ -116,26 +200,14 @@ def test_coloured_outline_is_border(tmp_path):
 
 
 BAD = {
-    "curve .cubic, command 'c'": BORDER + '<path d="M0 0c1 1 2 2 3 3" stroke="red"/>',
-    "curve .arc": '<path d="M0 0 A 1 1 0 0 0 3 3" stroke="red"/>',
-    "<circle> is a curve": '<circle r="3" stroke="black"/>',
     "no line in a crease colour.*orange": '<line x1="0" y1="0" x2="9" y2="9" stroke="orange"/>',
+    "no line in a crease colour.*klingon": '<line x1="0" y1="0" x2="9" y2="9" stroke="klingon"/>',
     "no line in a crease colour.*none": "",
     "enclose no face": '<line x1="0" y1="0" x2="9" y2="9" stroke="red"/>',
-    "not a number": '<line x1="a" y1="0" x2="9" y2="9" stroke="red"/>',
     "no usable size": '<line x1="1e308" y1="0" x2="-1e308" y2="9" stroke="red"/>',
-    "malformed path": '<path d="M0 0 L1" stroke="red"/>',
-    "malformed path data": '<path d="M0 0 X1 2" stroke="red"/>',
-    "does not start": '<path d="1 2 M0 0" stroke="red"/>',
-    "malformed path ": '<path d="L1 1" stroke="red"/>',
-    "odd number": '<polygon points="0,0 1" stroke="red"/>',
-    "rect without area": '<rect width="0" height="1" stroke="red"/>',
-    "rounded": '<rect width="1" height="1" rx="0.1" stroke="red"/>',
-    "unsupported transform": '<g transform="skewX(3)"/>',
-    "malformed transform": '<g transform="rotate 3"/>',
+    "cannot read the drawing": '<path d="M0 0 L1" stroke="red"/>',
     "malformed XML": "<line>",
     "nested too deeply": "<g>" * 200 + "</g>" * 200,
-    "shorter than the merge": '<path d="M0 0h1e-9M1 1h1e-9" stroke="red"/>',
 }
 
 
@@ -148,8 +220,8 @@ def test_bad_drawings(tmp_path, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg>&a;</svg>', "DOCTYPE"),
-        ('<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://x"><svg/>', "DOCTYPE"),
+        ('<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg>&a;</svg>', "entity"),
+        ('<!DOCTYPE svg [<!ENTITY a SYSTEM "file:///etc/passwd">]><svg>&a;</svg>', "entity"),
         ("<html/>", "root element"),
         ("", "malformed XML"),
         ('<?xml version="1.0" encoding="klingon"?><svg/>', "malformed XML"),

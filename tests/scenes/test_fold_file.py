@@ -116,7 +116,10 @@ def test_the_square_itself_folds(settings, tmp_path):
         ({"vertices_coords": [[0, 0], [0.02, "x"], [0.02, 0.02], [0, 0.02]]}, "vertices_coords"),
         ({"frame_unit": "furlong"}, "furlong"),
         ({"edges_foldAngle": [0, 0, 0, 0, 270]}, "270"),
-        ({"edges_foldAngle": [0, 0, 0, 0, None]}, "no target angle.*edges_foldAngle.*degrees, valley positive"),
+        (
+            {"edges_assignment": list("BBBBU"), "edges_foldAngle": [0, 0, 0, 0, None]},
+            "no target angle.*edges_foldAngle.*degrees, valley positive",
+        ),
         ({"edges_assignment": ["B", "B", "B", "B", "F"]}, "no crease to fold.*edges_assignment"),
     ],
 )
