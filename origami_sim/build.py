@@ -4,20 +4,20 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import nnls
 
-from origami_sim.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, rigid, second_moments, triangle
+from origami_sim.bodies import rigid
 from origami_sim.effects import get
 from origami_sim.errors import InputError
+from origami_sim.masses import Masses, Stated, positive
 from origami_sim.materials import MATERIALS, layered_rigidity, material
-from origami_sim.model import BODY, Model, Parameters, dihedral_angles
+from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 
 MEMBRANE_POISSON = 1.0 / 3.0
 """The only Poisson's ratio that bars along triangle edges reproduce in shear."""
 
 
-class Sheet:
+class Sheet(Masses):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -66,7 +66,7 @@ class Sheet:
             ("density", self.density),
             ("membrane", np.array([membrane])),
         ):
-            if not np.all(_positive(value)):
+            if not np.all(positive(value)):
                 raise InputError(
                     "a panel property must be positive", field=name, value=_first_bad(value), allowed="> 0"
                 )
@@ -77,8 +77,9 @@ class Sheet:
         self.membrane, self.membrane_damping = membrane, membrane_damping
         self._rigidity = np.full(faces, np.nan)
         self._patches: list[dict] = [{} for _ in range(faces)]
-        self._lumps: dict[int, tuple[float, np.ndarray, float]] = {}
-        self._stated: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+        self._stated: dict[int, Stated] = {}
+        self._points: list[tuple[int, float, np.ndarray]] = []
+        self._gravity: tuple[float, float, float] | None = None
         self._extra_mass = np.zeros(len(self.mesh.vertices))
         self._free = np.ones((len(self.mesh.vertices), 3))
         self._labels: dict[str, tuple[str, ...]] = {}
@@ -149,7 +150,7 @@ class Sheet:
 
     def panel(self, panels, *, rigidity: float) -> "Sheet":
         """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
-        if not np.all(_positive(rigidity)):
+        if not np.all(positive(rigidity)):
             raise InputError("a bending rigidity must be positive", field="rigidity", value=rigidity, allowed="> 0 N m")
         self._rigidity[self._index("panel", panels)] = rigidity
         return self
@@ -183,7 +184,7 @@ class Sheet:
         density = m.density if density is None else density
         if side not in (1, -1):
             raise InputError("a patch lies on one side", field="side", value=side, allowed="1 (top), -1 (below)")
-        if not np.all(_positive([thickness, *extent, density])):
+        if not np.all(positive([thickness, *extent, density])):
             raise InputError(
                 "a patch needs positive dimensions and density",
                 field=f"patch on panel {panel}",
@@ -229,48 +230,6 @@ class Sheet:
             )
         return self
 
-    def rigid_body(self, panel: int, *, mass: float, centre: ArrayLike, inertia: float) -> "Sheet":
-        """Gives a panel the mass [kg], centre of mass [m] and in-plane second moment [kg m^2] of a measured body.
-
-        `inertia` is that about an axis through the centre of mass across the panel's longer side.
-        """
-        for name, value, unit in (("mass", mass, "kg"), ("inertia", inertia, "kg m^2")):
-            if not np.all(_positive(value)):
-                raise InputError("a rigid body needs it positive", field=name, value=value, allowed=f"> 0 {unit}")
-        self._triangles_of(panel)
-        self._lumps[panel] = (mass, np.asarray(centre, float), inertia)
-        return self
-
-    def body(self, panel: int, *, mass: float, centre: ArrayLike, inertia: ArrayLike) -> "Sheet":
-        """Gives a panel the mass [kg], centre of mass [m] and inertia tensor [kg m^2] of a measured rigid body.
-
-        It replaces the weight of the panel and of its patches. Rigid panels may have any body; elastic ones only one
-        that masses at their nodes can make, with its centre of mass in their plane.
-
-        Args:
-            centre: in the reference state, anywhere.
-            inertia: about the centre of mass, [3, 3] in the reference axes, or the principal moments along x, y and z.
-
-        Raises:
-            InputError: no such panel, a mass or an inertia that no body has.
-        """
-        self._triangles_of(panel)
-        tensor, middle = np.asarray(inertia, float), np.asarray(centre, float)
-        tensor = np.diag(tensor) if tensor.shape == (3,) else tensor
-        check_body(mass, tensor, f"body of panel {panel}")
-        if middle.shape != (3,) or not np.all(np.isfinite(middle)):
-            field = f"body of panel {panel}.centre"
-            raise InputError("a centre is a place", field=field, value=centre, allowed="x, y, z")
-        self._stated[panel] = (mass, middle, tensor)
-        return self
-
-    def mass(self, nodes, mass: float) -> "Sheet":
-        """Adds point masses [kg]."""
-        if not np.all(np.asarray(mass, float) >= 0):
-            raise InputError("a mass cannot be negative", field="mass", value=mass, allowed=">= 0 kg")
-        np.add.at(self._extra_mass, self._index("node", nodes), mass)
-        return self
-
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
         """Holds panels or nodes along the named axes."""
         index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
@@ -283,10 +242,8 @@ class Sheet:
     def gravity(self, acceleration: Sequence[float] | np.ndarray = (0.0, 0.0, -9.80665)) -> "Sheet":
         """Weight of sheet and patches; acceleration [m/s^2]."""
         gx, gy, gz = acceleration
-        self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
-        if any(self._patches):
-            self.set("eccentric_weight", gravity_x=gx, gravity_y=gy, gravity_z=gz)
-        return self
+        self._gravity = (gx, gy, gz)
+        return self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
 
     def contact(
         self,
@@ -347,6 +304,12 @@ class Sheet:
             self.on("panel_bending")
         if self.membrane_damping > 0:
             self.on("bar_viscosity")
+        if self._gravity is not None and self._off_plane():
+            gx, gy, gz = self._gravity
+            self.on("eccentric_weight")
+            self._settings[:0] = [
+                ("eccentric_weight", f"gravity_{a}", g, None) for a, g in zip("xyz", (gx, gy, gz), strict=True)
+            ]
         tri = np.array([c[0] for c in self._contacts], int)
         model = Model(
             position=mesh.vertices,
@@ -383,67 +346,13 @@ class Sheet:
             p.set("panel_bending", "stiffness", self._bend_stiffness())
             p.set("panel_bending", "rest_angle", dihedral_angles(mesh.vertices, mesh.bends))
         if "eccentric_weight" in self._effects:
-            for panel, patch in enumerate(self._patches):
-                for t in self._triangles_of(panel) if patch else ():
-                    share = self._share(panel, t)
-                    offset = patch["side"] * 0.5 * (self.thickness[panel] + patch["thickness"])
-                    p.set("eccentric_weight", "mass", self._patch_mass(patch) * share, [t])
-                    p.set("eccentric_weight", "offset", offset, [t])
+            for t, (weight, offset) in self._off_plane().items():
+                p.set("eccentric_weight", "mass", weight, [t]).set("eccentric_weight", "offset", offset, [t])
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
         return rigid(model, p) if self.panels == "rigid" else (model, p)
 
-    # geometry -----------------------------------------------------------------------------------------------------
-
-    def _counts(self) -> dict[str, int]:
-        mesh = self.mesh
-        return {"panel": self.pattern.face_count, "crease": len(mesh.creases), "node": len(mesh.vertices)}
-
-    def _index(self, family: str, chosen: ArrayLike | None) -> np.ndarray:
-        """Indices of some entities of a family, or of all."""
-        count = self._counts()[family]
-        if chosen is None:
-            return np.arange(count)
-        index = np.atleast_1d(np.asarray(chosen, int)) if np.size(chosen) else np.zeros(0, int)
-        bad = index[(index < 0) | (index >= count)]
-        if len(bad):
-            raise InputError(f"there is no such {family}", field=family, value=int(bad[0]), allowed=f"0 to {count - 1}")
-        return index
-
-    def _triangles_of(self, panel: int) -> np.ndarray:
-        if not 0 <= panel < self.pattern.face_count:
-            raise InputError(
-                "there is no such panel", field="panel", value=panel, allowed=f"0 to {self.pattern.face_count - 1}"
-            )
-        return np.flatnonzero(self.mesh.triangle_face == panel)
-
-    def _nodes_of(self, panel: int) -> np.ndarray:
-        return np.unique(self.mesh.triangles[self._triangles_of(panel)])
-
-    def _share(self, panel: int, triangle: int) -> float:
-        return float(self.area[triangle] / self.area[self._triangles_of(panel)].sum())
-
-    def _centroid(self, panel: int) -> np.ndarray:
-        t = self._triangles_of(panel)
-        centres = self.mesh.vertices[self.mesh.triangles[t]].mean(axis=1)
-        return (self.area[t, None] * centres).sum(0) / self.area[t].sum()
-
-    def _edge_weights(self, triangle: int, direction: np.ndarray) -> tuple[float, float]:
-        """a, b with the in-plane part of `direction` = a (x2 - x1) + b (x3 - x1)."""
-        x1, x2, x3 = self.mesh.vertices[self.mesh.triangles[triangle]]
-        (a, b), *_ = np.linalg.lstsq(np.stack([x2 - x1, x3 - x1], axis=1), direction, rcond=None)
-        return float(a), float(b)
-
-    def _barycentric(self, triangle: int, point: np.ndarray) -> np.ndarray:
-        x1 = self.mesh.vertices[self.mesh.triangles[triangle, 0]]
-        a, b = self._edge_weights(triangle, point - x1)
-        return np.array([1 - a - b, a, b])
-
     # mechanics ----------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def _patch_mass(patch: dict) -> float:
-        return float(patch["density"] * patch["thickness"] * patch["size"].prod())
 
     def _bar_sections(self) -> np.ndarray:
         """E A of each bar [N]: every triangle gives its edges A = 2 S t / ((1 - nu) sum L)."""
@@ -486,123 +395,6 @@ class Sheet:
             out[q] = self.rigidity(int(mesh.bend_face[q])) * span**2 / self.area[pair].sum()
         return out
 
-    def _bodies(self) -> dict[str, np.ndarray]:
-        """Mass, centre of mass and inertia of each panel with patches and point masses, as `model.BODY` names them."""
-        x, left, rows = self.mesh.vertices, self._extra_mass.copy(), []
-        for panel in range(self.pattern.face_count):
-            nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
-            normal = self._area_vector[triangles].sum(0)
-            normal /= np.linalg.norm(normal)
-            parts = []  # mass, centre, second moments about the origin
-            if panel in self._stated:
-                mass, centre, tensor = self._stated[panel]
-                parts.append((mass, centre, second_moments(tensor) + mass * np.outer(centre, centre)))
-            elif panel in self._lumps:
-                mass, centre, inertia = self._lumps[panel]
-                e1, e2 = self._frame(panel, normal)
-                width = np.ptp(x[nodes] @ e2)
-                spread = inertia * np.outer(e1, e1) + mass * width**2 / 12 * np.outer(e2, e2)
-                parts.append((mass, centre, spread + mass * np.outer(centre, centre)))
-            else:
-                thick, patch = self.thickness[panel], self._patches[panel]
-                for t in triangles:
-                    parts.append(triangle(x[self.mesh.triangles[t]], self.density[panel] * thick * self.area[t], thick))
-                if patch:
-                    middle = patch["centre"] + patch["side"] * 0.5 * (thick + patch["thickness"]) * normal
-                    parts.append(rectangle(middle, patch["size"], patch["thickness"], normal, self._patch_mass(patch)))
-            for n in nodes:  # a mass on a crease is the first panel's
-                parts.append((left[n], x[n], left[n] * np.outer(x[n], x[n])))
-                left[n] = 0.0
-            mass = sum(m for m, *_ in parts)
-            centre = np.sum([m * c for m, c, _ in parts], axis=0) / mass
-            tensor = inertia_tensor(np.sum([s for *_, s in parts], axis=0) - mass * np.outer(centre, centre))
-            rows.append([mass, *centre, *(tensor[k] for k in SYMMETRIC)])
-        return dict(zip(BODY, np.array(rows).T, strict=True))
-
-    def _frame(self, panel: int, normal: np.ndarray) -> np.ndarray:
-        """[2, 3] unit vectors in the panel's plane: along its longest side, and across it."""
-        corners = self.mesh.vertices[list(self.pattern.faces[panel])]
-        sides = np.roll(corners, -1, axis=0) - corners
-        e1 = sides[np.argmax(np.linalg.norm(sides, axis=1))]
-        e1 = e1 / np.linalg.norm(e1)
-        return np.stack([e1, np.cross(normal, e1)])
-
-    def _node_masses(self) -> np.ndarray:
-        mesh, out = self.mesh, self._extra_mass.copy()
-        if self.panels == "rigid":  # the bodies have it
-            return np.ones(len(mesh.vertices))
-        for panel in range(self.pattern.face_count):
-            nodes, triangles = self._nodes_of(panel), self._triangles_of(panel)
-            patch = self._patches[panel]
-            sheet = self.density[panel] * self.thickness[panel] * self.area[triangles]
-            centred = len(nodes) > len(self.pattern.faces[panel])
-            if panel not in self._lumps and panel not in self._stated and not centred:
-                extra = self._patch_mass(patch) if patch else 0.0
-                for t, m in zip(triangles, sheet, strict=True):
-                    out[mesh.triangles[t]] += (m + extra * self._share(panel, t)) / 3
-                continue
-            out[nodes] += self._lumped(panel, nodes, triangles, sheet, patch)
-        bad = np.flatnonzero(out <= 0)
-        if len(bad):
-            raise InputError("a node has no mass", field=f"node {bad[0]}", allowed="> 0 kg")
-        return out
-
-    def _lumped(
-        self, panel: int, nodes: np.ndarray, triangles: np.ndarray, sheet: np.ndarray, patch: dict
-    ) -> np.ndarray:
-        """Node masses >= 0 that have the panel's mass, centre of mass and second moments."""
-        x = self.mesh.vertices
-        normal = self._area_vector[triangles].sum(0)
-        normal /= np.linalg.norm(normal)
-        frame = self._frame(panel, normal)
-        origin = self._centroid(panel)
-        y = (x[nodes] - origin) @ frame.T
-        if panel in self._stated:
-            mass, centre, tensor = self._stated[panel]
-            c, spread = (centre - origin) @ frame.T, frame @ second_moments(tensor) @ frame.T
-            if abs((centre - origin) @ normal) > 1e-6 * np.abs(y).max():
-                raise InputError(
-                    "the centre of mass lies off the panel's plane",
-                    field=f"body of panel {panel}.centre",
-                    value=centre.tolist(),
-                    allowed="a place in its plane, or panels='rigid'",
-                )
-            target = np.append(mass * np.array([1.0, *c]), np.diag(spread) + mass * c**2)
-            target = np.append(target, spread[0, 1] + mass * c[0] * c[1])
-        elif panel in self._lumps:
-            mass, centre, inertia = self._lumps[panel]
-            c = (centre - origin) @ frame.T
-            target = np.array([mass, mass * c[0], mass * c[1], inertia + mass * c[0] ** 2, np.nan, mass * c[0] * c[1]])
-        else:
-            target = np.zeros(6)
-            for t, m in zip(triangles, sheet, strict=True):
-                p = (x[self.mesh.triangles[t]] - origin) @ frame.T
-                # exact for a uniform triangle: a twelfth at each corner, the rest at the centroid
-                target += _moments(np.vstack([p, p.mean(0)]), m * np.array([1 / 12, 1 / 12, 1 / 12, 3 / 4]))
-            if patch:
-                half = patch["size"] / 2
-                grid = (
-                    np.array([[sx, sy, 0.0] for sx in (-1, 1) for sy in (-1, 1)]) * np.append(half, 0) + patch["centre"]
-                )
-                points = (np.vstack([grid, patch["centre"]]) - origin) @ frame.T
-                weights = np.array([1 / 12] * 4 + [2 / 3])  # exact for a uniform rectangle
-                target += _moments(points, self._patch_mass(patch) * weights)
-        given = ~np.isnan(target)
-        matrix = np.stack([_moments(p[None], np.ones(1)) for p in y], axis=1)[given]
-        size = np.abs(y).max()
-        scale = np.array([1, 1 / size, 1 / size, 1 / size**2, 1 / size**2, 1 / size**2])[given]
-        floor = 0.01 * target[0] / len(nodes)  # no node without inertia
-        rest = target[given] - matrix @ np.full(len(nodes), floor)
-        solution, residual = nnls(matrix * scale[:, None], rest * scale)
-        if (panel in self._lumps or panel in self._stated) and residual > 1e-6 * target[0]:
-            raise InputError(
-                "no non-negative node masses have this mass, centre and inertia",
-                field=f"panel {panel}",
-                value=float(residual),
-                allowed="a body whose masses lie within its panel, or panels='rigid'",
-            )
-        return solution + floor
-
     def _crease_viscosity(self, mass: np.ndarray) -> np.ndarray:
         loss_time, ratio = self._viscous_creases
         if not ratio:
@@ -615,29 +407,8 @@ class Sheet:
         return out
 
 
-def _moments(points: np.ndarray, masses: np.ndarray) -> np.ndarray:
-    """m, m y1, m y2, m y1^2, m y2^2, m y1 y2 of points [n, 2], summed."""
-    a, b = points[:, 0], points[:, 1]
-    return np.array(
-        [
-            masses.sum(),
-            (masses * a).sum(),
-            (masses * b).sum(),
-            (masses * a * a).sum(),
-            (masses * b * b).sum(),
-            (masses * a * b).sum(),
-        ]
-    )
-
-
-def _positive(value) -> np.ndarray:
-    """Where a value is finite and above zero."""
-    value = np.asarray(value, float)
-    return np.isfinite(value) & (value > 0)
-
-
 def _first_bad(value: np.ndarray) -> float:
-    return float(value[~_positive(value)][0])
+    return float(value[~positive(value)][0])
 
 
 def _material(name: str, panel: int):

@@ -7,7 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
@@ -198,6 +198,9 @@ def read_calibration(source: str | Path) -> Settings:
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
     """The settings of a scene: its own calibration, or a file that gives all of the same settings in the same units.
 
+    A scene may have a series of like parts (`SERIES`, the settings of one); a calibration may then state further ones
+    (`mass_3` and all others of part 3).
+
     Raises:
         InputError: what `read_calibration` refuses; a setting that is missing, unknown or in another unit.
     """
@@ -205,6 +208,8 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
     if calibration is None:
         return own
     given = read_calibration(calibration)
+    series = _series(module, given)
+    own = Settings([*own.values(), *(replace(own[f"{n}_1"], name=f"{n}_{k}") for n, k in series)], own.file)
     for name in own:
         if name not in given:
             raise InputError("the calibration lacks a setting of this scene", file=given.file, field=name)
@@ -224,6 +229,20 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
     return given
+
+
+def settings_of(module: ModuleType, given: Collection[str]) -> set[str]:
+    """Names that a calibration of a scene has to state, as many parts of its series as it states."""
+    return set(read_calibration(module.CALIBRATION)) | {f"{n}_{k}" for n, k in _series(module, given)}
+
+
+def _series(module: ModuleType, given: Collection[str]) -> list[tuple[str, int]]:
+    """Settings of the further parts of a scene's series of which a calibration states any, by name and number."""
+    names = getattr(module, "SERIES", ())
+    own = read_calibration(module.CALIBRATION)
+    found = [re.fullmatch(rf"({'|'.join(names)})_([1-9]\d?)", n) for n in given] if names else []
+    last = max((int(m[2]) for m in found if m), default=0)
+    return [(n, k) for k in range(1, last + 1) for n in names if f"{n}_{k}" not in own]
 
 
 def is_reference(s: Settings, calibration: str, besides: Collection[str] = ()) -> bool:

@@ -1,8 +1,10 @@
-"""A chain of two rigid arms on two hinges, with its published parameters, beside a real recording.
+"""A chain of rigid arms on hinges, with its published parameters, beside a real recording.
 
     python -m origami_sim.scenes.pendulum_chain
 
-Angles are those of the recording: absolute, from the upright vertical.
+The calibration has two arms; one without mass ends the chain, and a calibration may state further ones (`mass_3`,
+`centre_3`, `length_3`, `inertia_3`, `viscosity_3`, `angle_3`, `rate_3`). Angles are those of the recording: absolute,
+from the upright vertical.
 """
 
 import numpy as np
@@ -17,26 +19,47 @@ from origami_sim.scene import Outcome, Progress, Settings
 from origami_sim.solve.dynamics import Trajectory, simulate
 
 CALIBRATION = "pendulum_chain"
-WIDTH, MOUNT, REACH = 0.02, 0.04, 0.25
-"""Drawn width of the arms, length of the mount, and length of arm 2 [m]; only the masses on it matter."""
+SERIES = ("mass", "centre", "length", "inertia", "viscosity", "angle", "rate")
+"""Settings of one arm; a calibration may state further arms."""
+
+WIDTH, MOUNT = 0.02, 0.04
+"""Drawn width of the arms and length of the mount [m]; only the masses on it matter."""
+
+
+def arms(s: Settings) -> list[int]:
+    """Numbers of the arms, down to the first that has no mass."""
+    out = []
+    while f"mass_{len(out) + 1}" in s and _number(s, "mass", len(out) + 1) > 0:
+        out.append(len(out) + 1)
+    return out
+
+
+def of_arms(s: Settings, name: str) -> np.ndarray:
+    """(n,) a setting of every arm [SI]."""
+    return np.array([_number(s, name, k) for k in arms(s)])
+
+
+def _number(s: Settings, name: str, arm: int) -> float:
+    return float(s[f"{name}_{arm}"].value)
 
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
-    """Mount, arm 1 and arm 2 hanging straight; node masses give each arm its mass, centre and inertia."""
-    lengths = [MOUNT, s.length_1] + ([REACH] if s.mass_2 > 0 else [])
-    pattern = strip(lengths, WIDTH)
+    """Mount and arms hanging straight; each arm has its mass, centre and inertia."""
+    lengths = of_arms(s, "length")
+    pattern = strip([MOUNT, *lengths], WIDTH)
     pattern.vertices = pattern.vertices[:, [2, 1, 0]] * (1, 1, -1)  # hanging down
-    sheet = Sheet(pattern, thickness=0.005, material="aluminium", triangulation="center")
+    sheet = Sheet(pattern, thickness=0.005, material="aluminium", triangulation="center", panels=s.panels or "elastic")
     sheet.fix(panels=[0])
-    sheet.rigid_body(1, mass=s.mass_1, centre=(0, 0, -MOUNT - s.centre_1), inertia=s.inertia_1)
-    if s.mass_2 > 0:
-        sheet.rigid_body(2, mass=s.mass_2, centre=(0, 0, -MOUNT - s.length_1 - s.centre_2), inertia=s.inertia_2)
+    for k, upper in zip(arms(s), MOUNT + np.cumsum(lengths) - lengths, strict=True):
+        centre = (0, 0, -upper - _number(s, "centre", k))
+        sheet.body(k, mass=_number(s, "mass", k), centre=centre, inertia=_number(s, "inertia", k), about=(0, 1, 0))
     sheet.on("bars").set("bars", stiffness=s.membrane_stiffness)
     sheet.set("panel_bending", stiffness=s.membrane_stiffness * (WIDTH / 10) ** 2)
-    sheet.set("crease_viscosity", viscosity=np.array([s.viscosity_1, s.viscosity_2][: len(lengths) - 1]))
+    sheet.set("crease_viscosity", viscosity=of_arms(s, "viscosity"))
     sheet.gravity((0, 0, -s.gravity))
     sheet.membrane_damping = 0.0
-    sheet.name("panel", ("mount", "arm1", "arm2")[: len(lengths)])
+    sheet.name("panel", ("mount", *(f"arm{k}" for k in arms(s))))
+    sheet.name("crease", [f"hinge{k}" for k in arms(s)])
     model, parameters = sheet.build()
     return model, parameters, Drive()
 
@@ -44,20 +67,18 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
 def start(s: Settings, model: Model) -> State:
     """The state with the arms at their initial angles and rates."""
     position, velocity = model.position.copy(), np.zeros_like(model.position)
-    pivot, tip = np.array([0.0, 0.0, -MOUNT]), np.zeros(3)
-    for panel, (angle, rate, length) in enumerate(((s.angle_1, s.rate_1, s.length_1), (s.angle_2, s.rate_2, REACH)), 1):
+    pivot, tip, upper = np.array([0.0, 0.0, -MOUNT]), np.zeros(3), -MOUNT
+    every = zip(arms(s), of_arms(s, "angle"), of_arms(s, "rate"), of_arms(s, "length"), strict=True)
+    for panel, angle, rate, length in every:
         nodes = np.unique(model.triangles[model.triangle_panel == panel])
         along = np.array([np.sin(angle), 0.0, np.cos(angle)])
         across = np.array([np.cos(angle), 0.0, -np.sin(angle)]) * rate
-        upper = -MOUNT - (s.length_1 if panel == 2 else 0.0)
         reach = upper - model.position[nodes, 2]
         keep = reach > 1e-9
         nodes, reach = nodes[keep], reach[keep]
         position[nodes] = pivot + np.outer(reach, along) + np.outer(model.position[nodes, 1], (0, 1, 0))
         velocity[nodes] = tip + np.outer(reach, across)
-        pivot, tip = pivot + length * along, tip + length * across
-        if s.mass_2 == 0:
-            break
+        pivot, tip, upper = pivot + length * along, tip + length * across, upper - length
     state = State.at_rest(model, position=position)
     state.v[:, 0] = velocity
     return state
@@ -70,7 +91,7 @@ def from_recording(s: Settings, recording: Recording) -> Settings:
     the local estimate is refined by Gauss-Newton steps over rollouts, one world for each perturbed start, over a
     window that is doubled for as long as the residual stays at the noise.
     """
-    names = [n for k in (1, 2)[: len(recording.channels)] for n in (f"angle_{k}", f"rate_{k}")]
+    names = [n for k in arms(s)[: len(recording.channels)] for n in (f"angle_{k}", f"rate_{k}")]
     estimates = initial_angles(recording, float(recording.times[0])).values()
     best = np.array([v for e in estimates for v in (e.angle, e.rate)], float)
     window = 0.03
@@ -131,7 +152,7 @@ def arm_angles(motion: Trajectory, s: Settings) -> np.ndarray:
     out = []
     for panel in range(1, len(motion.model.names["panel"])):
         angle = panel_angle(motion.model, motion.x[:, :, 0], panel)
-        first = (s.angle_1, s.angle_2)[panel - 1]
+        first = _number(s, "angle", panel)
         out.append(angle + 2 * np.pi * np.round((first - angle[0]) / (2 * np.pi)))
     return np.stack(out, axis=1)
 

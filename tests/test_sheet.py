@@ -86,7 +86,7 @@ def test_weight_of_a_patch_sits_above_or_below_the_sheet():
 
 def test_a_rigid_body_has_the_given_mass_centre_and_inertia():
     sheet = Sheet(strip([0.04, 0.17], 0.02), thickness=5e-3, triangulation="center").crease(stiffness=1e-3)
-    sheet.rigid_body(1, mass=0.0938, centre=(0.04 + 0.1086, 0, 0), inertia=4.3753e-4)
+    sheet.body(1, mass=0.0938, centre=(0.04 + 0.1086, 0, 0), inertia=4.3753e-4, about=(0, 1, 0))
     model, parameters = sheet.build()
     before = Sheet(strip([0.04, 0.17], 0.02), thickness=5e-3, triangulation="center").crease(stiffness=1e-3).build()[1]
     own = np.unique(model.triangles[model.triangle_panel == 1])
@@ -104,7 +104,7 @@ def test_a_rigid_body_has_the_given_mass_centre_and_inertia():
 
 def test_a_rigid_body_beyond_its_panel_is_refused():
     sheet = Sheet(strip([0.04, 0.17], 0.02), thickness=5e-3, triangulation="center").crease(stiffness=1e-3)
-    sheet.rigid_body(1, mass=0.1, centre=(0.5, 0, 0), inertia=1e-4)
+    sheet.body(1, mass=0.1, centre=(0.5, 0, 0), inertia=1e-4, about=(0, 1, 0))
     with pytest.raises(InputError, match=r"no non-negative node masses.*panel 1.*within its panel"):
         sheet.build()
 
@@ -333,9 +333,19 @@ def sheet(**options) -> Sheet:
         (lambda: sheet().contact(1, (0.5, 0, 0)), r"outside its panel.*panel 1.*0\.5"),
         (lambda: sheet().contact(1, (float("nan"), 0, 0)), r"outside its panel"),
         (lambda: sheet().contact(-1, (0, 0, 0)), r"no such panel.*-1"),
-        (lambda: sheet().rigid_body(1, mass=0.0, centre=(0, 0, 0), inertia=1e-4), r"positive.*mass"),
-        (lambda: sheet().rigid_body(1, mass=1.0, centre=(0, 0, 0), inertia=-1e-4), r"positive.*inertia"),
-        (lambda: sheet().rigid_body(4, mass=1.0, centre=(0, 0, 0), inertia=1e-4), r"no such panel"),
+        (lambda: sheet().body(1, mass=0.0, centre=(0, 0, 0), inertia=1e-4, about="crease"), r"positive mass"),
+        (lambda: sheet().body(1, mass=1.0, centre=(0, 0, 0), inertia=-1e-4, about="crease"), r"positive.*inertia"),
+        (lambda: sheet().body(4, mass=1.0, centre=(0, 0, 0), inertia=1e-4, about="crease"), r"no such panel"),
+        (lambda: sheet().body(1, mass=1.0, centre=(0, 0, 0), inertia=1e-4), r"needs an axis.*panel 1\.about"),
+        (lambda: sheet().body(1, mass=1.0, centre=(0, 0, 0), inertia=1e-4, about=(0, 0, 0)), r"axis is a direction"),
+        (lambda: sheet().body(1, mass=1.0, centre=(0, 0, 0), inertia=(1, 1, 1), about="crease"), r"tensor has no axis"),
+        (lambda: sheet().body(1, mass=1.0, centre=(1, 0, 0), inertia=(1, 1, 1), through=(0, 0, 9)), r"from through="),
+        (lambda: sheet().body(1, mass=1.0, centre=(0, 0, 0), inertia=1.0, about="hip").crease(stiffness=1.0).build(),
+         r"has no such crease.*panel 1\.about.*hip.*0"),
+        (lambda: sheet().body(1, mass=1.0, centre=(3, 0, 0), inertia=1.0, about=0).crease(stiffness=1.0).build(),
+         r"no body has this inertia.*panel 1\.inertia.*distance of its centre"),
+        (lambda: sheet().point_mass(1, 1e-3, (0.5, 0, 0)), r"outside its panel.*panel 1.*rigid"),
+        (lambda: sheet().point_mass(1, -1e-3, (0.01, 0, 0)), r"point mass is positive.*panel 1"),
         (lambda: sheet().mass(0, -1.0), r"mass cannot be negative"),
         (lambda: sheet().mass(99, 1.0), r"no such node.*99.*0 to 5"),
         (lambda: sheet().fix(nodes=[77]), r"no such node.*77"),

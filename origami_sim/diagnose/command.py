@@ -29,7 +29,15 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
-from origami_sim.scene import NAMES, Settings, check_recorded_scene, read_calibration, scene_module, scene_settings
+from origami_sim.scene import (
+    NAMES,
+    Settings,
+    check_recorded_scene,
+    read_calibration,
+    scene_module,
+    scene_settings,
+    settings_of,
+)
 from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
@@ -146,7 +154,7 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
         check_recorded_scene(data[0], given, "--model")
         return module, scene_settings(module)
     settings = read_calibration(given)
-    own = {n: set(read_calibration(scene_module(n).CALIBRATION)) for n in NAMES}
+    own = {n: settings_of(scene_module(n), settings) for n in NAMES}
     fitting = [n for n, names in own.items() if names == set(settings)]
     if stated in fitting:
         fitting = [stated]

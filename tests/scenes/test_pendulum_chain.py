@@ -1,15 +1,19 @@
 """Two hinged arms, against rigid-body equations integrated by SciPy and against the real recording."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from origami_sim.compare import compare
+from origami_sim.errors import InputError
 from origami_sim.observe import observe
 from origami_sim.recording import read_recording, simulate_double_pendulum
 from origami_sim.recording.rigid_pendulum import DoublePendulum
-from origami_sim.scene import read_calibration, recordings_folder
+from origami_sim.scene import Settings, read_calibration, recordings_folder, scene_settings
 from origami_sim.scenes import pendulum_chain
 
 
@@ -55,6 +59,51 @@ def test_motion_converges_with_the_square_of_the_step(settings):
     errors = [np.abs(x - ends[-1]).max() for x in ends[:-1]]
     slope = np.polyfit(np.log([1, 2, 4, 8]), np.log(errors), 1)[0]
     assert slope == pytest.approx(-2.0, abs=0.1)
+
+
+def further(s, **last):
+    """Settings with one arm more, in which arm 3 is like arm 2 but for what is given."""
+    names = pendulum_chain.SERIES
+    third = [replace(s[f"{n}_2"], name=f"{n}_3", value=last.get(n, s[f"{n}_2"].value)) for n in names]
+    return Settings([*s.values(), *third], s.file)
+
+
+def test_three_rigid_arms_move_as_lagrange_says(settings):
+    """Any number of arms of any length: absolute angles p of a chain, M(p) p'' + C(p) p'^2 = moments."""
+    s = further(
+        settings.replace(length_2=0.31), mass=0.06, centre=0.05, inertia=2e-4, angle=2.9, rate=1.0, viscosity=2e-5
+    )
+    m, a, length, inertia, c = (
+        pendulum_chain.of_arms(s, n) for n in ("mass", "centre", "length", "inertia", "viscosity")
+    )
+    reach = np.tril(np.tile(length, (3, 1)), -1) + np.diag(a)  # of each arm's centre, by arm
+    moving, weight = np.diag(inertia), m @ reach * s.gravity
+
+    def rates(_, y):
+        p, w = np.split(y, 2)
+        pull = reach.T @ (m[:, None] * reach)
+        apart = p[:, None] - p
+        hinge = c * np.diff(w, prepend=0.0)
+        right = -(pull * np.sin(apart)) @ w**2 + weight * np.sin(p) - hinge + np.append(hinge[1:], 0.0)
+        return np.append(w, np.linalg.solve(moving + pull * np.cos(apart), right))
+
+    run = pendulum_chain.swing(s.with_panels("rigid").replace(duration=1.0), rate=100.0, tolerance=1e-11)
+    start = np.concatenate([pendulum_chain.of_arms(s, "angle"), pendulum_chain.of_arms(s, "rate")])
+    exact = solve_ivp(rates, (0, 1), start, "DOP853", run.times, rtol=1e-12, atol=1e-13).y[:3].T
+    assert np.abs(pendulum_chain.arm_angles(run, s) - exact).max() < 1e-7
+    assert run.model.names["crease"] == ("hinge1", "hinge2", "hinge3")
+
+
+def test_a_calibration_may_state_further_arms(settings, tmp_path):
+    text = settings.file.read_text()
+    part = "".join(block.replace("_2]", "_3]") for block in re.findall(r"\[\w+_2\]\n(?:.+\n)+", text))
+    (tmp_path / "three.toml").write_text(text + part)
+    three = scene_settings(pendulum_chain, tmp_path / "three.toml")
+    assert pendulum_chain.arms(three) == [1, 2, 3]
+    assert pendulum_chain.build(three)[0].names["panel"] == ("mount", "arm1", "arm2", "arm3")
+    (tmp_path / "three.toml").write_text(text + part.replace("[rate_3]", "[rate_4]"))
+    with pytest.raises(InputError, match=r"lacks a setting.*rate_3|no such setting"):
+        scene_settings(pendulum_chain, tmp_path / "three.toml")
 
 
 def test_energy_is_kept_without_friction(settings):
