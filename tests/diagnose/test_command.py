@@ -106,7 +106,7 @@ def test_the_missing_friction_is_found_and_all_files_are_there(diagnosed):
     code, out, err, folder = diagnosed
     assert code == EXIT["MECHANISM"]
     assert out.index("noise") < out.index("MECHANISM: ")  # the lint comes first
-    assert "crease_friction at crease 0" in out
+    assert "crease_friction at hinge1" in out
     stages = re.findall(r"^ *\d+ s  (\w+)", err, re.M)
     assert stages.index("screen") < stages.index("refit") < stages.index("baselines") < stages.index("replay")
     names = {"report.html", "diagnosis.json", "patched.toml", "replay.rrd"}
@@ -123,7 +123,7 @@ def test_the_patched_calibration_switches_the_effect_on(diagnosed, recorded, tmp
     folder = diagnosed[3]
     settings = read_calibration(folder / "patched.toml")
     (found,) = settings.effects
-    assert (found.effect, found.entities, found.site) == ("crease_friction", (0,), "crease 0")
+    assert (found.effect, found.entities, found.site) == ("crease_friction", (0,), "hinge1")
     assert found.values["friction_moment"] == pytest.approx(FRICTION, rel=0.05)
     low, high = settings["mass_1"].uncertainty or (0, 0)
     assert low < settings.mass_1 < high
@@ -308,7 +308,7 @@ def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypat
     recording = read_recording(recorded).window(0.0, 2.0)
     found = diagnose((module, s), recording, catalogue=["runaway"])
     (row,) = found.screening
-    assert (row.label, row.status) == ("runaway at crease 0", "its simulation goes unstable")
+    assert (row.label, row.status) == ("runaway at hinge1", "its simulation goes unstable")
     forward = Forward(Subject.from_scene(module, s), [recording], segment=0.5)
     every = suspects(forward.model, [recording], forward.drive, forward.parameters)
     suspect = next(x for x in every if x.effect == "runaway")
