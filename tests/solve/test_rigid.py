@@ -421,3 +421,31 @@ def test_an_arch_of_rigid_panels_held_at_both_ends_sags_to_rest():
     slopes = -links[:, 2] / links[:, 0]  # tangents of a hanging chain of equal weights fall by equal steps
     assert np.diff(slopes) == pytest.approx(np.diff(slopes)[0], rel=1e-6)
     assert slopes[0] == pytest.approx(-slopes[-1], rel=1e-6) and slopes[0] > 0.5
+
+
+@pytest.mark.parametrize("case", ["chain", "loop", "ground"])
+def test_the_gpu_follows_the_cpu(cuda, case):
+    """Only the compilers' rounding differs, which no step's error estimate sees."""
+    options = {"duration": 0.5, "rate": 50.0, "dt": 2e-3}
+    if case == "chain":
+        model, parameters = hanging().crease(stiffness=2e-3).set("crease_friction", friction_moment=1e-4).build()
+        state = State.join([folded(model, [a, 0.3]) for a in (0.2, 1.0, 1.9)])
+    elif case == "loop":
+        sheet = Sheet(miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.8), thickness=5e-4, panels="rigid")
+        model, parameters = sheet.crease(stiffness=1e-3).build()
+        parameters.set("crease", "rest_angle", 1.2 * parameters["crease", "rest_angle"])
+        state = State.at_rest(model, 3)
+    else:
+        sheet = Sheet(strip([0.03, 0.03], 0.03), thickness=2e-3, panels="rigid").crease(stiffness=2e-3).gravity()
+        for corner in ((0, -0.015, 0), (0, 0.015, 0), (0.06, -0.015, 0), (0.06, 0.015, 0)):
+            sheet.contact(0 if corner[0] == 0 else 1, corner)
+        sheet.set("ground", stiffness=500.0, damping=0.5).set("friction", stiffness=500.0, damping=0.5)
+        model, parameters = sheet.set("coulomb", friction_coefficient=0.3).build()
+        state = State.at_rest(model, 3)
+        options["dt"] = 1e-4
+    one, two = (simulate(model, parameters, state=state, **options, device=d) for d in ("cpu", cuda))
+    assert not one.failures and not two.failures
+    assert np.ptp(one.x, axis=0).max() > 1e-4
+    assert np.abs(one.x - two.x).max() <= 1e-9 * np.ptp(one.x, axis=(0, 1, 2)).max()
+    adaptive = [simulate(model, parameters, state=state, duration=0.2, rate=50.0, device=d) for d in ("cpu", cuda)]
+    assert np.abs(adaptive[0].x - adaptive[1].x).max() <= 1e-7 * np.ptp(one.x, axis=(0, 1, 2)).max()
