@@ -20,10 +20,10 @@ from origami_sim.scene import scene_settings
 from origami_sim.solve.rigid import TOLERANCE, batch_of
 from origami_sim.solve.timestep import stable_step
 
-WORLDS, SECONDS, FRAME = 8, 0.5, 4e-3
+WORLDS, SECONDS, FRAME = 8, 0.5, 2e-2
 
-ERROR, LOOSE = 1e-3, 1e-7
-"""Error that bars are stiffened to [rad], and a tolerance of rigid panels that makes no larger one."""
+ERROR, LOOSE = 1e-3, 10.0 ** -np.arange(3, 9)
+"""Error that bars are stiffened to [rad]; tolerances of rigid panels: the first with no larger error is timed."""
 
 
 def double_chain():
@@ -99,7 +99,10 @@ def main():
                 break
             for owner in ("bars", "panel_bending"):
                 stiff.set(owner, "stiffness", stiff[owner, "stiffness"] * error(bars, exact) / ERROR)
-        found, by_bodies = rolled(body, own, drive, state, tolerance=LOOSE)
+        for loose in LOOSE:
+            found, by_bodies = rolled(body, own, drive, state, tolerance=loose)
+            if error(found, exact) <= error(bars, exact):
+                break
         tight, default = rolled(body, own, drive, state, tolerance=TOLERANCE)
         rows.append(
             [
@@ -107,15 +110,16 @@ def main():
                 f"{stable_step(model, stiff).dt * 1e6:.1f}",
                 f"{by_bars * 1e3:.1f}",
                 f"{error(bars, exact):.1e}",
-                f"{by_bodies * 1e3:.1f}",
+                f"{loose:.0e}",
+                f"{by_bodies * 1e3:.2f}",
                 f"{error(found, exact):.1e}",
                 f"{by_bars / by_bodies:.0f}",
                 f"{default * 1e3:.1f}",
                 f"{error(tight, exact):.1e}",
             ]
         )
-    head = ["device", "step of bars [us]", "bars [ms/s]", "error [rad]", "rigid [ms/s]", "error [rad]", "bars : rigid"]
-    head += ["rigid, default [ms/s]", "error [rad]"]
+    head = ["device", "step of bars [us]", "bars [ms/s]", "error [rad]", "tolerance", "rigid [ms/s]", "error [rad]"]
+    head += ["bars : rigid", "rigid, default [ms/s]", "error [rad]"]
     print(table("rigid panels against bars, one core", tuple(head), rows))
 
 
