@@ -91,6 +91,10 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
     p.add_argument("--panels", choices=("elastic", "rigid"), help="bars and bending lines, or rigid bodies on hinges")
+    p.add_argument(
+        "--quasistatic", action="store_true", help="equilibria along time, without inertia: creep, slow drives"
+    )
+    p.add_argument("--until", type=float, metavar="SECONDS", help="of a quasi-static motion: hold it on until then")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
 
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
@@ -263,6 +267,7 @@ def _run(args) -> int:
     module = scene_module(args.scene)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
+    settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
     if args.settings:
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})
@@ -507,12 +512,13 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
                 "folder": str(folder),
                 "dt": outcome.trajectory.dt,
                 "failures": [str(f) for f in outcome.trajectory.failures],
+                "notes": outcome.trajectory.notes,
             }
         )
         return
     for table in outcome.tables.values():
         print(format_table(table, outcome.units or _units(outcome.tables)))
-    for sentence in outcome.summary:
+    for sentence in [*outcome.summary, *outcome.trajectory.notes]:
         print(sentence)
     print(f"{outcome.trajectory.step}; {outcome.trajectory.wall:.1f} s of computing; run folder: {folder}")
 

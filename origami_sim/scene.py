@@ -18,9 +18,10 @@ import numpy as np
 from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, State
 from origami_sim.recording.units import UNITS
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.solve.quasistatic import quasistatic
 from origami_sim.solve.statics import equilibrium
 
 if TYPE_CHECKING:
@@ -59,14 +60,26 @@ class Settings(Mapping[str, Setting]):
     """The settings of a calibration; values are attributes: settings.gap."""
 
     def __init__(
-        self, settings: Sequence[Setting], file: Path, effects: "Sequence[Addition]" = (), panels: str | None = None
+        self,
+        settings: Sequence[Setting],
+        file: Path,
+        effects: "Sequence[Addition]" = (),
+        panels: str | None = None,
+        motion: str | None = None,
+        until: float | None = None,
     ):
         self._settings = {s.name: s for s in settings}
-        self.file, self.panels = file, panels
+        self.file, self.panels, self.motion, self.until = file, panels, motion, until
         self.effects = tuple(effects)
         """Effects that the calibration adds to those of the scene."""
         if panels not in (None, "elastic", "rigid"):
             raise InputError("no such panels", file=file, field="panels", value=panels, allowed="elastic, rigid")
+        if motion not in (None, "dynamic", "quasistatic"):
+            raise InputError("no such motion", file=file, field="motion", value=motion, allowed="dynamic, quasistatic")
+        if until is not None and not (motion == "quasistatic" and until > 0 and np.isfinite(until)):
+            raise InputError(
+                "only a quasi-static motion is held on", field="until", value=until, allowed="> 0 s, and --quasistatic"
+            )
 
     def __getitem__(self, name: str) -> Setting:
         return self._settings[name]
@@ -92,11 +105,19 @@ class Settings(Mapping[str, Setting]):
             )
         for name in values:
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
-        return Settings(out, self.file, self.effects, self.panels)
+        return self._with(out)
 
     def with_panels(self, panels: str | None) -> "Settings":
         """A copy for a device with "rigid" or "elastic" panels (None: as the scene builds them)."""
-        return Settings(list(self.values()), self.file, self.effects, panels)
+        return self._with(panels=panels)
+
+    def with_motion(self, motion: str | None, until: float | None = None) -> "Settings":
+        """A copy for a "dynamic" or "quasistatic" motion (None: dynamic), the latter held on `until` [s]."""
+        return self._with(motion=motion, until=until)
+
+    def _with(self, settings: Sequence[Setting] | None = None, **changed) -> "Settings":
+        kept = {n: getattr(self, n) for n in ("file", "effects", "panels", "motion", "until")}
+        return Settings(list(self.values()) if settings is None else settings, **{**kept, **changed})
 
     def override(self, assignments: Sequence[str], source: str | Path | None = None) -> "Settings":
         """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI.
@@ -104,8 +125,8 @@ class Settings(Mapping[str, Setting]):
         Errors name the `source` of the assignments (default: the file of the settings).
         """
         if source is not None:
-            changed = Settings(list(self.values()), Path(source), self.effects, self.panels).override(assignments)
-            return Settings(list(changed.values()), self.file, self.effects, self.panels)
+            changed = self._with(file=Path(source)).override(assignments)
+            return self._with(list(changed.values()))
         values = {}
         for text in assignments:
             name, equals, given = (part.strip() for part in text.partition("="))
@@ -169,7 +190,7 @@ def read_calibration(source: str | Path) -> Settings:
 
     Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
     `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`), and the
-    word `panels` ("rigid", "elastic") says how its panels move.
+    words `panels` ("rigid", "elastic") and `motion` ("dynamic", "quasistatic") say how it moves.
 
     Raises:
         InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range, an effect or a
@@ -191,8 +212,8 @@ def read_calibration(source: str | Path) -> Settings:
         from origami_sim.diagnose.patch import read_additions
 
         additions = read_additions(data.pop("effects"), path)
-    panels = data.pop("panels", None)
-    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, panels)
+    panels, motion = data.pop("panels", None), data.pop("motion", None)
+    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, panels, motion)
 
 
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
@@ -326,6 +347,9 @@ class Outcome:
 
 Progress = Callable[[float], None]
 
+HELD = 60
+"""Frames of a quasi-static motion after the end of a scene's own: 17 per decade up to an hour after a second."""
+
 
 def follow(
     model: Model, parameters: Parameters, drives: Sequence[Drive], measure: Callable[[np.ndarray], np.ndarray | float]
@@ -347,6 +371,42 @@ def follow(
             notes.append(f"no equilibrium in row {n + 1} of the table: {found.message}")
         values.append(value)
     return np.array(values), notes
+
+
+def motion_of(
+    s: Settings,
+    model: Model,
+    parameters: Parameters,
+    drive: Drive,
+    *,
+    duration: float,
+    rate: float,
+    progress: Progress | None = None,
+    state: State | None = None,
+    **options,
+) -> Trajectory:
+    """The motion that a scene shows: `simulate`, or `quasistatic` where its settings ask for that.
+
+    A quasi-static motion that is held on after the scene's `duration` [s] has frames at even ratios of time from there.
+
+    Raises:
+        InputError: what `simulate` and `quasistatic` refuse; a time step given for a quasi-static motion.
+    """
+    if s.motion != "quasistatic":
+        return simulate(
+            model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state, **options
+        )
+    if options:
+        raise InputError(
+            "equilibria along time take no such option", field="motion", value="quasistatic", allowed="dynamic"
+        )
+    end = s.until or duration
+    times = np.arange(round(duration * rate) + 1) / rate
+    if end < times[-1]:
+        times = np.append(times[times < end * (1 - 1e-9)], end)
+    elif end > times[-1]:
+        times = np.concatenate([times, np.geomspace(times[-1], end, HELD + 1)[1:]])
+    return quasistatic(model, parameters, drive, times, state=state, progress=progress)
 
 
 def scene_module(name: str) -> ModuleType:

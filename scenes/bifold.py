@@ -27,8 +27,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 from origami_sim.solve.statics import equilibrium
 
 CALIBRATION = "bifold"
@@ -301,7 +300,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
                 notes.append(f"{support}, underlayer of {modulus / 1e6:g} MPa: {found.message}")
 
     model, parameters, drive = build(s.replace(**COARSE))
-    motion = simulate(model, parameters, drive, duration=float(SCHEDULE[-1]), rate=100, progress=progress)
+    motion = motion_of(s, model, parameters, drive, duration=float(SCHEDULE[-1]), rate=100, progress=progress)
     folds = np.degrees(fold_angles(model, motion.x[:, :, 0]))
     at = {"voltage": SCHEDULE[2], "field": SCHEDULE[5], "both": SCHEDULE[-1]}
     ends = {name: folds[int(np.argmin(np.abs(motion.times - t)))] for name, t in at.items()}

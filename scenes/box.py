@@ -13,8 +13,7 @@ from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, read_calibration
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of, read_calibration
 
 CALIBRATION = "box"
 FIELDS = np.array([0.010, 0.020, 0.050, 0.100, 0.150, 0.200])
@@ -125,7 +124,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     angles, notes = flap_angles(s, FIELDS)
     statics = np.degrees(angles)
     model, parameters, signals = build(s)
-    motion = simulate(model, parameters, signals, duration=3.0, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=3.0, rate=60, progress=progress)
     final = np.degrees(inclination(motion.x[-1, :, 0], pattern(s).faces))
     table, numbers = {"field_mT": FIELDS * 1e3, "flap_deg": statics.mean(1)}, {"flap_deg": float(final.mean())}
     if is_reference(s, CALIBRATION, besides={"field"}):

@@ -13,8 +13,8 @@ from origami_sim.materials import layered_rigidity, material
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
 from origami_sim.regression import stride_table
-from origami_sim.scene import Outcome, Progress, Settings
-from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.scene import Outcome, Progress, Settings, motion_of
+from origami_sim.solve.dynamics import Trajectory
 
 CALIBRATION = "crawler"
 REGIONS = ("middle", "big end", "small end")
@@ -108,8 +108,8 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
 def walk(s: Settings, *, cycles: int, rate: float = 60.0, progress: Progress | None = None, **options) -> Trajectory:
     """Simulates so many cycles of the field."""
     model, parameters, drive = build(s)
-    return simulate(model, parameters, drive, duration=cycles / s.frequency, rate=rate * s.frequency, progress=progress,
-                    **options)  # fmt: skip
+    lasting = {"duration": cycles / s.frequency, "rate": rate * s.frequency}
+    return motion_of(s, model, parameters, drive, **lasting, progress=progress, **options)
 
 
 def run(s: Settings, progress: Progress | None = None) -> Outcome:

@@ -16,8 +16,7 @@ from origami_sim.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "crease_coupon"
 
@@ -38,7 +37,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     angles = np.radians(np.linspace(-90, 90, 13))
     moments = s.stiffness * (angles - s.rest_angle)
     rest, notes = follow(model, parameters, [drive], lambda x: dihedral_angles(x, model.creases)[0])
-    motion = simulate(model, parameters, drive, duration=1.0, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, drive, duration=1.0, rate=60, progress=progress)
     return Outcome(
         motion,
         {"moment": {"angle_deg": np.degrees(angles), "moment_mNm": 1e3 * moments}},

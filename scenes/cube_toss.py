@@ -30,8 +30,7 @@ from scipy.spatial.transform import Rotation
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.scene import Outcome, Progress, Settings
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "cube_toss"
 
@@ -154,7 +153,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """One toss."""
     model, parameters, drive = build(s)
     start = tossed(s, model)
-    motion = simulate(model, parameters, drive, duration=s.duration, rate=148.0, state=start, progress=progress)
+    motion = motion_of(s, model, parameters, drive, duration=s.duration, rate=148.0, state=start, progress=progress)
     centre = motion.centre_of_mass()[:, 0]
     every = slice(None, None, 10)
     table = {"time_s": motion.times[every], "height_m": centre[every, 2], "lowest_m": motion.gaps[every, :, 0].min(1)}

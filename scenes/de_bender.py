@@ -31,8 +31,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 
 CALIBRATION = "de_bender"
 VOLTAGES = np.array([500.0, 1000.0, 2000.0, 3000.0, 4000.0])
@@ -323,7 +322,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     if known is not None and is_reference(s, CALIBRATION, besides={"tape_layers", "gravity"}):
         table["reference_r_over_l"] = known
     model, parameters, signals = build(s, hinges=s.motion_hinges)
-    motion = simulate(model, parameters, signals, duration=2.0, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=2.0, rate=60, progress=progress)
     rest, _, _ = settle((model, parameters, signals), [])
     final = float(np.linalg.norm((motion.x[-1, -2:, 0] - rest[-2:]).mean(axis=0)) / s.length)
     power = exponent(voltages, table["curvature_per_m"])

@@ -15,8 +15,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Outcome, Progress, Settings, is_reference, read_calibration
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, is_reference, motion_of, read_calibration
 
 from .de_bender import Segment, chain, exponent, inclinations, settle
 
@@ -128,7 +127,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         table |= {f"reference_{k}": v for k, v in REFERENCE.items()}
     power = exponent(voltages, table["notch_deg"])
     model, parameters, signals = build(s, hinges=s.motion_hinges)
-    motion = simulate(model, parameters, signals, duration=2.0, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=2.0, rate=60, progress=progress)
     final = float(np.degrees(turns(segments(s, s.motion_hinges), motion.x[-1, :, 0])[1]))
     notch, arms = float(table["notch_deg"][-1]), float(table["arms_deg"][-1])
     return Outcome(

@@ -20,8 +20,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.scene import Outcome, Progress, Settings
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "falling_ball"
 
@@ -94,7 +93,9 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     """The fall, beside its closed form."""
     model, parameters, drive = build(s)
     start = State.at_rest(model, position=np.array([[0.0, 0.0, s.height]]))
-    motion = simulate(model, parameters, drive, duration=s.duration, rate=60.0, dt=1e-3, state=start, progress=progress)
+    motion = motion_of(
+        s, model, parameters, drive, duration=s.duration, rate=60.0, dt=1e-3, state=start, progress=progress
+    )
     height = motion.x[:, 0, 0, 2]
     every = slice(None, None, 30)
     table: dict[str, np.ndarray | list] = {

@@ -15,8 +15,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.mesh import FORMATS as MESHES
-from origami_sim.scene import Outcome, Progress, Settings
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "fold_file"
 
@@ -62,7 +61,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive, np.ndarray]:
 def run(s: Settings, progress: Progress | None = None) -> Outcome:
     pattern = load(s)
     model, parameters, drive, target = build(s)
-    motion = simulate(model, parameters, drive, duration=s.fold_time + s.hold_time, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, drive, duration=s.fold_time + s.hold_time, rate=60, progress=progress)
     final = motion.creases[-1, :, 0]
     error = np.degrees(final - target)
     lengths = np.linalg.norm(model.position[model.bars[:, 1]] - model.position[model.bars[:, 0]], axis=1)

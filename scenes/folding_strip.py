@@ -17,8 +17,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 
 CALIBRATION = "folding_strip"
 SHARES = np.array([0.1, 0.25, 0.5, 1.0])
@@ -124,7 +123,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
     angles, notes = table(s)
     model, parameters, signals = build(s)
     duration = {"cycle": TIMES[-1], "ramp": 2.5, "oscillate": 4 / s.frequency}[s.mode]
-    motion = simulate(model, parameters, signals, duration=duration, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=duration, rate=60, progress=progress)
     creases = np.degrees(np.abs(motion.creases[:, :, 0]))
     drift = np.linalg.norm(np.ptp(motion.centre_of_mass()[:, 0], axis=0))
     return Outcome(

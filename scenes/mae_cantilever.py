@@ -21,8 +21,7 @@ from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.materials import MU0
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow
-from origami_sim.solve.dynamics import simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "mae_cantilever"
 SHARES = np.array([0.1, 0.2, 0.3, 0.5, 0.75, 1.0])
@@ -121,7 +120,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
         table["difference_percent"] = 100 * (table["r_over_l"] / REFERENCE - 1)
     study = mesh_study(s)
     model, parameters, signals = build(s.replace(cells=s.motion_cells))
-    motion = simulate(model, parameters, signals, duration=2.0, rate=60, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=2.0, rate=60, progress=progress)
     last, final = table["r_over_l"][-1], shape(motion.x[-1, :, 0], s.length)["r_over_l"]
     return Outcome(
         motion,

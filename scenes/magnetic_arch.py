@@ -26,8 +26,8 @@ from origami_sim.errors import InputError
 from origami_sim.materials import MU0
 from origami_sim.model import Model, Parameters, State
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, recordings_folder
-from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.scene import Outcome, Progress, Settings, motion_of, recordings_folder
+from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.statics import Path, continuation, equilibrium
 
 CALIBRATION = "magnetic_arch"
@@ -238,7 +238,7 @@ def move(s: Settings, *, progress: Progress | None = None) -> tuple[Trajectory, 
     duration = {"ramp": s.rise_time, "step": s.step_time}.get(s.mode, s.loop_time)
     rate = min(RATE, max(100.0, 1000 / duration))
     duration = np.floor(duration * rate * (1 + 1e-12)) / rate  # whole frames within the drive
-    motion = simulate(model, parameters, signals, duration=duration, rate=rate, state=state, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=duration, rate=rate, state=state, progress=progress)
     height = midspan(motion.x[:, :, 0])
     return motion, height[0] - height
 

@@ -20,8 +20,8 @@ from origami_sim.errors import InputError
 from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern.assemble import assemble
-from origami_sim.scene import Outcome, Progress, Settings, follow
-from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
+from origami_sim.solve.dynamics import Trajectory
 
 CALIBRATION = "multi_field_sheet"
 SHAPES = {"magnetic": "stair step", "electric": "accordion", "thermal": "roll"}
@@ -321,7 +321,7 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
             )
     model, parameters, signals = build(s)
     duration = sum(schedule(s, f)[0][-1] for f in fields(s))
-    motion = simulate(model, parameters, signals, duration=duration, rate=30, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=duration, rate=30, progress=progress)
     for row, (after, left) in zip(rows, flat_again(s, motion).values(), strict=True):
         row |= {"flat_after_s": after, "left_deg": np.degrees(left)}
         numbers[f"{row['field']}_flat_after_s"] = after

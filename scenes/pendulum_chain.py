@@ -15,7 +15,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import observe, panel_angle
 from origami_sim.pattern import strip
 from origami_sim.recording import Recording, initial_angles
-from origami_sim.scene import Outcome, Progress, Settings
+from origami_sim.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.solve.dynamics import Trajectory, simulate
 
 CALIBRATION = "pendulum_chain"
@@ -142,8 +142,8 @@ def replicate(s: Settings, recording: Recording, progress: Progress | None = Non
 def swing(s: Settings, *, rate: float = 1000.0, progress: Progress | None = None, **options) -> Trajectory:
     """Simulates `duration` of free swing."""
     model, parameters, drive = build(s)
-    return simulate(
-        model, parameters, drive, duration=s.duration, rate=rate, state=start(s, model), progress=progress, **options
+    return motion_of(
+        s, model, parameters, drive, duration=s.duration, rate=rate, state=start(s, model), progress=progress, **options
     )
 
 

@@ -186,6 +186,39 @@ def test_progress_is_shown_only_to_somebody_who_watches(capsys, monkeypatch):
     assert re.search(r"100 % in [\d.]+ s\n$", shown)
 
 
+@pytest.mark.parametrize("panels", ["rigid", "elastic"])
+def test_a_run_may_follow_equilibria_for_an_hour(call, tmp_path, panels):
+    """A crease that relaxes swings to its rest angle as a standard linear solid does, without inertia."""
+    own = read_calibration("crease_coupon")
+    branch, time = 0.5 * own.stiffness, 200.0
+    file = tmp_path / "creeping.toml"
+    file.write_text(
+        'motion = "quasistatic"\n'
+        + own.file.read_text()
+        + f"\n[[effects.crease_relaxation]]\nstiffness_1 = {branch}\ntime_1 = {time}\n"
+    )
+    code, out, err = call("run", "crease_coupon", "--calibration", file, "--panels", panels, "--until", 3600)
+    assert code == 0 and not err
+    assert "Quasi-static: 121 frames" in out and "equilibria along time" in out
+    run = load_run(tmp_path / "runs" / "crease_coupon")
+    assert run.trajectory.times[[0, 60, -1]] == pytest.approx([0.0, 1.0, 3600.0])
+    left = branch / (own.stiffness + branch) * np.exp(-run.trajectory.times / time / (1 + branch / own.stiffness))
+    assert run.trajectory.creases[:, 0, 0] == pytest.approx(own.rest_angle * (1 - left), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("run", "mae_crease", "--until", "10"), "only a quasi-static motion is held on"),
+        (("run", "mae_crease", "--quasistatic", "--until", "-1"), "only a quasi-static motion is held on"),
+        (("run", "falling_ball", "--quasistatic"), "take no such option"),
+    ],
+)
+def test_what_no_quasi_static_run_can_do_is_refused(call, arguments, sentence):
+    code, _, err = call(*arguments)
+    assert code == 2 and sentence in err
+
+
 # exit codes --------------------------------------------------------------------------------------------------------
 
 

@@ -24,7 +24,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.settling import Settling, levels, settling
-from origami_sim.solve.timestep import stable_step
+from origami_sim.solve.timestep import AT_REST, TimeStep
 
 TOLERANCE = 1e-5
 """Error of one step, as a part of the device's size; ten times less costs about twice the steps."""
@@ -328,7 +328,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
         contact_forces=sum((forces[n] for n in contact), zero),
         failures=march.failures,
         dt=float(np.diff(times).min(initial=np.inf)) if len(times) > 1 else 0.0,
-        step=stable_step(model, parameters),
+        step=TimeStep(np.inf, np.inf, 0, AT_REST),
         state=states[-1],
         wall=wall,
         jumps=march.jumps,

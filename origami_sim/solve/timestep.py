@@ -15,6 +15,9 @@ SAFETY = 0.8
 RIGID = "rigid panels"
 """Cause of a step that has no bound, because the solver adapts it."""
 
+AT_REST = "equilibria along time"
+"""Likewise, of a quasi-static motion."""
+
 SCALINGS, SETTLED = 20, 0.01
 """Scalings of the nodes that are tried at most for a closer bound; relative gain below which there are enough."""
 
@@ -35,8 +38,8 @@ class TimeStep:
     cause: str
 
     def __str__(self):
-        if self.cause == RIGID:
-            return f"each step by its error ({RIGID})"
+        if self.cause in (RIGID, AT_REST):
+            return f"each step by its error ({self.cause})"
         if np.isinf(self.limit):
             return "nothing limits the time step"
         limit = f"{SAFETY:g} of the limit {self.limit:.3g} s set at node {self.node} by {self.cause}"
