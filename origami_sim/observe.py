@@ -198,15 +198,14 @@ def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
 def body_point(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
     """The point of the body that carries a marker: (F, 3) [m], for positions x [F, N, 3].
 
-    Attached to a `node`, or to a `panel` with `point` = its offset from the panel's centroid in the reference state, in
-    the reference axes: it moves with the triangle of the panel on which it lies, or nearest to which it lies. `height`
-    lifts it above the mid-plane along the normal, that of the triangle or the mean around the node.
+    Attached to a `node`, or to a `panel` at a point of it, see `panel_point`: it moves with the triangle of the panel
+    on which it lies, or nearest to which it lies. `height` lifts it above the mid-plane along the normal, that of the
+    triangle or the mean around the node.
     """
     height = float(channel.attachment.get("height", 0.0))
     if "panel" in channel.attachment:
         panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
-        offset = np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float)
-        nodes, weights, lift = _on_panel(model, panel, offset)
+        nodes, weights, lift = _on_panel(model, panel, panel_point(model, channel, panel))
         corners = x[:, nodes]
         return np.einsum("k,fkc->fc", weights, corners) + (lift + height) * _normals(corners)
     node = _index(model, channel, "node", len(model.position))
@@ -220,6 +219,39 @@ def body_point(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
     return x[:, node] + height * doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
 
 
+def panel_point(model: Model, channel: Channel, panel: int) -> np.ndarray:
+    """Where a channel's point lies in the reference state (3,) [m].
+
+    `point` is its offset from the panel's centroid in the reference axes. Or it is measured from a crease of the panel,
+    `from`: at `distance` from it into the panel, and `along` it from its middle, to the right for who looks from it
+    into the panel with the panel's upper side up. Such a point stays where it is on the body when a length is refitted.
+
+    Raises:
+        InputError: a crease that the model lacks or that is not the panel's.
+    """
+    triangles = model.triangles[model.triangle_panel == panel]
+    corners = model.position[triangles]
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    centroid = np.average(corners.mean(axis=1), axis=0, weights=np.linalg.norm(doubled, axis=1))
+    if "from" not in channel.attachment:
+        return centroid + np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float)
+    given = channel.attachment["from"]
+    ends = model.creases[_find(model, channel, "crease", given, len(model.creases), key="from"), 1:3]
+    if not set(ends.tolist()) <= set(np.unique(triangles).tolist()):
+        raise InputError(
+            "the panel does not have this crease", field=f"channels.{channel.name}.from", value=given,
+            allowed="a crease of the panel on which the marker is",
+        )  # fmt: skip
+    start, end = model.position[ends]
+    hinge = (end - start) / np.linalg.norm(end - start)
+    normal = doubled.sum(axis=0) / np.linalg.norm(doubled.sum(axis=0))
+    into = np.cross(normal, hinge)
+    into = into * np.sign(into @ (centroid - start))
+    right = np.cross(into, normal)
+    attached = channel.attachment
+    return 0.5 * (start + end) + float(attached["distance"]) * into + float(attached.get("along", 0.0)) * right
+
+
 def body_axes(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
     """The model's axes x, y, z as the triangle under a marker has turned them, as the channel sees directions.
 
@@ -228,7 +260,7 @@ def body_axes(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
     """
     if "panel" in channel.attachment:
         panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
-        nodes = _on_panel(model, panel, np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float))[0]
+        nodes = _on_panel(model, panel, panel_point(model, channel, panel))[0]
     else:
         node = _index(model, channel, "node", len(model.position))
         around = np.flatnonzero((model.triangles == node).any(axis=1))
@@ -349,17 +381,18 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
 
 def _check_point(model: Model, channel: Channel) -> None:
     """Refuses a point that lies too far off its panel to be one of it."""
-    if "panel" not in channel.attachment or "point" not in channel.attachment:
+    key = next((k for k in ("point", "distance") if k in channel.attachment), None)
+    if "panel" not in channel.attachment or key is None:
         return
     panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
-    nodes = model.triangles[model.triangle_panel == panel]
-    size = float(np.linalg.norm(np.ptp(model.position[nodes].reshape(-1, 3), axis=0)))
-    far = float(np.linalg.norm(channel.attachment["point"]))
+    corners = model.position[np.unique(model.triangles[model.triangle_panel == panel])]
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    far = float(np.linalg.norm(panel_point(model, channel, panel) - corners.mean(axis=0)))
     if far > FAR * size:
         raise InputError(
             f"the point is {far:.3g} m off the middle of a panel of {size:.3g} m",
-            field=f"channels.{channel.name}.point",
-            value=channel.attachment["point"],
+            field=f"channels.{channel.name}.{key}",
+            value=channel.attachment[key],
             allowed=f"up to {FAR * size:.3g} m (millimetres read as metres?)",
         )
 
@@ -469,15 +502,11 @@ def _normals(corners: np.ndarray) -> np.ndarray:
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def _on_panel(model: Model, panel: int, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _on_panel(model: Model, panel: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Nodes (3,) of the triangle under a point of a panel, its weights (3,) on them, and its height above it [m]."""
     triangles = model.triangles[model.triangle_panel == panel]
     corners = model.position[triangles]
-    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    doubled = np.cross(*edges)
-    areas = np.linalg.norm(doubled, axis=1)
-    centroid = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    point = centroid + offset
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     best, chosen = -np.inf, None
     for nodes, corner, area in zip(triangles, corners, doubled, strict=True):
         square = float(area @ area)
@@ -495,7 +524,7 @@ def _index(model: Model, channel: Channel, family: str, count: int) -> int:
     return _find(model, channel, family, channel.attachment.get(family), count)
 
 
-def _find(model: Model, channel: Channel, family: str, given: object, count: int) -> int:
+def _find(model: Model, channel: Channel, family: str, given: object, count: int, key: str = "") -> int:
     names = model.names.get(family, ())
     if isinstance(given, str) and names.count(given) == 1:
         return names.index(given)
@@ -507,7 +536,7 @@ def _find(model: Model, channel: Channel, family: str, given: object, count: int
         else "the model has nothing of that name"
         if given is not None
         else f"a {channel.kind} needs a {family}",
-        field=f"channels.{channel.name}.{family}",
+        field=f"channels.{channel.name}.{key or family}",
         value=given,
         allowed=", ".join(n for n in names if names.count(n) == 1) or f"0 to {count - 1}",
     )

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.observe import channel_frames, check_scene, follow, observe, observe_equilibria
+from origami_sim.observe import body_point, channel_frames, check_scene, follow, observe, observe_equilibria
 from origami_sim.recording import Camera, Channel, Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import pendulum_chain
@@ -297,3 +297,28 @@ def test_each_channel_has_errors_of_its_own(motion):
         np.testing.assert_allclose(found[f"c{c}"], motion.creases[:40, c, 0] + zero, atol=1e-12)
     with pytest.raises(InputError, match="another model"):
         parameters.for_model(replace(model, channels=3))
+
+
+@pytest.mark.parametrize("length", [0.172719, 0.2])
+def test_a_marker_measured_from_a_hinge_does_not_move_when_the_length_is_refitted(length):
+    """45 mm below the hinge and 3 mm to the right of its middle, seen with the panel's upper side up."""
+    s = read_calibration(pendulum_chain.CALIBRATION).replace(length_1=length)
+    model = pendulum_chain.build(s)[0]
+    given = channel("marker", np.zeros((2, 3)), unit="m", panel="arm1", **{"from": "hinge1", "distance": 0.045})
+    found = body_point(model, model.position[None], given)[0]
+    np.testing.assert_allclose(found, [0.0, 0.0, -pendulum_chain.MOUNT - 0.045], atol=1e-12)
+    corners = model.position[model.triangles[model.triangle_panel == 1][0]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.linalg.norm(normal)
+    given.attachment["along"] = 0.003
+    moved = body_point(model, model.position[None], given)[0] - found
+    np.testing.assert_allclose(moved, 0.003 * np.cross([0.0, 0.0, -1.0], normal), atol=1e-12)
+    below = channel("marker", np.zeros((2, 3)), unit="m", panel="arm1", **{"from": "hinge2", "distance": 0.01})
+    found = body_point(model, model.position[None], below)[0]
+    np.testing.assert_allclose(found, [0.0, 0.0, -pendulum_chain.MOUNT - length + 0.01], atol=1e-12)
+    wrong = channel("marker", np.zeros((2, 3)), unit="m", panel="arm2", **{"from": "hinge1", "distance": 0.01})
+    with pytest.raises(InputError, match=r"does not have this crease.*channels\.c\.from.*hinge1"):
+        body_point(model, model.position[None], wrong)
+    far = replace(given, attachment=given.attachment | {"distance": 45.0})
+    with pytest.raises(InputError, match=r"off the middle of a panel.*channels\.c\.distance.*45"):
+        check_scene(recording([0.0, 0.1], far), model)

@@ -55,6 +55,9 @@ def run(args: Namespace) -> int:
     if replaced and set(replaced) != {r.name for r in data}:
         say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
     for recording in data:
+        if recording.gravity or recording.start:
+            key = "gravity" if recording.gravity else "start"
+            raise InputError("is not used in a diagnosis yet", file=recording.metadata.get("sidecar"), field=key)
         say(lint_report(recording))
     for note in data.notes:
         say(f"note: {note}")

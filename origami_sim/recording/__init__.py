@@ -10,6 +10,7 @@ from origami_sim.recording.reader import read_recording
 from origami_sim.recording.recording import Channel, DriveChannel, Recording, estimate_noise
 from origami_sim.recording.rigid_pendulum import DoublePendulum, double_pendulum_rhs, simulate_double_pendulum
 from origami_sim.recording.stand_in import stand_in_double_pendulum
+from origami_sim.recording.stated import Gravity, Start
 
 __all__ = [
     "AngleEstimate",
@@ -18,9 +19,11 @@ __all__ = [
     "DataSet",
     "DoublePendulum",
     "DriveChannel",
+    "Gravity",
     "NoiseReport",
     "Recording",
     "Series",
+    "Start",
     "applied_drive",
     "by_component",
     "double_pendulum_rhs",

@@ -233,7 +233,8 @@ def _equal_values(one: Recording, other: Recording) -> bool:
 
 
 def _equal_drives(one: Recording, other: Recording) -> bool:
-    return one.drive.keys() == other.drive.keys() and all(
+    same = (one.gravity, one.start) == (other.gravity, other.start) and one.drive.keys() == other.drive.keys()
+    return same and all(
         d.constant == other.drive[k].constant and np.array_equal(d.values, other.drive[k].values)
         for k, d in one.drive.items()
     )

@@ -42,8 +42,11 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
     table, form = _read_any(path, data, side)
 
     times = side.times(table)
+    if side.start is not None and side.time_base(table) == "step":
+        raise InputError("a quasi-static curve has no start", file=description, field="start", value=side.start.state)
     specs = {name: _with_unit(name, spec, table, side) for name, spec in side.channels.items()}
     cameras = {name: _camera(name, spec, side) for name, spec in specs.items() if spec["camera"] is not None}
+    specs = {name: _with_noise(spec, cameras.get(name)) for name, spec in specs.items()}
     series = {
         name: Series(
             readings=table.stack(spec["columns"]),
@@ -83,6 +86,8 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
             "priors": side.priors,
             **side.free_text,
         },
+        gravity=side.gravity,
+        start=side.start,
     )
 
 
@@ -134,6 +139,15 @@ def _with_unit(name: str, spec: dict, table: Table, side: Sidecar) -> dict:
     else:
         unit_factor(unit, dimension="length", file=side.file, field=field)
     return spec | {"unit": unit}
+
+
+def _with_noise(spec: dict, camera: Camera | None) -> dict:
+    """The channel with its noise in its own unit, which may have been stated in another."""
+    if spec["noise"] is None:
+        return spec
+    value, unit = spec["noise"]
+    own = camera.scale if camera is not None else unit_factor(spec["unit"])
+    return spec | {"noise": value if unit in (None, "px") else value * unit_factor(unit) / own}
 
 
 def _camera(name: str, spec: dict, side: Sidecar) -> Camera:

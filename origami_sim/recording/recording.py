@@ -13,6 +13,7 @@ from origami_sim.recording.camera import Camera
 
 if TYPE_CHECKING:
     from origami_sim.recording.noise import NoiseReport
+    from origami_sim.recording.stated import Gravity, Start
 
 CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
     "panel_angle": ("angle", (1,)),
@@ -120,6 +121,8 @@ class Recording:
         channels: measured channels by name.
         drive: applied inputs by name; empty for a free motion.
         metadata: source file and checksum, scene, notes of the lint, and what else the sidecar tells.
+        gravity: which way it pointed; None: as the model has it.
+        start: how the motion begins at the first frame; None if that is not stated.
     """
 
     name: str
@@ -127,6 +130,8 @@ class Recording:
     channels: dict[str, Channel]
     drive: dict[str, DriveChannel] = field(default_factory=dict)
     metadata: dict = field(default_factory=dict)
+    gravity: "Gravity | None" = None
+    start: "Start | None" = None
 
     def __post_init__(self) -> None:
         for what, text in (("name", self.name), *(("channels", name) for name in self.channels)):
@@ -170,10 +175,15 @@ class Recording:
         return self.only(keep)
 
     def only(self, keep: np.ndarray | slice) -> "Recording":
-        """Some of the frames, on the same time axis; a drive with a clock of its own stays whole."""
+        """Some of the frames, on the same time axis; a drive with a clock of its own stays whole.
+
+        Frames without the first are of a motion that has begun: nothing is known of their start.
+        """
+        times = self.times[keep]
         return replace(
             self,
-            times=self.times[keep],
+            times=times,
+            start=self.start if len(times) and times[0] == self.times[0] else None,
             channels={k: replace(c, values=c.values[keep]) for k, c in self.channels.items()},
             drive={
                 k: d if d.constant or d.times is not None else replace(d, values=d.values[keep])

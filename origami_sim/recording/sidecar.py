@@ -24,12 +24,15 @@
     column = "theta1_rad"               # or columns = ["x", "y", "z"], or track = "name of the tracked point"
     kind = "panel_angle"                # panel_angle, crease_angle, marker, marker_2d, tip_displacement, force, moment
     unit = "rad"                        # of the column; may be left out where the file states its unit of length
-    noise = 1e-4                        # standard deviation in `unit`; estimated from the data when left out
+    noise = 1e-4                        # standard deviation in `unit`, or "0.4 mrad"; estimated when left out
     sign = 1                            # value = sign * (reading - offset)
     offset = 0.0                        # reading at zero, in `unit`, e.g. the encoder zero
     unwrap = false                      # true: remove jumps of whole turns from an angle
     panel = "arm1"                      # what is observed: panel, crease, node, nodes or ground, and
     point = [0.0, 0.0, 0.01]            # on a panel, the body point from its centroid, in the reference axes [m]
+    from = "hinge1"                     # or, in place of the point, measured from a crease of the panel: its
+    distance = "45 mm"                  # distance [m] from it, and where it lies along it: from its middle to the right
+    along = 0.0                         # for who looks from it into the panel, the panel's upper side up [m]
     height = 0.001                      # of a marker above the mid-plane, along the normal [m]
     direction = [0.0, 0.0, 1.0]         # of a force or a displacement of one column
     camera = "side"                     # of a marker_2d; may be left out where there is one camera
@@ -55,7 +58,21 @@
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
     mass_1 = 0.5e-3                     # in the unit of the scene's setting, or "5 %" of its value, or "0.5 mm"
+    "crease.stiffness[hinge1]" = { factor = 1.2 }       # of one crease: as a share ("20 %", a factor), or
+    "crease.rest_angle[hinge1]" = { sd = "0.02 rad" }   # added to what it has
     "clock_delay.clock_delay" = "5 ms"  # of an effect that may act without being a fault: how well it is aligned
+
+    [gravity]                           # optional, of this recording; or gravity = [0.0, 0.0, -9.81]
+    pose = "hanging"                    # hanging, upside down: along or against `down`; lying: along `face`
+    down = [0.0, 0.0, -1.0]             # the model's direction that points down as it hangs
+    face = [1.0, 0.0, 0.0]              # the model's direction that points down as it lies
+    size = 9.81                         # [m/s^2]; that of the model when left out
+
+    [start]                             # optional; or start = "moving"
+    state = "released"                  # released (at rest), equilibrium (in the first frame's drive), moving
+    angles = { hinge1 = "20 deg" }      # fold angles at release [rad], by crease; others are as recorded
+    sd = "0.01 rad"                     # how well they, or the equilibrium, are known
+    rate_sd = "0.01 rad/s"              # and how well that it rests
 
 Any other key is an error. Units: see `origami_sim.recording.units`.
 """
@@ -64,14 +81,16 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
-from origami_sim.recording.table import LARGEST_NUMBER, Table, first_line, read_bytes
+from origami_sim.recording.section import ATTACHMENT_KEYS, Section
+from origami_sim.recording.stated import Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
+from origami_sim.recording.table import Table, first_line, read_bytes
 from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
 
@@ -89,12 +108,12 @@ _TOP_KEYS = (
     "drive",
     "scene",
     "priors",
+    "gravity",
+    "start",
 )
 _SOURCE_KEYS = ("format", "likelihood", "axes", "origin", "about")
 _TIME_KEYS = ("column", "unit", "rate_hz")
 _CHANNEL_KEYS = ("column", "columns", "track", "kind", "unit", "noise", "sign", "offset", "unwrap", "camera")
-_CARRIERS = ("panel", "crease", "node", "nodes", "ground")
-_ATTACHMENT_KEYS = (*_CARRIERS, "point", "height", "direction")
 _CAMERA_KEYS = ("origin", "pixel", "right", "up", "rotation", "scale", "height")
 _DRIVE_KEYS = (
     *("column", "columns", "value", "unit", "direction"),
@@ -130,6 +149,8 @@ class Sidecar:
     drive: dict[str, dict[str, Any]]
     scene: dict[str, Any]
     priors: dict[str, float | str]
+    gravity: Gravity | None
+    start: Start | None
 
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
@@ -138,17 +159,17 @@ class Sidecar:
             tree = tomllib.loads(read_bytes(path).decode("utf-8"))
         except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise InputError(f"is no valid TOML: {first_line(error)}", file=path) from error
-        top = _Section(path, "", tree, _TOP_KEYS)
+        top = Section(path, "", tree, _TOP_KEYS)
         channels = top.table("channels")
         if not channels:
             raise InputError("no channel is described", file=path, field="channels")
-        time = _Section(path, "time.", top.table("time"), _TIME_KEYS)
+        time = Section(path, "time.", top.table("time"), _TIME_KEYS)
         rate = time.number("rate_hz", None)
         if rate is not None and rate <= 0.0:
             raise InputError("the rate must be positive", file=path, field="time.rate_hz", value=rate)
         if "time" in tree and rate is None and "column" not in time.values:
             raise InputError("the time needs a column or a rate_hz", file=path, field="time")
-        scene = _Section(path, "scene.", top.table("scene"), _SCENE_KEYS)
+        scene = Section(path, "scene.", top.table("scene"), _SCENE_KEYS)
         source = _source_spec(path, tree.get("source"))
         cameras = {name: _camera_spec(path, name, table) for name, table in top.table("cameras").items()}
         texts = {key: text for key in ("description", "licence") if (text := top.text(key, None))}
@@ -165,7 +186,9 @@ class Sidecar:
             cameras=cameras,
             drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
             scene={"name": scene.text("name", None), "overrides": scene.table("overrides")} if scene.values else {},
-            priors={name: top.label("priors", name) for name in top.table("priors")},
+            priors={name: prior_spec(top, name) for name in top.table("priors")},
+            gravity=gravity_spec(path, tree.get("gravity")),
+            start=start_spec(path, tree.get("start")),
         )
 
     @property
@@ -210,9 +233,9 @@ class Sidecar:
 def _source_spec(path: Path, given: object) -> dict[str, Any]:
     """What the sidecar tells about the file; `axes` becomes a matrix (3, 3), or None."""
     if given is None or isinstance(given, str):
-        section = _Section(path, "", {} if given is None else {"source": given}, ("source",))
+        section = Section(path, "", {} if given is None else {"source": given}, ("source",))
         return {"format": None, "likelihood": None, "axes": None, "origin": None, "about": section.text("source", None)}
-    section = _Section(path, "source.", given, _SOURCE_KEYS)
+    section = Section(path, "source.", given, _SOURCE_KEYS)
     axes = section.values.get("axes")
     turn = None
     if axes is not None:
@@ -240,7 +263,7 @@ _SIGNS = (("", 1.0), ("-", -1.0))
 
 
 def _camera_spec(path: Path, name: str, table: object) -> dict[str, Any]:
-    section = _Section(path, f"cameras.{name}.", table, _CAMERA_KEYS)
+    section = Section(path, f"cameras.{name}.", table, _CAMERA_KEYS)
     axes = np.array([section.vector("right", [1.0, 0.0, 0.0]), section.vector("up", [0.0, 0.0, 1.0])])
     if "rotation" in section.values:
         if "right" in section.values or "up" in section.values:
@@ -264,7 +287,7 @@ def _camera_spec(path: Path, name: str, table: object) -> dict[str, Any]:
 
 
 def _channel_spec(path: Path, name: str, table: object, cameras: Mapping[str, object]) -> dict[str, Any]:
-    section = _Section(path, f"channels.{name}.", table, _CHANNEL_KEYS + _ATTACHMENT_KEYS)
+    section = Section(path, f"channels.{name}.", table, _CHANNEL_KEYS + ATTACHMENT_KEYS)
     kind = section.choice("kind", CHANNEL_KINDS)
     dimension, counts = CHANNEL_KINDS[kind]
     columns = section.columns(_TRACKED.get(kind))
@@ -276,19 +299,18 @@ def _channel_spec(path: Path, name: str, table: object, cameras: Mapping[str, ob
             value=columns,
             allowed=" or ".join(str(count) for count in counts),
         )
-    noise = section.number("noise", None)
-    if noise is not None and noise <= 0.0:
-        raise InputError("the noise must be positive", file=path, field=section.prefix + "noise", value=noise)
     sign = section.number("sign", 1.0)
     if sign not in (1.0, -1.0):
         raise InputError("unknown sign", file=path, field=section.prefix + "sign", value=sign, allowed="1, -1")
     unwrap = section.flag("unwrap")
     if unwrap and dimension != "angle":
         raise InputError("only an angle can be unwrapped", file=path, field=section.prefix + "unwrap")
+    unit = section.length_unit(kind) if dimension == "length" else section.unit(dimension)
+    noise = noise_spec(section, dimension, unit)
     return {
         "columns": columns,
         "kind": kind,
-        "unit": section.length_unit(kind) if dimension == "length" else section.unit(dimension),
+        "unit": unit,
         "camera": section.camera(kind, cameras),
         "noise": noise,
         "sign": sign,
@@ -299,7 +321,7 @@ def _channel_spec(path: Path, name: str, table: object, cameras: Mapping[str, ob
 
 
 def _drive_spec(path: Path, name: str, table: object) -> dict[str, Any]:
-    section = _Section(path, f"drive.{name}.", table, _DRIVE_KEYS)
+    section = Section(path, f"drive.{name}.", table, _DRIVE_KEYS)
     given = section.values
     ways = [key for key in ("value", "values") if key in given] + ["column"] * ("column" in given or "columns" in given)
     if len(ways) > 1:
@@ -342,159 +364,3 @@ def _drive_spec(path: Path, name: str, table: object) -> dict[str, Any]:
 
 def _listed(value: Any) -> list:
     return value if isinstance(value, list) and value else [value] if value != [] else []
-
-
-@dataclass(frozen=True, eq=False)
-class _Section:
-    """One table of a sidecar; every look-up raises a sentence that names the key."""
-
-    file: Path
-    prefix: str
-    values: Any
-    keys: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.values, dict):
-            self.refuse("must be a table", self.prefix.rstrip("."), self.values)
-        for key in self.values:
-            if key not in self.keys:
-                raise InputError(
-                    f"unknown key '{key}'", file=self.file, field=self.prefix + key, allowed=", ".join(self.keys)
-                )
-
-    def table(self, key: str) -> dict[str, Any]:
-        value = self.values.get(key, {})
-        if not isinstance(value, dict):
-            self.refuse("must be a table", self.prefix + key, value)
-        return value
-
-    def text(self, key: str, default: str | None) -> str | None:
-        value = self.values.get(key, default)
-        if value is not None and not (isinstance(value, str) and value):
-            self.refuse("must be a text", self.prefix + key, value)
-        return value
-
-    def flag(self, key: str) -> bool:
-        value = self.values.get(key, False)
-        if not isinstance(value, bool):
-            self.refuse("must be true or false", self.prefix + key, value)
-        return value
-
-    def number(self, key: str, default: float | None) -> Any:
-        value = self.values.get(key, default)
-        return default if value is None else self.check_number(key, value)
-
-    def check_number(self, key: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < LARGEST_NUMBER:
-            self.refuse("must be a finite number", self.prefix + key, value)
-        return float(value)  # type: ignore[arg-type]
-
-    def choice(self, key: str, allowed: Mapping[str, object]) -> str:
-        value = self.values.get(key)
-        if not isinstance(value, str) or value not in allowed:
-            fault = f"'{key}' is missing" if value is None else f"unknown {key}"
-            raise InputError(fault, file=self.file, field=self.prefix + key, value=value, allowed=", ".join(allowed))
-        return value
-
-    def unit(self, dimension: str | None, default: str | None = None) -> str:
-        unit = self.text("unit", default)
-        unit_factor(unit or "", dimension=dimension, file=self.file, field=self.prefix + "unit")
-        return unit or ""
-
-    def length_unit(self, kind: str) -> str | None:
-        """A unit of length, "px" for a marker in a picture, or None where the file has to state it."""
-        unit = self.text("unit", None)
-        if unit is not None and not (unit == "px" and kind == "marker_2d"):
-            unit_factor(unit, dimension="length", file=self.file, field=self.prefix + "unit")
-        return unit
-
-    def camera(self, kind: str, cameras: Mapping[str, object]) -> str | None:
-        """Name of the camera of a channel; the only one when it is left out."""
-        name = self.text("camera", None)
-        if name is None:
-            return next(iter(cameras)) if kind == "marker_2d" and len(cameras) == 1 else None
-        if kind != "marker_2d":
-            self.refuse("only a marker_2d has a camera", self.prefix + "camera", name)
-        if name not in cameras:
-            known = ", ".join(cameras) or "none is described"
-            raise InputError("unknown camera", file=self.file, field=self.prefix + "camera", value=name, allowed=known)
-        return name
-
-    def vector(self, key: str, default: list[float] | None, size: int = 3) -> Any:
-        value = self.values.get(key, default)
-        if value is None:
-            return None
-        if not isinstance(value, list) or len(value) != size:
-            self.refuse(f"must be {'three' if size == 3 else 'two'} numbers", self.prefix + key, value)
-        return [self.check_number(key, component) for component in value]
-
-    def direction(self) -> list[float] | None:
-        vector = self.vector("direction", None)
-        if vector is None:
-            return None
-        length = float(np.linalg.norm(vector))
-        if not length > 0.0:
-            self.refuse("must not be zero", self.prefix + "direction", vector)
-        return [component / length for component in vector]
-
-    def columns(self, coordinates: str | None = None) -> list[str]:
-        """The columns that are named, or those of the tracked point where the kind of channel has `coordinates`."""
-        if "track" in self.values:
-            if "column" in self.values or "columns" in self.values:
-                self.refuse("give either a track or columns", self.prefix + "track", self.values["track"])
-            if coordinates is None:
-                self.refuse("only a marker or a marker_2d is a track", self.prefix + "track", self.values["track"])
-            return [f"{self.text('track', None)}.{axis}" for axis in coordinates or ""]
-        if ("column" in self.values) == ("columns" in self.values):
-            raise InputError(
-                "give either 'column' or 'columns'", file=self.file, field=self.prefix + "column", allowed="one of both"
-            )
-        names = [self.values["column"]] if "column" in self.values else self.values["columns"]
-        if not isinstance(names, list) or not names or not all(isinstance(n, str) and n for n in names):
-            self.refuse("must name columns", self.prefix + "columns", names)
-        if len(set(names)) != len(names):
-            self.refuse("must not name a column twice", self.prefix + "columns", names)
-        return names
-
-    def attachment(self, kind: str, count: int) -> dict[str, Any]:
-        """What the channel observes: at most one carrier, and the point, height or direction on it."""
-        found = {key: self.values[key] for key in _ATTACHMENT_KEYS if key in self.values}
-        carriers = [key for key in found if key in _CARRIERS]
-        if len(carriers) > 1:
-            self.refuse("observes one thing only", self.prefix.rstrip("."), carriers)
-        for key in carriers:
-            many = found[key] if key == "nodes" and isinstance(found[key], list) and found[key] else [found[key]]
-            if key == "ground":
-                if found[key] is not True:
-                    self.refuse("must be true", self.prefix + key, found[key])
-            elif (key == "nodes" and many == [found[key]]) or any(
-                isinstance(one, bool) or not isinstance(one, (int, str)) or one == "" for one in many
-            ):
-                fault = "must be a list of names or numbers" if key == "nodes" else "must be a name or a number"
-                self.refuse(fault, self.prefix + key, found[key])
-            if key in ("nodes", "ground") and kind != "force":
-                self.refuse("is only for a force", self.prefix + key, found[key])
-        if "point" in found:
-            point = found["point"]
-            if not isinstance(point, list) or len(point) != 3:
-                self.refuse("must be three coordinates in metres", self.prefix + "point", point)
-            found["point"] = [self.check_number("point", coordinate) for coordinate in point]
-        if "height" in found:
-            found["height"] = self.check_number("height", found["height"])
-        if "direction" in found:
-            if kind not in ("force", "tip_displacement") or count != 1:
-                self.refuse(
-                    "is only for a force or displacement of one column", self.prefix + "direction", found["direction"]
-                )
-            found["direction"] = self.direction()
-        return found
-
-    def label(self, key: str, column: str) -> str | float:
-        value = self.values[key][column]
-        if isinstance(value, str):
-            return value
-        return self.check_number(f"{key}.{column}", value)
-
-    def refuse(self, fault: str, field: str, value: object) -> NoReturn:
-        """Raises InputError for this key."""
-        raise InputError(fault, file=self.file, field=field, value=value)

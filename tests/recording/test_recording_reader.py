@@ -288,7 +288,7 @@ SIDECAR_FAULTS = {
         "the stated rate is not that of the time column, 100 Hz .*value 1000",
     ),
     "negative noise": (lambda s: s + "noise = -1.0\n", "the noise must be positive"),
-    "noise text": (lambda s: s + 'noise = "low"\n', "must be a finite number .*'low'"),
+    "noise text": (lambda s: s + 'noise = "low"\n', "a text with a unit .*'low'"),
     "noise nan": (lambda s: s + "noise = nan\n", "must be a finite number"),
     "sign": (lambda s: s + "sign = 2\n", "unknown sign .*allowed: 1, -1"),
     "unwrap number": (lambda s: s + "unwrap = 1\n", "must be true or false"),
