@@ -95,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         "--quasistatic", action="store_true", help="equilibria along time, without inertia: creep, slow drives"
     )
     p.add_argument("--until", type=float, metavar="SECONDS", help="of a quasi-static motion: hold it on until then")
+    p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
 
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
@@ -268,6 +269,8 @@ def _run(args) -> int:
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
+    if args.accuracy is not None:
+        settings = settings.with_accuracy(args.accuracy)
     if args.settings:
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})
@@ -504,23 +507,27 @@ def _units(tables: dict) -> dict[str, str]:
 
 def _tell(args, outcome: "Outcome", folder: Path) -> None:
     from origami_sim.results import format_table
+    from origami_sim.solve import accuracy
 
+    motion = outcome.trajectory
     if args.json:
         _print_json(
             {
                 "numbers": outcome.numbers,
                 "folder": str(folder),
-                "dt": outcome.trajectory.dt,
-                "failures": [str(f) for f in outcome.trajectory.failures],
-                "notes": outcome.trajectory.notes,
+                "dt": motion.dt,
+                "energy_error": accuracy.worst(motion.energy_error),
+                "notes": motion.notes,
+                "failures": [str(f) for f in motion.failures],
             }
         )
         return
     for table in outcome.tables.values():
         print(format_table(table, outcome.units or _units(outcome.tables)))
-    for sentence in [*outcome.summary, *outcome.trajectory.notes]:
+    for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
-    print(f"{outcome.trajectory.step}; {outcome.trajectory.wall:.1f} s of computing; run folder: {folder}")
+    said = [str(motion.step), accuracy.sentence(motion.energy_error), f"{motion.wall:.1f} s of computing"]
+    print(f"{'; '.join(filter(None, said))}; run folder: {folder}")
 
 
 def _soundness(motion: "Trajectory") -> int:

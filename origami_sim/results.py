@@ -243,6 +243,7 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
         "dt": float(t.dt),
         "dt_reason": str(step),
         "time_step": {"limit": step.limit, "dt": step.dt, "node": step.node, "cause": step.cause},
+        "energy_error": t.energy_error,
         "wall": float(t.wall),
         "steps": t.state.step,
         "failures": [{"world": f.world, "time": f.time, "node": f.node, "cause": f.cause} for f in t.failures],
@@ -561,6 +562,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
         state=State(**state),
         wall=float(manifest["wall"]),
         notes=list(manifest["notes"]),
+        energy_error=None if (error := manifest.get("energy_error")) is None else np.array(error, float),
     )
 
 

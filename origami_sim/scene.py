@@ -20,6 +20,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.recording.units import UNITS
+from origami_sim.solve.accuracy import check_accuracy
 from origami_sim.solve.dynamics import Trajectory, simulate
 from origami_sim.solve.quasistatic import quasistatic
 from origami_sim.solve.statics import equilibrium
@@ -67,11 +68,14 @@ class Settings(Mapping[str, Setting]):
         panels: str | None = None,
         motion: str | None = None,
         until: float | None = None,
+        accuracy: float | None = None,
     ):
         self._settings = {s.name: s for s in settings}
         self.file, self.panels, self.motion, self.until = file, panels, motion, until
         self.effects = tuple(effects)
         """Effects that the calibration adds to those of the scene."""
+        self.accuracy = accuracy if accuracy is None else check_accuracy(accuracy, file)
+        """Accuracy of the scene's motion (see `simulate`); None: with the default step."""
         if panels not in (None, "elastic", "rigid"):
             raise InputError("no such panels", file=file, field="panels", value=panels, allowed="elastic, rigid")
         if motion not in (None, "dynamic", "quasistatic"):
@@ -80,6 +84,10 @@ class Settings(Mapping[str, Setting]):
             raise InputError(
                 "only a quasi-static motion is held on", field="until", value=until, allowed="> 0 s, and --quasistatic"
             )
+
+    def _with(self, settings: Sequence[Setting] | None = None, **changes) -> "Settings":
+        kept = {n: getattr(self, n) for n in ("file", "effects", "panels", "motion", "until", "accuracy")}
+        return Settings(list(self.values()) if settings is None else settings, **{**kept, **changes})
 
     def __getitem__(self, name: str) -> Setting:
         return self._settings[name]
@@ -115,9 +123,9 @@ class Settings(Mapping[str, Setting]):
         """A copy for a "dynamic" or "quasistatic" motion (None: dynamic), the latter held on `until` [s]."""
         return self._with(motion=motion, until=until)
 
-    def _with(self, settings: Sequence[Setting] | None = None, **changed) -> "Settings":
-        kept = {n: getattr(self, n) for n in ("file", "effects", "panels", "motion", "until")}
-        return Settings(list(self.values()) if settings is None else settings, **{**kept, **changed})
+    def with_accuracy(self, accuracy: float | None) -> "Settings":
+        """A copy of which the motion is simulated to an accuracy (None: with the default step)."""
+        return self._with(accuracy=accuracy if accuracy is None else check_accuracy(accuracy))
 
     def override(self, assignments: Sequence[str], source: str | Path | None = None) -> "Settings":
         """A copy with `name=value` assignments applied; a value may carry a unit (gap=2.54mm), else it is SI.
@@ -190,7 +198,8 @@ def read_calibration(source: str | Path) -> Settings:
 
     Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
     `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`), and the
-    words `panels` ("rigid", "elastic") and `motion` ("dynamic", "quasistatic") say how it moves.
+    words `panels` ("rigid", "elastic") and `motion` ("dynamic", "quasistatic") say how it moves, the number `accuracy`
+    how accurately (see `simulate`).
 
     Raises:
         InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range, an effect or a
@@ -212,8 +221,8 @@ def read_calibration(source: str | Path) -> Settings:
         from origami_sim.diagnose.patch import read_additions
 
         additions = read_additions(data.pop("effects"), path)
-    panels, motion = data.pop("panels", None), data.pop("motion", None)
-    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, panels, motion)
+    given = {word: data.pop(word, None) for word in ("panels", "motion", "accuracy")}
+    return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, **given)
 
 
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
@@ -390,15 +399,26 @@ def motion_of(
     A quasi-static motion that is held on after the scene's `duration` [s] has frames at even ratios of time from there.
 
     Raises:
-        InputError: what `simulate` and `quasistatic` refuse; a time step given for a quasi-static motion.
+        InputError: what `simulate` and `quasistatic` refuse; a step or an accuracy given for a quasi-static motion.
     """
     if s.motion != "quasistatic":
         return simulate(
-            model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state, **options
+            model,
+            parameters,
+            drive,
+            duration=duration,
+            rate=rate,
+            accuracy=s.accuracy,
+            progress=progress,
+            state=state,
+            **options,
         )
-    if options:
+    if options or s.accuracy is not None:
         raise InputError(
-            "equilibria along time take no such option", field="motion", value="quasistatic", allowed="dynamic"
+            "equilibria along time take no such option",
+            field="motion",
+            value="quasistatic",
+            allowed="dynamic",
         )
     end = s.until or duration
     times = np.arange(round(duration * rate) + 1) / rate

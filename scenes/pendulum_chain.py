@@ -135,7 +135,8 @@ def replicate(s: Settings, recording: Recording, progress: Progress | None = Non
     model, parameters, drive = build(s)
     rate = round(1.0 / float(np.median(np.diff(recording.times))))
     duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
-    motion = simulate(model, parameters, drive, duration=duration, rate=rate, state=start(s, model), progress=progress)
+    lasting = {"duration": duration, "rate": rate, "accuracy": s.accuracy}
+    motion = simulate(model, parameters, drive, **lasting, state=start(s, model), progress=progress)
     return motion, s
 
 

@@ -78,10 +78,24 @@ def test_run_box_prints_its_table_and_leaves_a_run(call, tmp_path):
     assert "reference_deg" in out
     assert "81.39" in out
     assert re.search(r"dt = .* of the limit .* set at node", out)
+    assert re.search(r"energy balance: off by \S+ % of the energy exchanged", out)
     run = load_run(tmp_path / "runs" / "box")
     assert run.manifest["scene"] == "box"
     assert run.units["field_mT"] == "mT"
     assert run.replay.is_file()
+
+
+def test_a_run_that_is_too_coarse_says_so_and_an_accuracy_mends_it(call, tmp_path):
+    code, out, _ = call("run", "cube_toss", "--set", "duration=0.4")
+    assert code == 0 and re.search(r"The energy balance is off by .* accuracy", out)
+    code, out, _ = call("run", "cube_toss", "--set", "duration=0.4", "--accuracy", "1e-2", "--json")
+    result = json.loads(out)
+    assert code == 0 and result["energy_error"] < 1e-2
+    assert result["notes"][0].startswith("Accuracy 0.01: halving")
+    kept = load_run(tmp_path / "runs" / "cube_toss")
+    assert kept.manifest["energy_error"] == kept.trajectory.energy_error.tolist() == [result["energy_error"]]
+    code, out, err = call("run", "cube_toss", "--accuracy", "2")
+    assert (code, out) == (2, "") and "no such accuracy" in err and "accuracy" in err
 
 
 def test_overrides_reach_the_run_with_their_units(call, tmp_path):

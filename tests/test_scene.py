@@ -139,6 +139,19 @@ def test_calibrations_that_cannot_be_read(tmp_path):
         read_calibration(binary)
 
 
+def test_a_calibration_may_ask_for_an_accuracy(tmp_path):
+    text = Path(read_calibration("falling_ball").file).read_text()
+    file = tmp_path / "exact.toml"
+    file.write_text(f"accuracy = 1e-3\n{text}")
+    settings = read_calibration(file)
+    assert settings.accuracy == settings.replace().accuracy == settings.with_panels("rigid").accuracy == 1e-3
+    assert "accuracy" not in settings and settings.with_accuracy(None).accuracy is None
+    assert scene_module("falling_ball").run(settings).trajectory.notes[0].startswith("Accuracy 0.001")
+    file.write_text(f"accuracy = 'high'\n{text}")
+    with pytest.raises(InputError, match=r"exact\.toml.*no such accuracy.*high"):
+        read_calibration(file)
+
+
 def test_a_calibration_must_fit_the_scene(tmp_path):
     module, own = scene_module("mae_crease"), tmp_path / "own.toml"
     text = (CALIBRATIONS / "mae_crease.toml").read_text()
