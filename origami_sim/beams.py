@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from origami_sim.build import Sheet
 from origami_sim.model import Model, Parameters
 
 
@@ -29,3 +30,11 @@ def as_beam(model: Model, parameters: Parameters, axial: float):
         viscosity = parameters["bar_viscosity", "viscosity"][along, 0]
         parameters.set("bar_viscosity", "viscosity", viscosity * factor, along)
     parameters.set("bars", "stiffness", stiffness, along)
+
+
+def along_strip(sheet: Sheet, word: str) -> list[str]:
+    """Names of the creases of a strip along x, counted from its first end: "station 1", "station 2"."""
+    order = np.argsort(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0], kind="stable")
+    rank = np.empty(len(order), int)
+    rank[order] = np.arange(1, len(order) + 1)
+    return [f"{word} {k}" for k in rank]

@@ -215,10 +215,11 @@ def build(s: Settings, *, stepped: bool | None = None) -> tuple[Model, Parameter
         "layers": s.active_thickness / gap,
         "constraint": chi,
     }
-    stiffness = np.zeros(len(sheet.mesh.creases))
+    stiffness, names = np.zeros(len(sheet.mesh.creases)), []
     for k, (_, i, j, _) in enumerate(sheet.mesh.creases):
         a, b = sorted((int(i), int(j)))
         row, column = a // n, a % n
+        names.append(f"y-crease {column}.{row + 1}" if b - a == n else f"x-crease {row}.{column + 1}")
         if b - a == n:  # along y
             stiffness[k] = own[across.owner[column - 1]] * (y[row + 1] - y[row]) / across.length[column - 1]
             continue
@@ -227,6 +228,7 @@ def build(s: Settings, *, stepped: bool | None = None) -> tuple[Model, Parameter
         stiffness[k] = (wide * at.rigidity[0] + (pitch[column] - wide) * at.rigidity[1]) / reach[row - 1]
         sheet.set("maxwell_stress", [k], lever=at.lever, width=wide, side=-1.0, **stack)
     sheet.crease(stiffness=stiffness, loss_time=s.loss_time)
+    sheet.name("crease", names)
     sheet.on("maxwell_membrane").set("mass_damping", decay_rate=s.decay_rate)
     model, parameters = sheet.build()
 

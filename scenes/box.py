@@ -21,6 +21,7 @@ REFERENCE = np.array([20.4, 38.6, 62.0, 74.0, 78.8, 81.4])
 """Flap angle [deg] at FIELDS: independent lumped solution for the default calibration."""
 
 OUTWARD = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)], float)
+SIDES = ("+x", "+y", "-x", "-y")
 
 
 def pattern(s: Settings) -> Pattern:
@@ -54,7 +55,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
             density=s.patch_density,
         )
         sheet.panel(k + 1, rigidity=s.flap_stiffening * sheet.rigidity(k + 1))
-    sheet.fix(panels=[0])
+    sheet.fix(panels=[0]).name("panel", ["base", *(f"flap {n}" for n in SIDES)])
+    middles = sheet.mesh.vertices[sheet.mesh.creases[:, 1:3]].mean(axis=1)
+    sheet.name("crease", [f"hinge {SIDES[k]}" for k in np.argmax(middles @ OUTWARD.T, axis=1)])
     if s.crease_law == "finite_elements":
         law = bridge_law(s)
         sheet.set("crease_table", **law)

@@ -26,7 +26,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet = Sheet(strip([s.length, s.length], s.width), thickness=s.thickness, density=s.density)
     # rigid beside the crease's order of magnitude, so that a fit of its stiffness leaves the panels alone
     sheet.fix(panels=[0]).panel([0, 1], rigidity=1e3 * 10 ** np.floor(np.log10(s.stiffness)))
-    sheet.crease(stiffness=s.stiffness, rest_angle=s.rest_angle, loss_time=s.loss_time)
+    sheet.crease(stiffness=s.stiffness, rest_angle=s.rest_angle, loss_time=s.loss_time).name("crease", ["hinge"])
     model, parameters = sheet.build()
     return model, parameters, Drive()
 

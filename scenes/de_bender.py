@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.beams import as_beam
+from origami_sim.beams import along_strip, as_beam
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.effects.crease_table import KNOTS
@@ -176,7 +176,9 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
         sheet.panel(panel, rigidity=s.twist * d)
     order = np.argsort(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0], kind="stable")
     tables = {key: _Table(s, a) for key, a in sections.items()} if s.section == "ogden" else {}
-    stiffness = np.zeros(len(order))
+    stiffness, rest = np.zeros(len(order)), np.zeros(len(order))
+    rest[order] = s.natural_curvature * part
+    sheet.name("crease", along_strip(sheet, "hinge"))
     stack = {
         "permittivity": s.permittivity * s.pressure_share,
         "layer_thickness": s.layer_thickness,
@@ -193,8 +195,8 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
             sheet.set(
                 "crease_table",
                 [crease],
-                angle_min=-turn,
-                angle_max=turn,
+                angle_min=rest[crease] - turn,
+                angle_max=rest[crease] + turn,
                 resisting_moment=tables[g.tape_layers].moments(s.thinning)[None, None] * s.width,
             )
         if not g.electrode:
@@ -205,7 +207,7 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
                 "thickness_thinning", [crease], first=a.tape - a.neutral, neutral=0.0, hinge_length=length, **stack
             )
     if not tables:
-        sheet.crease(stiffness=stiffness, rest_angle=0.0)
+        sheet.crease(stiffness=stiffness, rest_angle=rest)
     sheet.set("crease_viscosity", viscosity=s.loss_time * stiffness).set("mass_damping", decay_rate=s.decay_rate)
     gx, gz = {"weightless": (0, 0), "hanging": (1, 0), "lifting": (0, 1)}[s.orientation]
     sheet.gravity((gx * s.gravity, 0, gz * s.gravity))

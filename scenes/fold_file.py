@@ -53,6 +53,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive, np.ndarray]:
     sheet.crease(stiffness=stiffness, damping_ratio=s.damping_ratio)
     sheet.set("crease_drive", drive_stiffness=stiffness, target_angle=target - sheet._rest)
     sheet.set("crease_stop", stop_stiffness=stiffness)
+    sheet.name("crease", [f"edge {e}" for e in sheet.mesh.crease_edge])
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     model, parameters = sheet.build()
     return model, parameters, Drive(load=ramp(1.0, s.fold_time)), target

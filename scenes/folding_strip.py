@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from origami_sim.beams import along_strip
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
@@ -77,6 +78,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         s.modulus, s.patch_width, s.thickness, s.gap, poisson=s.poisson, end_correction=s.end_correction
     )
     sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
+    sheet.name("crease", along_strip(sheet, "gap"))
     sheet.on("crease_stop").set("mass_damping", decay_rate=s.decay_rate)
     model, parameters = sheet.build()
     model.position[:, 0] -= lengths.sum() / 2

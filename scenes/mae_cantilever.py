@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.beams import as_beam, diagonal_share
+from origami_sim.beams import along_strip, as_beam, diagonal_share
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.materials import MU0
@@ -62,7 +62,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     share = diagonal_share(cell, s.width) / s.twist
     bending = s.modulus * s.width * s.thickness**3 / 12 / cell / (1 - share)
     at_clamp = np.isclose(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0], cell)
-    sheet.crease(stiffness=np.where(at_clamp, 2.0, 1.0) * bending, rest_angle=0.0, loss_time=s.loss_time)
+    span = np.where(at_clamp, 0.5, 1.0) * cell  # of the beam, that a hinge stands for
+    sheet.crease(stiffness=bending * cell / span, rest_angle=s.natural_curvature * span, loss_time=s.loss_time)
+    sheet.name("crease", along_strip(sheet, "station"))
     for panel in range(1, cells + 1):
         sheet.magnetise(panel, remanence=s.remanence, volume=cell * s.width * s.thickness, poling=(1, 0, 0))
     sheet.gravity((0, 0, -s.gravity)).set("mass_damping", decay_rate=s.decay_rate)

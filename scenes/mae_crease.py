@@ -25,7 +25,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     )
     # rigid beside the crease's order of magnitude, so that a fit of its stiffness leaves the panels alone
     sheet.fix(panels=[0]).panel([0, 1], rigidity=1e5 * 10 ** np.floor(np.log10(s.stiffness)))
-    sheet.crease(stiffness=s.stiffness, rest_angle=0.0, loss_time=s.loss_time)
+    sheet.crease(stiffness=s.stiffness, rest_angle=0.0, loss_time=s.loss_time).name("crease", ["hinge"])
     sheet.magnetise(1, remanence=s.remanence, volume=s.length * s.width * s.thickness, poling=(1, 0, 0))
     model, parameters = sheet.build()
     return model, parameters, Drive(field=(0, 0, ramp(s.field, 1.0)))

@@ -19,7 +19,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from origami_sim.beams import as_beam, diagonal_share
+from origami_sim.beams import along_strip, as_beam, diagonal_share
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, series
 from origami_sim.errors import InputError
@@ -77,7 +77,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     bending = s.modulus * s.width * s.thickness**3 / 12 / cell / (1 - share)
     station = np.rint(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0] / cell)
     at_clamp = (station == 1) | (station == cells + 1)
-    sheet.crease(stiffness=np.where(at_clamp, 2.0, 1.0) * bending, rest_angle=0.0, loss_time=s.loss_time)
+    span = np.where(at_clamp, 0.5, 1.0) * cell  # of the strip, that a hinge stands for
+    sheet.crease(stiffness=bending * cell / span, rest_angle=s.natural_curvature * span, loss_time=s.loss_time)
+    sheet.name("crease", along_strip(sheet, "station"))
     for panel in range(1, cells + 1):
         outwards = (-1, 0, 0) if panel <= cells // 2 else (1, 0, 0)
         sheet.magnetise(panel, remanence=s.remanence, volume=cell * s.width * s.thickness, poling=outwards)

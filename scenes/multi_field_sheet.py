@@ -48,6 +48,14 @@ class Creases:
     along_y: np.ndarray
     along_x: np.ndarray
 
+    def names(self) -> list[str]:
+        """Of all creases: "y-crease 2.1" is the second column border in the first row, "x-crease 1.3" the other way."""
+        out = [""] * (self.along_y.size + self.along_x.size)
+        for way, creases in (("y", self.along_y), ("x", self.along_x)):
+            for (first, second), crease in np.ndenumerate(creases):
+                out[int(crease)] = f"{way}-crease {first + 1}.{second + 1}"
+        return out
+
 
 def counts(s: Settings) -> tuple[int, int]:
     """Columns and rows of panels."""
@@ -124,7 +132,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
             allowed="an even number of columns, 4 or more, and 2 or more rows",
         )
     sheet, creases = assembled(s)
-    sheet.fix(panels=[0])
+    sheet.fix(panels=[0]).name("crease", creases.names())
     rigidity, turn = bilayer(s)
     stiffness = np.zeros(len(sheet.mesh.creases))
     warm = creases.along_y.ravel()

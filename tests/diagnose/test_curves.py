@@ -257,7 +257,7 @@ def test_wrong_parameter():
 
 def test_cubic_stiffening():
     d = diagnose(coupon(), [torque(lambda q: K * (q - REST) + 3e-4 * (q - REST) ** 3)])
-    assert (d.verdict, d.chosen) == ("MECHANISM", ["crease_stiffening at crease 0"])
+    assert (d.verdict, d.chosen) == ("MECHANISM", ["crease_stiffening at hinge"])
     number = next(n for n in d.candidates[0].numbers if n.label == "crease_stiffening.cubic_stiffness")
     assert number.value == pytest.approx(3e-4, rel=0.1)
     assert d.error_after[0] < 0.1 * d.error_refitted[0]
