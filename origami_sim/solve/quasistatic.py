@@ -92,21 +92,22 @@ def quasistatic(
     times: Sequence[float] | np.ndarray = (),
     *,
     state: State | None = None,
-    rested: bool = False,
+    before: Drive | None = None,
     tolerance: float | None = TOLERANCE,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> QuasiStatic:
     """Follows the equilibria of all worlds along time, with creep, relaxation and whatever else remembers.
 
-    Bars, or rigid panels whose creases close no loop. Inertia and laws of the rate are left out, and where they would
+    Bars or rigid panels. Inertia and laws of the rate are left out, and where they would
     have mattered a note says so.
 
     Args:
         times: [F] instants to keep [s], increasing. The drive comes on at the first: the first frame is the answer
             before anything has relaxed.
         state: where to start (default: the reference state, without memory); its worlds must match.
-        rested: the device has been in the drive of the first instant for ever, and everything has relaxed.
+        before: a drive in which it had been for ever, so that everything has relaxed, until the first instant; with
+            `drive.held(times[0])` nothing happens then. None: nothing acts on the state before.
         tolerance: error of one step over the device's size; steps between frames are cut until they keep to it. None:
             one step from frame to frame.
         threads: CPU threads (default all cores). progress: called with the fraction done.
@@ -115,8 +116,8 @@ def quasistatic(
         The frames. A world of which no equilibrium is found stays where it was, and `failures` says since when and why.
 
     Raises:
-        InputError: times that are not finite or do not increase, a drive that ends early, worlds that differ, rigid
-            panels in a closed loop, no node that is free to move.
+        InputError: times that are not finite or do not increase, a drive that ends early, worlds that differ,
+            no node that is free to move.
     """
     drive = drive or Drive()
     at = np.asarray(times, float)
@@ -145,7 +146,7 @@ def quasistatic(
     one = [parameters.world(w if parameters.worlds > 1 else 0) for w in range(count)]
     search = settling([(model, p) for p in one], applied, start, threads=threads)
     march = March(search, applied, tolerance if search.held.remembers else None)
-    march.begin(start, float(at[0]), FOREVER if rested else INSTANT)
+    march.begin(start, float(at[0]), None if before is None else levels(before, float(at[0]), count))
     states = [march.state]
     for i, instant in enumerate(at[1:], 1):
         for end in instants[(instants > at[i - 1]) & (instants <= instant)]:
@@ -177,15 +178,22 @@ class March:
         self.alive = np.ones(0, bool)
         self.state: State
 
-    def begin(self, state: State, time: float, dt: float):
-        """The first equilibria, dt [s] after the drive of the first instant has come on."""
+    def begin(self, state: State, time: float, before: np.ndarray | None = None):
+        """The first equilibria, after the drive has come on at once where the device had rested before.
+
+        Args:
+            before: level of the drive in which it had rested for ever [channels, W]; None: nothing acted on the state.
+        """
         self.state, self.time = state, time
         self.alive = np.ones(state.worlds, bool)
-        level = levels(self.drive, time, state.worlds)
-        new, found = self.search.settle(level, state, state.x, self.alive, dt=dt, time=time)
-        if not np.all(found):
-            # from afar: with the memory of the beginning first
-            new, found = self.search.settle(level, new, new.x, self.alive, dt=dt, time=time)
+        if before is not None:
+            self._from_afar(before, FOREVER)
+        self._from_afar(levels(self.drive, time, state.worlds), INSTANT)
+
+    def _from_afar(self, level: np.ndarray, dt: float):
+        """Equilibria that may be far away, reached within dt [s] at the present time."""
+        start = self.state
+        new, found = self.search.settle(level, start, start.x, self.alive, dt=dt, time=self.time)
         self._take(new, found, 0)
 
     def go(self, end: float, frame: int):

@@ -56,32 +56,13 @@ class RigidSystem:
         angles += 2 * np.pi * np.round((self._angles(q)[:, None] - angles) / (2 * np.pi))
         self._batch.place(x, angles)
         found = np.einsum("mnwa,nwa->mw", by, self._batch.total_force(time))
-        along = np.eye(self.count)
-        if len(self.tree.row_node):
-            slopes = self.tree.closures(self.x, q[:, None] + near)[1]
-            left, values, right = np.linalg.svd(slopes[:, :, 0])
-            rank = int((values > REDUNDANT * values.max(initial=0.0)).sum())
-            along = left[:, rank:]
-            # the loops' forces balance what moments would open them; they turn as the loops' directions do
-            pull = right[:rank].T @ (left[:, :rank].T @ -found[:, 0] / values[:rank])
-            found = found + np.einsum("mrw,r->mw", slopes, pull)
+        along, found = loops_kept(self.tree, self.x, q[:, None] + near, found)
         slope = (found[:, self.count + 1 :] - found[:, 1 : self.count + 1]) / (2 * STEP)
         return along.T @ found[:, 0], along.T @ slope @ along, along, x[:, 0], angles[:, 0]
 
-    def closed(self, q: np.ndarray) -> np.ndarray | None:
-        """The nearest coordinates (m,) at which all loops are closed; None if they are not found."""
-        if not len(self.tree.row_node):
-            return q
-        for _ in range(20):
-            gap, slope = self.tree.closures(self.x, q[:, None])
-            if np.abs(gap).max(initial=0.0) <= CLOSED * self.size:
-                return q
-            q = q - np.linalg.lstsq(slope[:, :, 0].T, gap[:, 0], rcond=REDUNDANT)[0]
-        return None
-
     def _stepped(self, q: np.ndarray, step: np.ndarray, time: float) -> tuple | None:
         """Coordinates a step away with all loops closed, and the moments there; None where loops do not close."""
-        moved = self.closed(q + step)
+        moved = closed(self.tree, self.x, q + step)
         return None if moved is None else (moved, *self.moments(moved, time))
 
     def _angles(self, q: np.ndarray) -> np.ndarray:
@@ -166,3 +147,30 @@ class RigidSystem:
         """Whether moments after a step have not turned against it by half of the work that they promised."""
         _, f, _, along, *_ = new
         return bool(np.all(np.isfinite(f)) and (along.T @ step) @ f >= -0.5 * abs(work))
+
+
+def closed(tree: Topology, start: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+    """The coordinates (m,) nearest to q (m,), from positions [N, 3], at which loops are closed; None if not found."""
+    if not len(tree.row_node):
+        return q
+    size = float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
+    for _ in range(20):
+        gap, slope = tree.closures(start, q[:, None])
+        if np.abs(gap).max(initial=0.0) <= CLOSED * size:
+            return q
+        q = q - np.linalg.lstsq(slope[:, :, 0].T, gap[:, 0], rcond=REDUNDANT)[0]
+    return None
+
+
+def loops_kept(tree: Topology, start: np.ndarray, q: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions [m, d] in which all loops stay closed at the first of the coordinates q [m, W], and moments [m, W].
+
+    To the moments are added those of the forces that keep the loops closed: they turn as the loops' directions do.
+    """
+    if not len(tree.row_node):
+        return np.eye(len(q)), moments
+    slopes = tree.closures(start, q)[1]
+    left, values, right = np.linalg.svd(slopes[:, :, 0])
+    rank = int((values > REDUNDANT * values.max(initial=0.0)).sum())
+    pull = right[:rank].T @ (left[:, :rank].T @ -moments[:, 0] / values[:rank])
+    return left[:, rank:], moments + np.einsum("mrw,r->mw", slopes, pull)

@@ -19,7 +19,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch, Evaluation
 from origami_sim.solve.rigid import Topology
-from origami_sim.solve.rigid_statics import NEUTRAL
+from origami_sim.solve.rigid_statics import NEUTRAL, closed, loops_kept
 from origami_sim.solve.rigid_statics import STEP as TURN
 from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
 
@@ -95,7 +95,7 @@ class Settling(ABC):
         among: effects of the program, see `Batch`.
     """
 
-    far = FAR
+    far, iterations = FAR, ITERATIONS
 
     def __init__(
         self,
@@ -163,7 +163,7 @@ class Settling(ABC):
                 break
             s = self._solved(factors, x, going)
             past, before = [s], np.full(len(wanted), np.inf)
-            for _ in range(ITERATIONS):
+            for _ in range(self.iterations):
                 large = np.abs(s).max(axis=0, initial=0.0)
                 going &= large < 0.5 * before  # else a new tangent serves better; false for nan
                 before = large
@@ -270,20 +270,20 @@ class SettlingBars(Settling):
 
 
 class _Small:
-    """A dense tangent of any symmetry, shifted."""
+    """A dense tangent of any symmetry along some directions [m, d], shifted."""
 
-    def __init__(self, k: np.ndarray, shift: float):
-        self._k = k + shift * np.eye(len(k))
+    def __init__(self, k: np.ndarray, shift: float, along: np.ndarray):
+        self._k, self._along = k + shift * np.eye(len(k)), along
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        return np.linalg.lstsq(self._k, right, rcond=None)[0]
+        return self._along @ np.linalg.lstsq(self._k, self._along.T @ right, rcond=None)[0]
 
 
 class SettlingPanels(Settling):
-    """Equilibria of rigid panels: the coordinates are fold angles and the pose of the root.
+    """Equilibria of rigid panels: the coordinates are fold angles and the pose of the root, with loops kept closed.
 
     Raises:
-        InputError: panels that close loops, or what `Topology` refuses.
+        InputError: what `Topology` refuses, or nothing that is free to move.
     """
 
     far = 2 * FAR
@@ -291,16 +291,11 @@ class SettlingPanels(Settling):
     def __init__(self, worlds, drive: Drive, state: State, **options):
         super().__init__(worlds, drive, state, **options)
         self.tree = t = Topology(self.model)
-        if len(t.row_node):
-            raise InputError(
-                "equilibria of rigid panels that close a loop are not found",
-                field="panels",
-                value="rigid",
-                allowed="panels='elastic', or a motion with losses",
-            )
         self.count = len(t.turns) + len(t.joints)
         if not self.count:
             raise InputError("statics needs a panel that is free to move", field="free", value=0)
+        if len(t.row_node):  # the directions in which loops stay closed turn with every step
+            self.iterations = 1
 
     @property
     def size(self) -> float:
@@ -314,26 +309,29 @@ class SettlingPanels(Settling):
     def _moved(self, x, s):
         out = x.copy()
         for w in np.flatnonzero(np.any(s != 0.0, axis=0)):
-            out[:, w] = self.tree.positions(x[:, w], s[:, [w]])[0][:, 0]
+            q = closed(self.tree, x[:, w], s[:, w])
+            if q is not None:
+                out[:, w] = self.tree.positions(x[:, w], q[:, None])[0][:, 0]
         return out
 
     def _factors(self, x, wanted):
         m = self.count
-        near = TURN * np.concatenate([np.eye(m), -np.eye(m)], axis=1)
+        near = TURN * np.concatenate([np.zeros((m, 1)), np.eye(m), -np.eye(m)], axis=1)
         out: list[_Small | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(wanted):
             moved, by = self.tree.positions(x[:, w], near)
-            start = self.start.select(np.full(2 * m, w))
-            f = self._copies(int(w), 2 * m).force(start, moved, self.dt, self.time)
+            start = self.start.select(np.full(2 * m + 1, w))
+            f = self._copies(int(w), 2 * m + 1).force(start, moved, self.dt, self.time)
             moments = np.einsum("mnwa,nwa->mw", by, f)
-            k = (moments[:, m:] - moments[:, :m]) / (2 * TURN)
-            if not np.all(np.isfinite(k)):
+            if not np.all(np.isfinite(moments)):
                 continue
+            along, moments = loops_kept(self.tree, x[:, w], near, moments)
+            k = along.T @ ((moments[:, m + 1 :] - moments[:, 1 : m + 1]) / (2 * TURN)) @ along
             values = np.linalg.eigvalsh(0.5 * (k + k.T))
             largest = float(np.abs(values).max(initial=0.0)) or 1.0
-            stable[w] = not m or values[0] >= -NEUTRAL * largest
-            out[w] = _Small(k, 0.0 if stable[w] else -1.5 * float(values[0]))
+            stable[w] = not len(values) or values[0] >= -NEUTRAL * largest
+            out[w] = _Small(k, 0.0 if stable[w] else -1.5 * float(values[0]), along)
         return out, stable
 
 

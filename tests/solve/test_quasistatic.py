@@ -7,9 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 from structures import truss
 
-from origami_sim import Drive, Sheet, equilibrium, quasistatic, ramp, series, simulate, strip
+from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, series, simulate, strip
 from origami_sim.errors import InputError
-from origami_sim.model import State
 from origami_sim.solve.quasistatic import knots
 
 K, BRANCH, TIME, MOMENT = 2e-3, 3e-3, 7.0, 1e-3
@@ -80,8 +79,12 @@ def test_a_moment_relaxes_at_a_held_angle():
 
 def test_everything_has_relaxed_where_the_device_had_rested():
     model, parameters = hinge("rigid", "crease_relaxation")
-    run = quasistatic(model, parameters, Drive(load=1.0), [0.0, 5.0], rested=True)
-    assert run.creases[:, 0, 0] == pytest.approx(MOMENT / K, rel=1e-5)
+    rested = quasistatic(model, parameters, Drive(load=1.0), [0.0, 5.0], before=Drive(load=1.0))
+    assert rested.creases[:, 0, 0] == pytest.approx(MOMENT / K, rel=1e-9)
+    times = np.array([0.0, 10.0, 1e3])
+    recovering = quasistatic(model, parameters, Drive(load=0.0), times, before=Drive(load=1.0))
+    left = MOMENT / K - MOMENT / (K + BRANCH)
+    assert recovering.creases[:, 0, 0] == pytest.approx(left * np.exp(-times / RETARDATION), abs=1e-4)
 
 
 def test_slow_polarisation_follows_a_ramp_exactly():
@@ -219,9 +222,19 @@ def test_bad_input_is_refused(options, sentence):
         quasistatic(model, parameters, **options)
 
 
-def test_closed_loops_of_rigid_panels_are_refused():
-    from origami_sim import miura
-
-    model, parameters = Sheet(miura(2, 2, 0.02, 0.02, 1.0), thickness=1e-3, panels="rigid").build()
-    with pytest.raises(InputError, match="close a loop"):
-        quasistatic(model, parameters, Drive(), [0.0], state=State.at_rest(model))
+def test_rigid_panels_in_a_loop_creep_from_one_equilibrium_to_another():
+    """At once the branches are springs, at last they are gone: both ends are equilibria of elastic creases."""
+    sheet = Sheet(miura(1, 1, 0.02, 0.02, np.pi / 3, fold_angle=np.pi / 4), thickness=1e-3, panels="rigid")
+    sheet.fix(panels=[0]).crease(stiffness=K).on("crease_relaxation", "crease_drive")
+    sheet.set("crease_relaxation", stiffness_1=BRANCH, time_1=TIME)
+    model, parameters = sheet.build()
+    parameters.set("crease_drive", "drive_stiffness", MOMENT)
+    parameters.set("crease_drive", "target_angle", 1.0, entities=0)
+    run = quasistatic(model, parameters, Drive(load=1.0), [0.0, 5.0, 20.0, 1e4])
+    plain = model.with_effects(without=("crease_relaxation",))
+    ends = []
+    for stiffness in (K + BRANCH, K):
+        one = parameters.for_model(plain).set("crease", "stiffness", stiffness)
+        ends.append(equilibrium(plain, one, Drive(load=1.0)).angles)
+    assert run.creases[[0, -1], :, 0] == pytest.approx(np.array(ends), abs=1e-7)
+    assert np.all(np.diff(run.creases[:, 0, 0]) > 0) and not run.failures
