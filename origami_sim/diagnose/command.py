@@ -23,7 +23,7 @@ from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.diagnose.report import geometry_of, write_report
-from origami_sim.diagnose.subject import alignments, divided, spreads
+from origami_sim.diagnose.subject import alignments, divided, numbers, split, spreads
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -82,8 +82,8 @@ def run(args: Namespace) -> int:
         recordings.append(
             replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
         )
-    known, aligned = _priors(settings, data, args.prior, model, parameters)
-    subject = Subject.from_scene(module, settings, spreads=known, name=name).beside(aligned)
+    known, single, aligned = _priors(settings, data, args.prior, model, parameters)
+    subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
     options = _options(args)
@@ -200,11 +200,12 @@ def _naming(file: str | None) -> Iterator[None]:
 
 def _priors(
     settings: Settings, data: DataSet, given: Sequence[str], model: Model, parameters: Parameters
-) -> tuple[dict[str, float], list[Free]]:
-    """Standard deviations [SI] by the sidecar, and over them by the command line; and what is aligned."""
+) -> tuple[dict[str, float], list[Free], list[Free]]:
+    """Standard deviations [SI] by the sidecar, and over them by the command line; single entities; what is aligned."""
     first = data[0].metadata
     sidecar = first.get("sidecar")
     own, further = divided(first.get("priors") or {}, model)
+    own, single = split(settings, own)
     out, aligned = spreads(settings, own, source=sidecar), alignments(further, parameters, source=sidecar)
     stated: dict[str, float | str] = {}
     for text in given:
@@ -215,8 +216,11 @@ def _priors(
             )
         stated[name] = value
     own, further = divided(stated, model)
+    own, over = split(settings, own)
+    tuned = numbers({n: v for n, v in single.items() if n not in over}, model, parameters, source=sidecar)
+    tuned += numbers(over, model, parameters, source="--prior")
     aligned = [*(f for f in aligned if f.name not in further), *alignments(further, parameters, source="--prior")]
-    return out | spreads(settings, own, source="--prior"), aligned
+    return out | spreads(settings, own, source="--prior"), tuned, aligned
 
 
 def _options(args: Namespace) -> Options:

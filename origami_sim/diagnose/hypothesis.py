@@ -7,6 +7,7 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
+from origami_sim.entities import tune
 from origami_sim.model import Model, Parameters, magnets
 from origami_sim.recording import Recording
 from origami_sim.scene import Settings
@@ -158,6 +159,20 @@ class Subject:
             return model, out, drive or Drive()
 
         return cls(build, tuple(nominals))
+
+    def tuned(self, numbers: Sequence[Free]) -> "Subject":
+        """The same with numbers that change a parameter of some entities of the model; see `entities.tune`."""
+        own = {f.name: f.start for f in numbers}
+
+        def build(values: Mapping[str, float]):
+            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in own})
+            out = parameters.copy()
+            for label, start in own.items():
+                if values.get(label, start) != start:
+                    tune(out, model, label, values[label])
+            return model, out, drive
+
+        return Subject(build, (*self.nominals, *numbers), self.name) if numbers else self
 
     def beside(self, numbers: Sequence[Free]) -> "Subject":
         """The same with effects that act in any case, as strongly as the fit says: such as a clock that may be late.

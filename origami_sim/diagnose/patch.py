@@ -4,19 +4,20 @@ It is a calibration as any other, with one table more:
 
     [[effects.crease_friction]]
     site = "crease 1"               # in words; optional, like source
-    entities = [1]                  # of the effect's family; left out: all of them
+    entities = [1]                  # of the effect's family, or at = "hinge1" by name; left out: all of them
     friction_moment = 2.0e-5        # parameters of the effect [SI]
     yield_angle = 0.01
 
 Parameters that are not stated are those of an effect of the scene that has one of the same name for the same family (a
 magnet keeps its remanence), else their typical value. An effect that the scene already has, or that a table above has
-added, keeps what is not stated; with `more = true` the numbers are added to what it has, and may be negative.
+added, keeps what is not stated; with `more = true` the numbers are added to what it has, and may be negative, and with
+`times = true` they are factors on it.
 """
 
 import json
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +25,13 @@ import numpy as np
 from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
 from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.effects import CATALOGUE, get
+from origami_sim.entities import WAYS, located
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Settings
 
-_WORDS = ("site", "source")
+_WORDS = ("site", "source", "at")
+_SWITCHES = ("more", "times")
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class Addition:
     Attributes:
         effect: name in the catalogue. values: its parameters [SI].
         entities: of the effect's family; None for all. site, source: for readers.
-        more: whether the values are added to those that the effect has.
+        more: whether the values are added to those that the effect has. times: whether they are factors on them.
+        at: name of the entities, in place of their numbers.
     """
 
     effect: str
@@ -47,6 +51,13 @@ class Addition:
     site: str = ""
     source: str = ""
     more: bool = False
+    times: bool = False
+    at: str = ""
+
+    @property
+    def changes(self) -> bool:
+        """Whether it changes what the effect has, and states nothing new."""
+        return self.more or self.times
 
 
 def read_additions(tree: object, file: Path) -> tuple[Addition, ...]:
@@ -73,16 +84,22 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
     if not isinstance(entry, dict):
         raise InputError("an effect is a table of its parameters", file=file, field=where, value=entry)
     known = {p.name: p for p in effect.parameters if p.knots == 1}
-    words, values, entities, more = {}, {}, None, entry.get("more", False)
-    if not isinstance(more, bool):
-        raise InputError("not a switch", file=file, field=f"{where}.more", value=more, allowed="true, false")
+    words, values, entities = {}, {}, None
+    switches = {s: entry.get(s, False) for s in _SWITCHES}
+    for key, value in switches.items():
+        if not isinstance(value, bool):
+            raise InputError("not a switch", file=file, field=f"{where}.{key}", value=value, allowed="true, false")
+    changes = any(switches.values())
+    if all(switches.values()) or ("at" in entry and "entities" in entry):
+        fault = ("more", "times") if all(switches.values()) else ("at", "entities")
+        raise InputError(f"give either {fault[0]} or {fault[1]}", file=file, field=f"{where}.{fault[0]}")
     for key, value in entry.items():
         at = f"{where}.{key}"
         if key in _WORDS:
             if not isinstance(value, str):
                 raise InputError("not a word", file=file, field=at, value=value)
             words[key] = value
-        elif key == "more":
+        elif key in _SWITCHES:
             continue
         elif key == "entities":
             whole = isinstance(value, list) and all(type(v) is int and v >= 0 for v in value)
@@ -94,10 +111,10 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
                 "the effect has no such parameter",
                 file=file,
                 field=at,
-                allowed=", ".join([*known, "entities", "more", *_WORDS]),
+                allowed=", ".join([*known, "entities", *_SWITCHES, *_WORDS]),
             )
         else:
-            low, high = (-np.inf, np.inf) if more else known[key].bounds
+            low, high = (-np.inf, np.inf) if changes else known[key].bounds
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
                 raise InputError(
                     "out of its bounds",
@@ -107,7 +124,7 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
                     allowed=f"{low:g} to {high:g} {known[key].unit}",
                 )
             values[key] = float(value)
-    return Addition(name, values, entities, more=more, **words)
+    return Addition(name, values, entities, **switches, **words)
 
 
 def switched_on(
@@ -118,6 +135,7 @@ def switched_on(
     Raises:
         InputError: an entity that the model does not have; more of an effect that nothing has switched on.
     """
+    additions = [_placed(a, model, parameters, file) for a in additions]
     for a in additions:
         count = model.count(get(a.effect).family)
         if a.entities is not None and max(a.entities) >= count:
@@ -128,7 +146,7 @@ def switched_on(
                 value=max(a.entities),
                 allowed=f"0 to {count - 1}",
             )
-    new = [a for a in additions if a.effect not in model.effects and not a.more]
+    new = [a for a in additions if a.effect not in model.effects and not a.changes]
     richer = model.with_effects(*(a.effect for a in new))
     numbers = [_numbers(a) for a in new]
     missing = Hypothesis(tuple(Suspect(a.effect, a.site, "", n, a.entities) for a, n in zip(new, numbers, strict=True)))
@@ -136,15 +154,29 @@ def switched_on(
     for a in additions:
         if a.effect not in richer.effects:
             raise InputError(
-                "there is no such effect to have more of", file=file, field=f"effects.{a.effect}.more", value=True
+                "there is no such effect to have more of",
+                file=file,
+                field=f"effects.{a.effect}.{'more' if a.more else 'times'}",
+                value=True,
             )
-        if a.effect in model.effects or a.more:
+        if a.effect in model.effects or a.changes:
             mine = np.arange(model.count(get(a.effect).family)) if a.entities is None else np.array(a.entities)
             for name, value in a.values.items():
                 bounds = get(a.effect).parameter(name).bounds
-                there = out[a.effect, name][mine] if a.more else 0.0
-                out.set(a.effect, name, np.clip(there + value, *bounds), mine)
+                there = out[a.effect, name][mine]
+                new_value = there + value if a.more else there * value if a.times else value
+                out.set(a.effect, name, np.clip(new_value, *bounds), mine)
     return richer, out
+
+
+def _placed(a: Addition, model: Model, parameters: Parameters, file: Path | None) -> Addition:
+    """The same with its entities by number."""
+    if not a.at:
+        return a
+    richer = model.with_effects(a.effect)
+    label = f"{a.effect}.{next(iter(a.values), get(a.effect).parameters[0].name)}[{a.at}]"
+    found = located(label, richer, parameters.for_model(richer), file=file, field=f"effects.{a.effect}.at")
+    return replace(a, entities=tuple(found.entities.tolist()), at="")
 
 
 def _numbers(a: Addition) -> tuple[Free, ...]:
@@ -175,11 +207,20 @@ def _of_channel(a: Addition) -> bool:
 
 def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
     found: dict[tuple[str, str], dict[str, float]] = {}
+    source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
+    tuned = []
     for label, value in diagnosis.patch.items():
         name, _, entities = label.partition("@")
-        if name not in settings:
-            effect, _, parameter = name.partition(".")
+        if name in settings:
+            continue
+        effect, _, parameter = name.partition(".")
+        way = next((w for w in WAYS if name.endswith(WAYS[w])), None)
+        if way is None:
             found.setdefault((effect, entities), {})[parameter] = value
+            continue
+        parameter, _, at = parameter.removesuffix(WAYS[way]).removesuffix("]").partition("[")
+        factor = way == "factor"
+        tuned.append(Addition(effect, {parameter: value}, source=source, more=not factor, times=factor, at=at))
     best = patched(diagnosis)
     suspected = [] if best is None else best.effects
     sites = iter([] if best is None else best.sites)
@@ -187,8 +228,7 @@ def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
     for (effect, entities), values in found.items():
         if effect not in suspected and effect not in there:  # of what is aligned, the rest does nothing
             found[effect, entities] = silent(effect) | values
-    source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
-    return tuple(
+    return *tuned, *(
         Addition(
             effect,
             values,
@@ -235,8 +275,7 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
         lines += [f"{word} = {_toml(getattr(a, word))}" for word in _WORDS if getattr(a, word)]
         if a.entities is not None:
             lines.append(f"entities = {_toml(list(a.entities))}")
-        if a.more:
-            lines.append("more = true")
+        lines += [f"{switch} = true" for switch in _SWITCHES if getattr(a, switch)]
         for name, value in a.values.items():
             p = get(a.effect).parameter(name)
             lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")

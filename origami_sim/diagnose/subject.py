@@ -1,5 +1,6 @@
 """What may be handed to `diagnose` as the model."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -9,6 +10,7 @@ import numpy as np
 from origami_sim.diagnose.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
+from origami_sim.entities import WAYS, located
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Setting, Settings, _parse, scene_module, scene_settings
@@ -31,7 +33,8 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         source: see `Source`.
         priors: standard deviations of what was known before. For a scene: by setting, see `spreads`. For a model with
             parameters: by "effect.parameter", relative ("5 %" or 0.05), one factor for all entities. For both: by
-            "effect.parameter" of an effect that may act besides, see `alignments`.
+            "effect.parameter" of single creases, panels or nodes of an effect of the model, see `numbers`; and of an
+            effect that may act besides, see `alignments`.
 
     Raises:
         InputError: no such scene, setting or parameter; a prior that is not positive; what is no model.
@@ -48,13 +51,17 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         case (ModuleType() as module, Settings() as settings):
             model, parameters, *_ = module.build(settings)
             own, further = divided(priors or {}, model)
-            subject = Subject.from_scene(module, settings, spreads=spreads(settings, own))
-            return subject.beside(alignments(further, parameters))
+            known, single = split(settings, own)
+            subject = Subject.from_scene(module, settings, spreads=spreads(settings, known))
+            return subject.tuned(numbers(single, model, parameters)).beside(alignments(further, parameters))
         case (Model() as model, Parameters() as parameters) | (Model() as model, Parameters() as parameters, Drive()):
             drive = source[2] if len(source) == 3 else None
             own, further = divided(priors or {}, model)
-            nominals = [_factor(parameters, name, given) for name, given in own.items()]
-            return Subject.from_model(model, parameters, drive, nominals).beside(alignments(further, parameters))
+            plain = {n: v for n, v in own.items() if "[" not in n and _is_share(v)}
+            nominals = [_factor(parameters, name, given) for name, given in plain.items()]
+            rest = numbers({n: v for n, v in own.items() if n not in plain}, model, parameters)
+            subject = Subject.from_model(model, parameters, drive, nominals).tuned(rest)
+            return subject.beside(alignments(further, parameters))
     raise InputError(
         "this is no model",
         field="model",
@@ -111,6 +118,58 @@ def _aligned(s: Setting, given: float | str, source: object) -> float:
     return _positive(
         s.name, str(_parse(s, text, None if source is None else Path(str(source)))), given, allowed, source
     )
+
+
+def split(settings: Settings, priors: Mapping[str, float | str]) -> tuple[dict, dict]:
+    """Priors of a scene's settings, and those of parameters of its model ("crease.stiffness[hinge1]")."""
+    single = {n: v for n, v in priors.items() if "." in n and n not in settings}
+    return {n: v for n, v in priors.items() if n not in single}, single
+
+
+def numbers(
+    priors: Mapping[str, float | str], model: Model, parameters: Parameters, *, source: object = None
+) -> list[Free]:
+    """Numbers of some entities of an effect of the model, such as the rest angle of one crease.
+
+    Args:
+        priors: standard deviations by "effect.parameter[name]", a share ("20 %": the fit changes it by a factor) or in
+            a unit ("0.02 rad": the fit adds to it). A name that several entities share stands for all of them; without
+            brackets all entities are meant.
+
+    Raises:
+        InputError: no such effect, parameter or entity; a value that is no positive share or has no unit; a share of
+            what is zero.
+    """
+    out = []
+    for label, given in priors.items():
+        found = located(label, model, parameters, file=source)
+        now = parameters[found.effect, found.name][found.entities]
+        text = str(given).strip()
+        allowed = f"a share such as '20 %', or a standard deviation with a unit such as '0.02 {found.unit}'"
+        if text.endswith("%"):
+            if not np.any(now):
+                raise InputError("no share of zero", file=source, field=f"priors.{label}", value=given, allowed=allowed)
+            spread = 0.01 * _positive(label, text[:-1], given, allowed, source)
+            name = label + WAYS["factor"]
+            out.append(Free(NOMINAL, name, "-", 1.0, 0.3 * spread, 0.0, np.inf, spread))
+            continue
+        if _is_share(given):
+            raise InputError(
+                "needs a share or a unit", file=source, field=f"priors.{label}", value=given, allowed=allowed
+            )
+        setting = Setting(f"priors.{label}", 0.0, found.unit, "", label)
+        spread = _positive(
+            label, str(_parse(setting, text, None if source is None else Path(str(source)))), given, allowed, source
+        )
+        low, high = found.bounds[0] - float(now.min()), found.bounds[1] - float(now.max())
+        out.append(Free(NOMINAL, label + WAYS["added"], found.unit, 0.0, 0.3 * spread, low, high, spread))
+    return out
+
+
+def _is_share(given: float | str) -> bool:
+    """Whether a prior is a share: in per cent, or a bare number."""
+    text = str(given).strip()
+    return text.endswith("%") or re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", text.lower()) is not None
 
 
 def _factor(parameters: Parameters, name: str, given: float | str) -> Free:

@@ -682,7 +682,7 @@ def test_priors_come_in_the_settings_unit_with_a_unit_or_as_a_share(recorded):
     )
     data = command.read_recordings([str(recorded)])
     built = scene_module("pendulum_chain").build(settings)[:2]
-    known, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], *built)
+    known, _, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], *built)
     assert known == pytest.approx(
         {"length_1": 1e-3, "mass_1": 1e-3, "viscosity_1": 5e-5}
     )  # the command line over the sidecar
