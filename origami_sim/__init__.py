@@ -25,8 +25,10 @@ if TYPE_CHECKING:
         read_mesh,
         read_pattern,
         read_svg,
+        sheet,
         strip,
         triangulate,
+        uncreased,
         waterbomb,
         write_fold,
         write_mesh,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from origami_sim.replay import open_replay, screenshot, write_replay
     from origami_sim.results import format_table, load_run, save_run
     from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.shell import isotropic, orthotropic
     from origami_sim.solve.dynamics import Trajectory, simulate
     from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
     from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
@@ -51,12 +54,13 @@ _HOMES = {
     "errors": "InputError",
     "materials": "MATERIALS bridge_stiffness layered_rigidity material",
     "model": "Model Parameters State",
-    "pattern": "Pattern cross grid kresling miura strip waterbomb triangulate "
+    "pattern": "Pattern cross grid kresling miura sheet strip uncreased waterbomb triangulate "
     "read_fold read_mesh read_pattern read_svg write_fold write_mesh",
     "recording": "Recording read_recording",
     "replay": "open_replay screenshot write_replay",
     "results": "format_table load_run save_run",
     "scene": "read_calibration scene_module",
+    "shell": "isotropic orthotropic",
     "solve.dynamics": "Trajectory simulate",
     "solve.quasistatic": "QuasiStatic quasistatic",
     "solve.statics": "Equilibrium Path continuation equilibrium",
@@ -66,9 +70,9 @@ _MODULES = {name: module for module, names in _HOMES.items() for name in names.s
 
 __all__ = [  # noqa: RUF022  (by what they are for)
     # a sheet
-    "Pattern", "cross", "grid", "kresling", "miura", "strip", "waterbomb",
+    "Pattern", "cross", "grid", "kresling", "miura", "sheet", "strip", "uncreased", "waterbomb",
     "read_pattern", "read_fold", "read_svg", "read_mesh", "write_fold", "write_mesh", "triangulate",
-    "Sheet", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
+    "Sheet", "isotropic", "orthotropic", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
     # a model and what drives it
     "Model", "Parameters", "State", "rigid", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
     # solutions

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.effects import get
+from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 
@@ -95,7 +95,7 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     """
     if model.panels == "rigid":
         return model, parameters
-    bending = [n for n in model.effects if get(n).family in ("bar", "bend") and n not in ELASTIC]
+    bending = [n for n in model.effects if get(n).family in ("bar", "bend", *SHELLS) and n not in ELASTIC]
     if bending:
         raise InputError(
             "rigid panels neither bend nor stretch",

@@ -12,6 +12,7 @@ from origami_sim.masses import Masses, Stated, positive
 from origami_sim.materials import MATERIALS, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
+from origami_sim.shell import Shell, assign, stated
 
 MEMBRANE_POISSON = 1.0 / 3.0
 """The only Poisson's ratio that bars along triangle edges reproduce in shear."""
@@ -86,6 +87,7 @@ class Sheet(Masses):
         self._contacts: list[tuple[int, np.ndarray, float, np.ndarray, str]] = []
         self._settings: list[tuple[str, str, object, object]] = []
         self._effects = ["bars"]
+        self._shell: Shell | None = None
         self._viscous_creases: tuple[float, float] = (0.0, 0.0)
         a, b, c = (self.mesh.vertices[self.mesh.triangles[:, k]] for k in range(3))
         self._area_vector = 0.5 * np.cross(b - a, c - a)
@@ -147,6 +149,35 @@ class Sheet(Masses):
             self._viscous_creases = (loss_time or 0.0, damping_ratio or 0.0)
             self.on("crease_viscosity")
         return self
+
+    def shell(
+        self,
+        *,
+        poisson: float | None = None,
+        elasticity: ArrayLike | None = None,
+        membrane: ArrayLike | None = None,
+        bending: ArrayLike | None = None,
+        axis: Sequence[float] = (1.0, 0.0, 0.0),
+    ) -> "Sheet":
+        """Makes the panels thin shells, which converge to plates and membranes of the material on any mesh.
+
+        They take the place of bars and bending lines. Without further statements every panel is isotropic, with its
+        thickness, modulus, Poisson's ratio, rigidity and patch.
+
+        Args:
+            poisson: Poisson's ratio instead of the material's.
+            elasticity: [3, 3] plane-stress stiffness [Pa], such as `orthotropic(...)`, for strains 11, 22 and twice 12.
+            membrane, bending: [3, 3] stiffness of the whole thickness [N/m], [N m] instead of what follows from it.
+            axis: the material's first axis in the reference state.
+
+        Raises:
+            InputError: rigid panels, a matrix that is not symmetric and positive, an axis without direction.
+        """
+        if self.panels == "rigid":
+            raise InputError("rigid panels neither bend nor stretch", field="panels", value="rigid", allowed="elastic")
+        self._shell = stated(elasticity, membrane, bending, poisson, axis)
+        self._effects = [e for e in self._effects if e != "bars"]
+        return self.on("shell_membrane", "shell_bending")
 
     def panel(self, panels, *, rigidity: float) -> "Sheet":
         """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
@@ -300,7 +331,7 @@ class Sheet(Masses):
             raise InputError(
                 "a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)"
             )
-        if len(mesh.bends):
+        if len(mesh.bends) and self._shell is None:
             self.on("panel_bending")
         if self.membrane_damping > 0:
             self.on("bar_viscosity")
@@ -334,7 +365,10 @@ class Sheet(Masses):
             p.set("body", name, values)
         lengths = np.linalg.norm(mesh.vertices[mesh.bars[:, 1]] - mesh.vertices[mesh.bars[:, 0]], axis=1)
         stiffness = self.membrane * self._bar_sections() / lengths
-        p.set("bars", "rest_length", lengths).set("bars", "stiffness", stiffness)
+        if "bars" in self._effects:
+            p.set("bars", "rest_length", lengths).set("bars", "stiffness", stiffness)
+        if self._shell is not None:
+            assign(self, self._shell, model, p)
         if self.membrane_damping > 0:
             reduced = 1.0 / (1.0 / mass[mesh.bars]).sum(1)
             p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))
@@ -342,7 +376,7 @@ class Sheet(Masses):
             p.set("crease", "stiffness", self._crease_stiffness).set("crease", "rest_angle", self._rest)
         if any(self._viscous_creases):
             p.set("crease_viscosity", "viscosity", self._crease_viscosity(mass))
-        if len(mesh.bends):
+        if len(mesh.bends) and "panel_bending" in self._effects:
             p.set("panel_bending", "stiffness", self._bend_stiffness())
             p.set("panel_bending", "rest_angle", dihedral_angles(mesh.vertices, mesh.bends))
         if "eccentric_weight" in self._effects:
@@ -380,6 +414,14 @@ class Sheet(Masses):
         if patch:
             layers.append((patch["thickness"], patch["material"].plane_modulus))
         return layered_rigidity(layers)
+
+    def has_rigidity(self, panel: int) -> bool:
+        """Whether the bending rigidity of a panel was stated by `panel`."""
+        return not np.isnan(self._rigidity[panel])
+
+    def patch_of(self, panel: int) -> dict:
+        """The patch on a panel; empty if there is none."""
+        return self._patches[panel]
 
     def _bend_stiffness(self) -> np.ndarray:
         mesh = self.mesh

@@ -69,6 +69,8 @@ class Model:
                 "crease": self.creases,
                 "bend": self.bends,
                 "triangle": self.triangles,
+                "membrane": self.triangles,
+                "plate": self.triangles,
                 "node": self.position,
             }[family]
         )

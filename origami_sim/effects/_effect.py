@@ -27,6 +27,11 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     # forces on the three corners, as the rows of a 3 x 3 matrix
     # stray: flux density from all other magnets at this one, stray_gradient: its dB_i/dx_j; see Effect.magnet
     "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "stray", "stray_gradient", "dt"),
+    # resultants [N/m] from Green's strain (11, 22 and twice 12), and moments per width [N] from the curvature [1/m] that
+    # comes on top of the reference state's, in the triangle's axes; both positive where they grow with it
+    # whole: 1 for a triangle's curvature, 0 for the difference to a neighbour's
+    "membrane": ("strain", "dt"),
+    "plate": ("curvature", "whole", "dt"),
     # force on the node
     "node": ("x", "v", "mass", "dt"),
     # normal: force along the ground's normal, repulsion positive
@@ -42,6 +47,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 """Families of entities, and the quantities that each offers to its laws (SI units)."""
 
 HINGES = ("crease", "bend")
+SHELLS = ("membrane", "plate")
 CONTACTS = ("contact", "coefficient", "tangent")
 DISTORTIONS = ("drive", "measurement")
 
@@ -160,6 +166,9 @@ class Effect:
                         f"drive nor a quantity of the family '{self.family}'; allowed: {', '.join(sorted(known))}"
                     )
             object.__setattr__(self, attribute, names)
+        local = {"field", "gradient", "voltage"} & set(self.drives)
+        if self.family in SHELLS and (local or self.memory):
+            raise ValueError(f"effect '{self.name}': the family '{self.family}' offers no memory, field or voltage")
         if self.interacts and (self.magnet is None or not self.fitted):
             raise ValueError(f"effect '{self.name}': a law that asks for the stray field needs a magnet and a strength")
 

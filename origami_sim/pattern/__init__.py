@@ -6,7 +6,7 @@ from ..errors import InputError
 from .build import cross, grid, kresling, miura, strip, waterbomb
 from .crease_pattern import ASSIGNMENTS, Pattern
 from .fold import read_fold, write_fold
-from .mesh import read_mesh, write_mesh
+from .mesh import read_mesh, sheet, uncreased, write_mesh
 from .svg import read_svg
 from .topology import open_cuts
 from .triangulate import Triangulation, hinge_angles, triangulate
@@ -25,8 +25,10 @@ __all__ = [
     "read_mesh",
     "read_pattern",
     "read_svg",
+    "sheet",
     "strip",
     "triangulate",
+    "uncreased",
     "waterbomb",
     "write_fold",
     "write_mesh",

@@ -1,5 +1,6 @@
 """Crease patterns from triangle meshes (OBJ, STL) and meshes back to files, by trimesh."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,30 @@ def _merged(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return vertices[first[order]], rank[index.reshape(-1)][triangles]
+
+
+def sheet(vertices, faces) -> Pattern:
+    """Return a sheet without creases: all inner edges are 'F', so that it bends over its whole surface.
+
+    Args:
+        vertices: [V, 3] positions [m]. faces: vertex loops, of triangles or polygons.
+
+    Raises:
+        InputError: anything `checks` refuses.
+    """
+    return uncreased(assemble(vertices, [tuple(map(int, face)) for face in faces]))
+
+
+def uncreased(pattern: Pattern) -> Pattern:
+    """Return the pattern with its unassigned edges made flat, such as those of `grid`: a sheet that bends all over.
+
+    Folds of a sheet that is not flat become its rest angles.
+    """
+    out = replace(pattern, assignments=list(pattern.assignments), fold_angles=pattern.fold_angles.copy())
+    for e in pattern.edges_assigned("U"):
+        out.assignments[e], out.fold_angles[e] = "F", 0.0
+    out.notes = [note for note in pattern.notes if "without an assignment" not in note]
+    return out
 
 
 def write_mesh(vertices, faces, path) -> None:

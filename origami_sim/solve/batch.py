@@ -14,6 +14,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets
+from origami_sim.solve import plates
 from origami_sim.solve.compose import BITS, compose
 
 APART = 128
@@ -138,6 +139,8 @@ class Batch:
             constant([first.get(k, 0) for k in kept] or [0], wp.int32),
             self._upload(self._acting(parameters) if among else np.zeros((1, self.worlds), np.int64), wp.int64),
         ]
+        if self.program.shells:
+            self._constants.append(plates.upload(model, self._stride, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)
         self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))

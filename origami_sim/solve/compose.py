@@ -15,8 +15,8 @@ import numpy as np
 import warp as wp
 
 from origami_sim import kinematics, magnetostatics
-from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, Effect, get
-from origami_sim.solve import articulated, runge_kutta, templates
+from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, SHELLS, Effect, get
+from origami_sim.solve import articulated, plates, runge_kutta, templates
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
@@ -95,6 +95,11 @@ class Program:
         each = [own.get(slot, np.zeros(1)) for slot in self.slots]
         return np.concatenate(each), [0, *np.cumsum([len(a) for a in each])[:-1].tolist()]
 
+    @property
+    def shells(self) -> bool:
+        """Whether the kernels take the rows of curvature."""
+        return any(e.family in SHELLS for e in self.effects)
+
     @functools.cached_property
     def rollout(self) -> wp.Kernel:
         return self._kernel("rollout")
@@ -135,6 +140,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "wave": wave,
         "articulated": articulated,
         "runge_kutta": runge_kutta,
+        "shells": plates,
         "NATURAL": NATURAL,
     }
     for e in effects:
@@ -236,10 +242,11 @@ class _Composer:
                 for line in writes:
                     t(line)
 
-    def add_energy(self, t: _Text, effect: Effect, entity: str, mode: str):
+    def add_energy(self, t: _Text, effect: Effect, entity: str, mode: str, times: str = ""):
         if mode == "evaluate" and effect.energy is not None:
             i = self.number(effect)
-            t(f"energies[{i}, w] = energies[{i}, w] + {self.call(effect, 'energy', entity)}")
+            law = self.call(effect, "energy", entity)
+            t(f"energies[{i}, w] = energies[{i}, w] + {f'{times} * {law}' if times else law}")
 
     def add_work(self, t: _Text, effect: Effect, power: str, mode: str):
         if mode in MOVING and effect.exchanges_work:
@@ -268,6 +275,9 @@ class _Composer:
         self._bars(t, mode)
         for family in HINGES:
             self._hinges(t, mode, family)
+        if mode != "rigid":  # panels that neither bend nor stretch
+            self._membranes(t, mode)
+            self._plates(t, mode)
         self._triangles(t, mode)
         self._contacts(t, mode)
         for i, e in enumerate(self.effects):
@@ -403,6 +413,69 @@ class _Composer:
         """A hinge's angle, continued from its last one, and its gradients."""
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("angle = kinematics.unwrap(g.angle, angles[r, w])")
+
+    def _membranes(self, t: _Text, mode: str):
+        effects = self.family("membrane")
+        if not effects:
+            return
+        with t.block("for row in range(triangles.shape[0]):"):
+            t("c = row & NATURAL")
+            for i in (1, 2, 3):
+                t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
+            t("shape = plates.shape[c]")
+            self._strain(t)
+            for e in effects:
+                i = self.number(e)
+                with self.acting(t, e):
+                    self.apply_law(t, e, "c", mode, f"N{i}")
+                    self.add_energy(t, e, "c", mode, "plates.area[c]")
+                    t(f"R{i} = shells.pull(y1, y2, y3, shape, plates.area[c] * N{i})")
+                    corners = [f"kinematics.corner(R{i}, {k})" for k in range(3)]
+                    for k, corner in enumerate(corners):
+                        self.scatter(t, e, f"n{k + 1}", corner, mode)
+                    self.add_work(t, e, " + ".join(f"wp.dot({f}, V[n{k + 1}, w])" for k, f in enumerate(corners)), mode)
+
+    def _strain(self, t: _Text):
+        """A triangle's strain, and the corners at which its gradient is taken."""
+        for i in (1, 2, 3):
+            t(f"y{i} = X[n{i}, w]")
+        t("strain = shells.strain(y1, y2, y3, shape)")
+
+    def _plates(self, t: _Text, mode: str):
+        effects = self.family("plate")
+        if not effects:
+            return
+        hinges = "for row in range(crease_count, hinges.shape[0]):"
+
+        def at_hinge():
+            t("r = row & NATURAL")
+            for i, node in enumerate("ijkl"):
+                t(f"{node} = hinges[r][{i}] & NATURAL")
+            self._fold(t)
+
+        if not self.family("bend"):  # whose laws have brought the angles up to date
+            with t.block(hinges):
+                at_hinge()
+                t("angles[r, w] = angle")
+        for e in effects:
+            i = self.number(e)
+            with self.acting(t, e):
+                with t.block(hinges):
+                    t("plates.moment[row, w] = scalar(0.0)")
+                with t.block("for row in range(plates.triangle.shape[0]):"):
+                    t("c = plates.triangle[row] & NATURAL")
+                    t("whole = plates.whole[row]")
+                    t("curvature = shells.bent(plates, angles, row, w)")
+                    self.apply_law(t, e, "c", mode, f"M{i}")
+                    self.add_energy(t, e, "c", mode, "plates.share[row]")
+                    t(f"shells.spread(plates, row, w, plates.share[row] * M{i})")
+                with t.block(hinges):
+                    at_hinge()
+                    t("moment = plates.moment[r, w]")
+                    for node in "ijkl":
+                        self.scatter(t, e, node, f"moment * g.g{node}", mode)
+                    rate = " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl")
+                    self.add_work(t, e, f"moment * ({rate})", mode)
 
     def _triangles(self, t: _Text, mode: str):
         effects = self.family("triangle")
@@ -547,8 +620,12 @@ class _Composer:
             at_node = f"share[{i - 1}] * part - (off * wp.dot(part, patch.g{i})) * patch.n"
             self.scatter(t, effect, f"n{i}", at_node, mode)
 
+    def arguments(self) -> str:
+        """What every kernel takes."""
+        return templates.arguments(bool(self.family(*SHELLS)))
+
     def sources(self) -> dict[str, str]:
-        given = {"arguments": templates.ARGUMENTS, "hoist": self.hoist()}
+        given = {"arguments": self.arguments(), "hoist": self.hoist()}
         mass = self.value("inertia", "mass", "n")
         return {
             "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass),

@@ -36,7 +36,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import DISTORTIONS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve import compose, templates
+from origami_sim.solve import compose
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import STEP, _System
 from origami_sim.solve.timestep import stable_step
@@ -101,6 +101,13 @@ class _Averager(compose._Composer):
         # the mean of the gradient along the path: times the change of the span it is the change of the length
         t("along = (before + after) * (scalar(1.0) / (wp.length(before) + wp.length(after)))")
 
+    def _strain(self, t: compose._Text):
+        ends = [f"X0[n{i}]" for i in (1, 2, 3)], [f"X1[n{i}, w]" for i in (1, 2, 3)]
+        for i, (a, b) in enumerate(zip(*ends, strict=True), 1):
+            t(f"y{i} = scalar(0.5) * ({a} + {b})")
+        t(f"before_strain = shells.strain({', '.join(ends[0])}, shape)")
+        t(f"strain = before_strain + fraction * (shells.strain({', '.join(ends[1])}, shape) - before_strain)")
+
     def _fold(self, t: compose._Text):
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("last = kinematics.dihedral(X1[i, w], X1[j, w], X1[k, w], X1[l, w])")
@@ -118,7 +125,7 @@ def _kernel(names: tuple[str, ...]) -> wp.Kernel:
     """The kernel of the averaged force for a set of effects."""
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
     composer = _Averager(effects)
-    source = _HEAD.format(arguments=templates.ARGUMENTS, hoist=composer.hoist(), body=composer.body("rollout"))
+    source = _HEAD.format(arguments=composer.arguments(), hoist=composer.hoist(), body=composer.body("rollout"))
     return compose.written(source, "average", effects)
 
 

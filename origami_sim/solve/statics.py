@@ -26,6 +26,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid_statics import RigidSystem
+from origami_sim.solve.timestep import gradient_norms
 
 STEP = 2e-4
 """Step of the differences over the smallest length of the elements at a node."""
@@ -428,6 +429,10 @@ class _System:
         for family, elements in (("bar", m.bars), ("crease", m.creases), ("bend", m.bends), ("triangle", m.triangles)):
             if family in families:
                 groups.append(elements)
+        if "membrane" in families:
+            groups.append(m.triangles)
+        if "plate" in families:
+            groups.append(gradient_norms(m, "plate")[0])
         if families & set(CONTACTS):
             groups.append(m.contacts)
         if any(get(e).interacts for e in m.laws):

@@ -1,6 +1,6 @@
 """Text of the kernels around the laws of the effects: arguments, time loops, what is done with the forces."""
 
-ARGUMENTS = """
+_ARGUMENTS = """
     mask: wp.array(dtype=vec3), bars: wp.array(dtype=wp.vec2i), hinges: wp.array(dtype=wp.vec4i),
     electrodes: wp.array(dtype=wp.int32), triangles: wp.array(dtype=wp.vec3i),
     magnets: wp.array(dtype=wp.int32),
@@ -8,10 +8,16 @@ ARGUMENTS = """
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
     series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{plates}
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
 """
+
+
+def arguments(shells: bool) -> str:
+    """Arguments that all kernels begin with; those of sheets have the rows of curvature among them."""
+    return _ARGUMENTS.format(plates="\n    plates: shells.Plates," if shells else "")
+
 
 ROLLOUT = """
 @wp.kernel(enable_backward=False)

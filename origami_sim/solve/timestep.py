@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from origami_sim import curvature
 from origami_sim.effects import CONTACTS, HINGES, Effect, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -65,12 +66,63 @@ def gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
         gj = np.abs(1 - ai) * gi + np.abs(1 - al) * gl
         gk = np.abs(ai) * gi + np.abs(al) * gl
         return h, np.stack([gi, gj, gk, gl], axis=1)
+    if family == "membrane":
+        a, b, c = (x[model.triangles[:, i]] for i in range(3))
+        twice = np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+        return model.triangles, np.stack([np.linalg.norm(s, axis=-1) / twice for s in (c - b, a - c, b - a)], axis=1)
+    if family == "plate":
+        return _plate_norms(model)
     if family in CONTACTS:
         a, b, c = (x[model.contacts[:, i]] for i in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=-1)
         slopes = np.stack([np.linalg.norm(s, axis=-1) / area for s in (c - b, a - c, b - a)], axis=1)
         return model.contacts, np.abs(model.contact_weights) + np.abs(model.contact_offsets)[:, None] * slopes
     raise KeyError(family)
+
+
+def _plate_norms(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes [R, k] of the rows of curvature (padded by the first with nothing) and the gradient's norms there [R, k].
+
+    They are those of the reference state, where the parts of a row's hinges add or cancel along one normal; folds of a
+    sheet that is fine enough to be one stay small.
+    """
+    rows, x = curvature.of(model), model.position
+    hinges, n, count = model.bends[rows.hinge], len(x), len(rows.triangle)
+    weight = rows.weight * np.sqrt([1.0, 1.0, 0.5])  # the norm counts the shear component, not its double, twice
+    slopes = [weight[:, :, None] * g[rows.hinge][:, None] for g in _hinge_gradients(x, model.bends)]
+    place = (rows.row[:, None] * n + hinges).T.ravel()
+    found, index = np.unique(place, return_inverse=True)
+    total = np.zeros((len(found), 3, 3))
+    np.add.at(total, index, np.concatenate(slopes))
+    norm = np.sqrt((total**2).sum((1, 2)))
+    row = found // n
+    column = np.arange(len(found)) - np.searchsorted(row, row)
+    nodes = np.zeros((count, int(column.max(initial=-1)) + 1), np.int64)
+    norms = np.zeros(nodes.shape)
+    nodes[:] = found[np.searchsorted(row, np.arange(count))][:, None] % n
+    nodes[row, column], norms[row, column] = found % n, norm
+    return nodes, norms
+
+
+def _hinge_gradients(x: np.ndarray, hinges: np.ndarray) -> list[np.ndarray]:
+    """Gradients [Q, 3] of the fold angles at the nodes i, j, k and l."""
+    i, j, k, m = (x[hinges[:, c]] for c in range(4))
+    e = k - j
+    ee = (e**2).sum(-1, keepdims=True)
+    n1, n2 = np.cross(i - j, e), np.cross(e, m - j)
+    gi, gl = (n * np.sqrt(ee) / (n**2).sum(-1, keepdims=True) for n in (n1, n2))
+    ai, al = (((p - j) * e).sum(-1, keepdims=True) / ee for p in (i, m))
+    return [gi, -(1 - ai) * gi - (1 - al) * gl, -ai * gi - al * gl, gl]
+
+
+def _per_element(model: Model, family: str, k: np.ndarray) -> np.ndarray:
+    """Stiffness of the elements of a family, from that of its entities [E, W]: of triangles it is given per area."""
+    if family == "membrane":
+        return k * curvature.of(model).area[:, None]
+    if family == "plate":
+        rows = curvature.of(model)
+        return np.broadcast_to(k, (len(model.triangles), k.shape[1]))[rows.triangle] * rows.share[:, None]
+    return k
 
 
 def stable_step(model: Model, parameters: Parameters) -> TimeStep:
@@ -113,7 +165,8 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
             slope = getattr(effect, kind)
             if slope is None:
                 continue
-            k = np.broadcast_to(slope({**own, **parameters.of(effect.name)}), (len(nodes), worlds))
+            k = _per_element(model, effect.family, slope({**own, **parameters.of(effect.name)}))
+            k = np.broadcast_to(k, (len(nodes), worlds))
             sums[first[effect.family] : first[effect.family] + len(nodes)] += k
             if kind == "stiffness":
                 stiffest.append((effect, k))
@@ -151,5 +204,6 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
         nodes, norms = families[effect.family]
         row = np.where(nodes == i, k[:, [w]] * norms * norms.sum(axis=1, keepdims=True), 0.0).max(axis=1, initial=0.0)
         if row.max(initial=0.0) > largest:
-            largest, cause = row.max(), f"{model.name(effect.family, int(np.argmax(row)))} ({effect.name})"
+            at = int(np.argmax(row)) if effect.family != "plate" else int(curvature.of(model).triangle[np.argmax(row)])
+            largest, cause = row.max(), f"{model.name(effect.family, at)} ({effect.name})"
     return TimeStep(limit=float(limit[w]), dt=SAFETY * float(limit[w]), node=i, cause=cause)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ from effects.kit import ALL, INTERNAL, hinge_positions, make_model, quiet, rando
 
 import origami_sim.effects
 from origami_sim.drive import Drive
-from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES
+from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES, SHELLS
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.statics import tangent
+from origami_sim.solve.timestep import stable_step
 
 ACT_BY_DEFAULT = {"gravity", "ground"}
 """Effects that do something as soon as they are switched on; all others wait for a parameter."""
@@ -295,7 +298,26 @@ def test_stays_finite_when_flat_when_folded_and_at_rest(name, kind):
     assert name not in report.energies or np.all(np.isfinite(report.energies[name]))
 
 
-@pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].stiffness is not None])
+LIMITING = [n for n in ALL if CATALOGUE[n].stiffness is not None]
+
+
+@pytest.mark.parametrize("name", [n for n in LIMITING if CATALOGUE[n].family in SHELLS])
+def test_declared_stiffness_of_a_sheet_bounds_its_frequencies(name):
+    """A bumpy sheet without stress: the largest eigenvalue of its tangent stays below what limits the step."""
+    rng = np.random.default_rng(4)
+    model = strip(3, effects=(name,))
+    model = replace(model, bends=np.concatenate([model.creases, model.bends]), creases=model.creases[:0])
+    model = replace(model, position=model.position + 0.1 * rng.uniform(-1, 1, model.position.shape))
+    parameters = Parameters(model)
+    entries = {"11": 1.5, "22": 1.0, "12": 0.3, "66": 0.6, "16": 0.1, "26": -0.2}
+    for component, value in entries.items():
+        parameters.set(name, f"stiffness_{component}", value)
+    bound = (2 / stable_step(model, parameters).limit) ** 2
+    highest = np.linalg.eigvalsh(tangent(model, parameters).toarray())[-1]
+    assert bound / 10 < highest < bound
+
+
+@pytest.mark.parametrize("name", [n for n in LIMITING if CATALOGUE[n].family not in SHELLS])
 def test_declared_stiffness_bounds_the_slope_of_the_force(name):
     """One element: |d(force)/d(coordinate)| by differences over the whole range stays below what limits the step."""
     effect = CATALOGUE[name]

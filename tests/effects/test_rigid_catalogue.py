@@ -8,12 +8,12 @@ from effects.kit import make_model, quiet, start
 from effects.test_catalogue import NOW, give, responsible, the_drive
 
 from origami_sim.articulation import Articulation
-from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS
+from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, SHELLS
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.rigid import RigidBatch
 
-ALL = tuple(n for n, e in CATALOGUE.items() if e.family not in (*DISTORTIONS, "bar", "bend"))
+ALL = tuple(n for n, e in CATALOGUE.items() if e.family not in (*DISTORTIONS, *SHELLS, "bar", "bend"))
 FOLDS = (np.array([0.7, -0.5]), np.array([2.9, -2.8]))
 """Fold angles [rad]; in the second, laws act that wait for a crease to close."""
 

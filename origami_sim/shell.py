@@ -1,0 +1,171 @@
+"""Sheets as thin shells: elasticity of the material, and the membrane and bending stiffness that follow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from origami_sim import curvature
+from origami_sim.effects._plate import COMPONENTS
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters
+
+if TYPE_CHECKING:
+    from origami_sim.build import Sheet
+
+PLACES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "66": (2, 2), "16": (0, 2), "26": (1, 2)}
+"""Row and column of the components of a stiffness matrix."""
+
+
+@dataclass(frozen=True)
+class Shell:
+    """What `Sheet.shell` states.
+
+    Attributes:
+        elasticity: [3, 3] plane-stress stiffness [Pa] in the material's axes; None: isotropic, each panel's own.
+        membrane: [3, 3] membrane stiffness [N/m], bending: [3, 3] bending stiffness [N m]; None: from the elasticity.
+        poisson: Poisson's ratio instead of the material's. axis: the material's first axis in the reference state.
+    """
+
+    elasticity: np.ndarray | None = None
+    membrane: np.ndarray | None = None
+    bending: np.ndarray | None = None
+    poisson: float | None = None
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+
+def isotropic(modulus: float, poisson: float) -> np.ndarray:
+    """Plane-stress stiffness [3, 3] of an isotropic material, in the unit of its modulus.
+
+    Raises:
+        InputError: modulus not positive, Poisson's ratio not between -1 and 1.
+    """
+    if not (np.isfinite(modulus) and modulus > 0):
+        raise InputError("a modulus must be positive", field="modulus", value=modulus, allowed="> 0")
+    if not -1 < poisson < 1:
+        allowed = "above -1, below 1"
+        raise InputError("no sheet has this Poisson's ratio", field="poisson", value=poisson, allowed=allowed)
+    return modulus / (1 - poisson**2) * np.array([[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]])
+
+
+def orthotropic(modulus_1: float, modulus_2: float, poisson_12: float, shear: float) -> np.ndarray:
+    """Plane-stress stiffness [3, 3] of a sheet with two directions, such as paper, in the unit of its moduli.
+
+    Args:
+        modulus_1, modulus_2: Young's moduli along and across the first axis. shear: shear modulus.
+        poisson_12: contraction along 2 over extension along 1 under tension along 1; nu_21 = nu_12 E2 / E1.
+
+    Raises:
+        InputError: a modulus that is not positive, or nu_12^2 >= E1 / E2.
+    """
+    for name, value in (("modulus_1", modulus_1), ("modulus_2", modulus_2), ("shear", shear)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError("a modulus must be positive", field=name, value=value, allowed="> 0")
+    limit = float(np.sqrt(modulus_1 / modulus_2))
+    if not abs(poisson_12) < limit:
+        allowed = f"between -{limit:.4g} and {limit:.4g} (square root of modulus_1 / modulus_2)"
+        raise InputError("no sheet has this Poisson's ratio", field="poisson_12", value=poisson_12, allowed=allowed)
+    compliance = np.array([[1 / modulus_1, -poisson_12 / modulus_1], [-poisson_12 / modulus_1, 1 / modulus_2]])
+    out = np.zeros((3, 3))
+    out[:2, :2], out[2, 2] = np.linalg.inv(compliance), shear
+    return out
+
+
+def stated(
+    elasticity: ArrayLike | None,
+    membrane: ArrayLike | None,
+    bending: ArrayLike | None,
+    poisson: float | None,
+    axis: Sequence[float],
+) -> Shell:
+    """A checked statement. Raises InputError for matrices that are not positive and an axis without direction."""
+    given = {"elasticity": elasticity, "membrane": membrane, "bending": bending}
+    matrices = {n: None if m is None else _positive(n, m) for n, m in given.items()}
+    if poisson is not None:
+        if elasticity is not None:
+            raise InputError("the elasticity has Poisson's ratio in it", field="poisson", value=poisson, allowed="none")
+        isotropic(1.0, poisson)
+    direction = np.asarray(axis, float)
+    if direction.shape != (3,) or not np.all(np.isfinite(direction)) or not np.linalg.norm(direction) > 0:
+        raise InputError("a material needs a direction", field="axis", value=direction.tolist(), allowed="x, y, z")
+    x, y, z = direction.tolist()
+    return Shell(**matrices, poisson=poisson, axis=(x, y, z))
+
+
+def _positive(name: str, given: ArrayLike) -> np.ndarray:
+    m = np.asarray(given, float)
+    good = m.shape == (3, 3) and bool(np.all(np.isfinite(m))) and np.allclose(m, m.T, rtol=1e-9, atol=0)
+    if not good or np.linalg.eigvalsh(m)[0] <= 0:
+        allowed = "a symmetric 3 x 3 matrix with positive eigenvalues, for 11, 22 and twice 12"
+        raise InputError("no sheet has this stiffness", field=name, value=m.tolist(), allowed=allowed)
+    return m
+
+
+def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -> None:
+    """Sets the stiffness of every triangle, from its panel's thickness, material and patch.
+
+    Raises:
+        InputError: the material's axis stands upright on a panel.
+    """
+    triangles = model.triangles
+    found = curvature.of(model)
+    upright = np.linalg.norm(found.axes @ np.array(shell.axis), axis=1) < 1e-6 * np.linalg.norm(shell.axis)
+    turn = np.arctan2(found.axes[:, 1] @ np.array(shell.axis), found.axes[:, 0] @ np.array(shell.axis))
+    membrane, bending = np.zeros((len(triangles), 3, 3)), np.zeros((len(triangles), 3, 3))
+    by_panel = [_of_panel(sheet, shell, p) for p in range(sheet.pattern.face_count)]
+    plain = shell.elasticity is None and shell.membrane is None and shell.bending is None
+    for t, panel in enumerate(model.triangle_panel.tolist()):
+        a, d = by_panel[panel]
+        if not plain:
+            if upright[t]:
+                raise InputError(
+                    "the material's axis stands upright on a panel",
+                    field=f"axis on {model.name('panel', panel)}",
+                    value=list(shell.axis),
+                    allowed="a direction with a part in every panel's plane",
+                )
+            by = _turned(turn[t])
+            a, d = by.T @ a @ by, by.T @ d @ by
+        membrane[t], bending[t] = a, curvature.relaxed(d, found.normal[t][found.loose[t]])
+    for effect, matrices in (("shell_membrane", membrane), ("shell_bending", bending)):
+        # what is left of a relaxed direction by rounding must not be negative
+        scale = np.abs(matrices).max(axis=(1, 2), initial=1e-300)
+        for c in COMPONENTS:
+            row, column = PLACES[c]
+            values = matrices[:, row, column]
+            values = np.where(np.abs(values) < 1e-12 * scale, 0.0, values)
+            parameters.set(effect, f"stiffness_{c}", values[:, None])
+
+
+def _of_panel(sheet: "Sheet", shell: Shell, panel: int) -> tuple[np.ndarray, np.ndarray]:
+    """Membrane [N/m] and bending stiffness [N m] of a panel, in the material's axes."""
+    thickness, modulus = float(sheet.thickness[panel]), float(sheet.modulus[panel])
+    nu = float(sheet.poisson[panel]) if shell.poisson is None else shell.poisson
+    patch = sheet.patch_of(panel)
+    if shell.elasticity is not None:
+        a, d = shell.elasticity * thickness, shell.elasticity * thickness**3 / 12
+        if patch:
+            raise InputError(
+                "a patch is bonded to an isotropic sheet",
+                field=f"elasticity of panel {panel}",
+                allowed="membrane= and bending= of the layers together",
+            )
+    else:
+        unit = isotropic(1.0, nu)
+        a = modulus * thickness * unit
+        if patch:
+            m = patch["material"]
+            a = a + patch["thickness"] * isotropic(m.modulus, m.poisson)
+        # a stated rigidity is that of wide strips; one from the material was found with the material's Poisson's ratio
+        fixed = patch or sheet.has_rigidity(panel)
+        d = sheet.rigidity(panel) * (1 - (nu if fixed else float(sheet.poisson[panel])) ** 2) * unit
+    a = a if shell.membrane is None else shell.membrane
+    return sheet.membrane * a, d if shell.bending is None else shell.bending
+
+
+def _turned(angle: float) -> np.ndarray:
+    """Strains [3, 3] (11, 22 and twice 12) in axes that are turned by `angle`, from those in the old ones."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])

@@ -1,0 +1,85 @@
+"""Strains and curvatures of a sheet's triangles in the kernels, and the forces that go with their stresses."""
+
+import numpy as np
+import warp as wp
+
+from origami_sim import _warp, curvature  # noqa: F401  settings
+from origami_sim.model import Model, dihedral_angles
+
+scalar = wp.float64
+
+
+@wp.struct
+class Plates:
+    """Rows of `curvature.Curvature` with hinges counted from the first crease, and room for the hinges' moments.
+
+    rest: curvature of the rows in the reference state [1/m]; moment: [H, W] [N m].
+    """
+
+    start: wp.array(dtype=wp.int32)
+    hinge: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.vec3d)
+    triangle: wp.array(dtype=wp.int32)
+    whole: wp.array(dtype=wp.float64)
+    share: wp.array(dtype=wp.float64)
+    rest: wp.array(dtype=wp.vec3d)
+    area: wp.array(dtype=wp.float64)
+    shape: wp.array(dtype=wp.mat22d)
+    moment: wp.array2d(dtype=wp.float64)
+
+
+@wp.func
+def bent(p: Plates, angles: wp.array2d(dtype=wp.float64), row: int, w: int):
+    """Curvature of a row less that of the reference state: 11, 22 and twice 12 [1/m]."""
+    k = -p.rest[row]
+    for e in range(p.start[row], p.start[row + 1]):
+        k += angles[p.hinge[e], w] * p.weight[e]
+    return k
+
+
+@wp.func
+def spread(p: Plates, row: int, w: int, moment: wp.vec3d):
+    """Adds to the moments of the hinges what a row's moments [N m^2] do on them."""
+    for e in range(p.start[row], p.start[row + 1]):
+        h = p.hinge[e]
+        p.moment[h, w] = p.moment[h, w] - wp.dot(p.weight[e], moment)
+
+
+@wp.func
+def strain(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, shape: wp.mat22d):
+    """Green's strain of a triangle: 11, 22 and twice 12."""
+    f1 = shape[0, 0] * (x2 - x1) + shape[1, 0] * (x3 - x1)
+    f2 = shape[0, 1] * (x2 - x1) + shape[1, 1] * (x3 - x1)
+    one = scalar(1.0)
+    half = scalar(0.5)
+    return wp.vec3d(half * (wp.dot(f1, f1) - one), half * (wp.dot(f2, f2) - one), wp.dot(f1, f2))
+
+
+@wp.func
+def pull(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, shape: wp.mat22d, n: wp.vec3d):
+    """Forces on the corners, as rows, from membrane forces (second Piola-Kirchhoff) times the area [N m]."""
+    f1 = shape[0, 0] * (x2 - x1) + shape[1, 0] * (x3 - x1)
+    f2 = shape[0, 1] * (x2 - x1) + shape[1, 1] * (x3 - x1)
+    p1 = n[0] * f1 + n[2] * f2
+    p2 = n[2] * f1 + n[1] * f2
+    r2 = -(shape[0, 0] * p1 + shape[0, 1] * p2)
+    r3 = -(shape[1, 0] * p1 + shape[1, 1] * p2)
+    return wp.matrix_from_rows(-r2 - r3, r2, r3)
+
+
+def upload(model: Model, worlds: int, device) -> Plates:
+    """The rows of a model on a device."""
+    found, creases = curvature.of(model), len(model.creases)
+
+    def constant(a, dtype):
+        return wp.array(np.ascontiguousarray(a), dtype=dtype, device=device)
+
+    p = Plates()
+    p.start, p.hinge = constant(found.start, wp.int32), constant(found.hinge + creases, wp.int32)
+    p.weight, p.triangle = constant(found.weight, wp.vec3d), constant(found.triangle, wp.int32)
+    p.whole, p.share = constant(found.whole, wp.float64), constant(found.share, wp.float64)
+    with np.errstate(invalid="ignore"):  # of hinges without triangles
+        p.rest = constant(found.of(dihedral_angles(model.position, model.bends)), wp.vec3d)
+    p.area, p.shape = constant(found.area, wp.float64), constant(found.shape, wp.mat22d)
+    p.moment = wp.zeros((max(creases + len(model.bends), 1), worlds), dtype=wp.float64, device=device)
+    return p

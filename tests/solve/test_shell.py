@@ -1,0 +1,240 @@
+"""Sheets as shells against plates, membranes and the elastica: what any mesh has to converge to."""
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg as spla
+from effects.kit import random_rotation
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from solve.sheets import KINDS, at, border, mesh, plate, rimmed, tributary
+
+from origami_sim import (
+    Drive,
+    InputError,
+    Sheet,
+    State,
+    equilibrium,
+    grid,
+    isotropic,
+    orthotropic,
+    rigid,
+    simulate,
+    stable_step,
+    uncreased,
+)
+from origami_sim.curvature import curvature
+from origami_sim.model import dihedral_angles
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.statics import tangent
+
+SUPPORTED = 0.0040623527
+"""Deflection of the middle of a simply supported square plate, in q a^4 / D (Navier's series)."""
+
+CLAMPED = 0.0012653191
+"""The same of a clamped one (Taylor & Govindjee 2004, Commun. Numer. Meth. Eng. 20, 757)."""
+
+E, THICKNESS = 1e9, 1e-3
+
+
+def deflections(model, parameters, force):
+    """Small deflections [N] of a flat sheet under forces along z [N]."""
+    k = tangent(model, parameters, Drive(load=1.0)).tocsc()
+    free = 3 * np.flatnonzero(model.free[:, 2]) + 2
+    w = np.zeros(model.position.size)
+    w[free] = spla.spsolve(k[free][:, free], np.repeat(force, 3)[free])
+    return w[2::3]
+
+
+def plate_error(kind, n, case, poisson):
+    """Relative error of the middle's deflection under a pressure."""
+    x, triangles = mesh(kind, n) if case == "supported" else rimmed(kind, n)
+    axes = "z" if case == "supported" else "xyz"
+    model, parameters = plate(x, triangles, held=border(x), axes=axes, poisson=poisson)
+    w = deflections(model, parameters, tributary(x, triangles))
+    exact = (SUPPORTED if case == "supported" else CLAMPED) * 12 * (1 - poisson**2) / (E * THICKNESS**3)
+    return at(x, w, [0.5, 0.5]) / exact - 1
+
+
+@pytest.mark.parametrize("case", ["supported", "clamped"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_plates_of_sixteen_cells_are_right_to_two_percent(kind, case):
+    for poisson in (0.0, 0.3, 0.49):
+        assert abs(plate_error(kind, 16, case, poisson)) < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["supported", "clamped"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_plates_converge(kind, case):
+    """Largest error over Poisson's ratios, so that no zero between two meshes is taken for convergence."""
+    cells = [8, 16, 32]
+    errors = [max(abs(plate_error(kind, n, case, nu)) for nu in (0.0, 0.3, 0.49)) for n in cells]
+    assert -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_constant_curvature_is_found_exactly_and_needs_no_force_inside(kind):
+    """The patch test of bending, with the sheet anywhere in space: hinge angles of a paraboloid, small.
+
+    Moments that the paraboloid needs are missing at the border, which is felt three rings of triangles deep.
+    """
+    x, triangles = mesh(kind, 10)
+    model, parameters = plate(x, triangles, poisson=0.3)
+    found = curvature(x, triangles, model.bends, model.free)
+    inside = np.all((x[:, :2] > 0.35) & (x[:, :2] < 0.65), axis=1)
+    for k in ((1.0, -0.3, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.0)):
+        bent = x.copy()
+        bent[:, 2] = 1e-6 * (k[0] * x[:, 0] ** 2 + k[1] * x[:, 1] ** 2 + k[2] * x[:, 0] * x[:, 1]) / 2
+        rows = 1e6 * found.of(dihedral_angles(bent, model.bends))
+        inner = np.flatnonzero(~np.any(found.loose[found.triangle], axis=1))
+        whole = inner[found.whole[inner] == 1]
+        assert rows[whole] == pytest.approx(np.tile(k, (len(whole), 1)), abs=1e-7)
+        r = random_rotation(np.random.default_rng(3))
+        state = Batch(model, parameters, Drive(), State.at_rest(model, 1, bent @ r.T)).evaluate(0.0)
+        force = np.linalg.norm(state.forces["shell_bending"][:, 0], axis=1)
+        assert force[inside].max() < 1e-6 * force.max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_membrane_stretches_and_shears_exactly(kind):
+    """The patch test of the membrane at large strain: uniform Green strain, forces on the border only."""
+    x, triangles = mesh(kind, 6)
+    model, parameters = plate(x, triangles, poisson=0.3)
+    f = np.array([[1.2, 0.3, 0.0], [0.1, 0.9, 0.0], [0.0, 0.0, 1.0]])
+    r = random_rotation(np.random.default_rng(1))
+    report = Batch(model, parameters, Drive(), State.at_rest(model, 1, x @ f.T @ r.T)).evaluate(0.0)
+    force = np.linalg.norm(report.forces["shell_membrane"][:, 0], axis=1)
+    inside = np.setdiff1d(np.arange(len(x)), border(x))
+    assert force[inside].max() < 1e-12 * force.max()
+    strain = 0.5 * (f[:2, :2].T @ f[:2, :2] - np.eye(2))
+    e = np.array([strain[0, 0], strain[1, 1], 2 * strain[0, 1]])
+    density = 0.5 * e @ (isotropic(E, 0.3) * THICKNESS) @ e
+    assert report.energies["shell_membrane"][0] == pytest.approx(density, rel=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "cells"), [("diagonal", 40)])
+def test_an_elastica_of_forty_cells_is_right_to_two_per_mille(kind, cells):
+    """A cantilever strip under a dead load across its end that bends it by 60 degrees, thickness/length 1e-3."""
+    load, width = 3.0, 0.05
+    x, triangles = mesh(kind, cells + 2, 2, size=(1 + 2 / cells, width))
+    x[:, 0] -= 2 / cells
+    model, parameters = plate(x, triangles, held=np.flatnonzero(x[:, 0] < 1e-9), poisson=0.0)
+    end = np.flatnonzero(x[:, 0] > 1 - 1e-9)
+    share = np.array([0.25, 0.5, 0.25])[np.argsort(np.argsort(x[end, 1]))]
+    parameters.set("load", "force_z", share * load * E * THICKNESS**3 / 12 * width, end)
+    state = None
+    for part in np.linspace(0.2, 1.0, 5):
+        found = equilibrium(model, parameters, Drive(load=float(part)), state=state, tolerance=1e-8)
+        assert found.converged, found.message
+        state = found.state
+    tip = share @ found.x[end]
+    assert [tip[0], tip[2]] == pytest.approx(elastica(load), abs=0.002)
+
+
+def elastica(load):
+    """Place of the end of a cantilever of unit length and rigidity under a dead load across it (shooting)."""
+
+    def run(bend):
+        return solve_ivp(
+            lambda s, y: [y[1], -load * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])],
+            (0, 1),
+            [0.0, bend, 0.0, 0.0],
+            rtol=1e-11,
+            atol=1e-12,
+        ).y[:, -1]
+
+    return run(brentq(lambda b: run(b)[1], 0.0, load))[2:]
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 4, 1.2])
+def test_a_bent_strip_curves_across_as_its_material_does(angle):
+    """Anticlastic: pure bending of a strip with free sides, cut from paper at an angle, on a random mesh.
+
+    Its curvature D^-1 (1, 0, 0) is constant, so it needs no force but at the ends.
+    """
+    x, triangles = mesh("random", 16, 6, size=(1.0, 0.4))
+    elasticity = orthotropic(E, 0.5 * E, 0.4, 0.2 * E)
+    model, parameters = plate(x, triangles, elasticity=elasticity, axis=(np.cos(angle), np.sin(angle), 0))
+    c, s = np.cos(angle), np.sin(angle)
+    strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    k = np.linalg.solve(strains.T @ elasticity @ strains, [1.0, 0.0, 0.0])
+    k /= np.abs(k).max()
+    w = 1e-6 * (k[0] * x[:, 0] ** 2 + k[1] * x[:, 1] ** 2 + k[2] * x[:, 0] * x[:, 1]) / 2
+    bent = x + np.column_stack([np.zeros_like(x[:, :2]), w])
+    force = Batch(model, parameters, Drive(), State.at_rest(model, 1, bent)).evaluate(0.0).forces["shell_bending"][:, 0]
+    inside = (x[:, 0] > 0.25) & (x[:, 0] < 0.75)
+    assert np.abs(force[inside]).max() < 1e-6 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("poisson", [0.0, 0.49])
+def test_a_square_sheet_is_twisted_into_a_saddle(kind, poisson):
+    """Held at three corners and pushed at the fourth it becomes w = x y P / (2 D (1 - nu)), exactly."""
+    x, triangles = mesh(kind, 8)
+    corners = [int(np.argmin(((x[:, :2] - c) ** 2).sum(axis=1))) for c in ((0, 0), (1, 0), (0, 1), (1, 1))]
+    model, parameters = plate(x, triangles, held=corners[:3], axes="z", poisson=poisson)
+    force = np.zeros(len(x))
+    force[corners[3]] = 1e-6
+    rigidity = E * THICKNESS**3 / (12 * (1 - poisson**2))
+    expected = x[:, 0] * x[:, 1] * 1e-6 / (2 * rigidity * (1 - poisson))
+    assert deflections(model, parameters, force) == pytest.approx(expected, abs=1e-6 * expected.max())
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.49])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_membrane_converges(kind, poisson):
+    """Plane stress under a body force made for u = sin(pi x) sin(pi y) (1, 0): order 2, below 2 % at 16 cells."""
+    errors = []
+    for n in (8, 16):
+        x, triangles = mesh(kind, n)
+        model, parameters = plate(x, triangles, held=border(x), poisson=poisson)
+        sx, sy, cx, cy = (f(np.pi * x[:, a]) for f in (np.sin, np.cos) for a in (0, 1))
+        stiffness = E * THICKNESS / (1 - poisson**2)
+        along, across = (1 + (1 - poisson) / 2) * sx * sy, -(1 + poisson) / 2 * cx * cy
+        body = stiffness * np.pi**2 * np.stack([along, across], axis=1)
+        k = tangent(model, parameters).tocsc()
+        free = np.flatnonzero(model.free.ravel() * np.tile([1, 1, 0], len(x)))
+        force = np.zeros(x.shape)
+        force[:, :2] = body * tributary(x, triangles)[:, None]
+        u = np.zeros(x.size)
+        u[free] = spla.spsolve(k[free][:, free], force.ravel()[free])
+        errors.append(np.abs(u.reshape(-1, 3)[:, 0] - sx * sy).max())
+    assert errors[1] < 0.02
+    assert np.log2(errors[0] / errors[1]) > 1.5
+
+
+def test_a_shell_keeps_its_energy_while_it_swings():
+    """A square sheet let go from a twisted shape; at the recommended step and below, the balance falls with its square."""
+    pattern = uncreased(grid(4, 4, 0.025, 0.025))
+    sheet = Sheet(pattern, thickness=1e-3, modulus=1e6, density=1000.0, membrane_damping=0.0).shell(poisson=0.4)
+    model, parameters = sheet.fix(nodes=[0, 1, 5]).build()
+    x = model.position.copy()
+    x[:, 2] = 1.0 * x[:, 0] * x[:, 1] * (x[:, 0] > 0.03)
+    step = stable_step(model, parameters)
+    ranges = []
+    for part in (1.0, 0.5, 0.25):
+        state = State.at_rest(model, 1, x)
+        motion = simulate(model, parameters, duration=0.05, rate=200.0, state=state, dt=part * step.dt)
+        assert not motion.failures
+        ranges.append(np.ptp(motion.energy_balance()))
+    assert ranges[0] < 0.1 * max(e.max() for e in motion.energies.values())
+    assert ranges[2] < 0.35 * ranges[1] < 0.15 * ranges[0]
+
+
+def test_what_no_sheet_can_be_is_refused():
+    pattern = uncreased(grid(2, 2, 0.01, 0.01))
+    sheet = Sheet(pattern, thickness=1e-3)
+    with pytest.raises(InputError, match="positive eigenvalues"):
+        sheet.shell(elasticity=np.diag([1.0, -1.0, 1.0]))
+    with pytest.raises(InputError, match="Poisson"):
+        sheet.shell(poisson=1.2)
+    with pytest.raises(InputError, match="direction"):
+        sheet.shell(axis=(0, 0, 0))
+    with pytest.raises(InputError, match="upright"):
+        sheet.shell(elasticity=orthotropic(1e9, 1e9, 0.3, 1e9), axis=(0, 0, 1)).build()
+    with pytest.raises(InputError, match="poisson_12"):
+        orthotropic(1e9, 4e9, 0.6, 1e9)
+    with pytest.raises(InputError, match="neither bend nor stretch"):
+        Sheet(pattern, thickness=1e-3, panels="rigid").shell()
+    with pytest.raises(InputError, match="neither bend nor stretch"):
+        rigid(*sheet.shell().build())
