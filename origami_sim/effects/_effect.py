@@ -27,8 +27,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     # forces on the three corners, as the rows of a 3 x 3 matrix
     # stray: flux density from all other magnets at this one, stray_gradient: its dB_i/dx_j; see Effect.magnet
     "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "stray", "stray_gradient", "dt"),
-    # resultants [N/m] from Green's strain (11, 22 and twice 12), and moments per width [N] from the curvature [1/m] that
-    # comes on top of the reference state's, in the triangle's axes; both positive where they grow with it
+    # resultants [N/m] from Green's strain (11, 22 and twice 12), and moments per width [N] from the curvature [1/m]
+    # that comes on top of the reference state's, in the triangle's axes; both positive where they grow with it
     # whole: 1 for a triangle's curvature, 0 for the difference to a neighbour's
     "membrane": ("strain", "dt"),
     "plate": ("curvature", "whole", "dt"),

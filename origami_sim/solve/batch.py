@@ -140,7 +140,8 @@ class Batch:
             self._upload(self._acting(parameters) if among else np.zeros((1, self.worlds), np.int64), wp.int64),
         ]
         if self.program.shells:
-            self._constants.append(plates.upload(model, self._stride, self.device))
+            moments = self._room(max(len(hinges), 1), dtype=wp.float64)
+            self._constants.append(plates.upload(model, moments, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)
         self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))

@@ -67,8 +67,8 @@ def pull(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, shape: wp.mat22d, n: wp.vec3d
     return wp.matrix_from_rows(-r2 - r3, r2, r3)
 
 
-def upload(model: Model, worlds: int, device) -> Plates:
-    """The rows of a model on a device."""
+def upload(model: Model, moments: wp.array, device) -> Plates:
+    """The rows of a model on a device, with room for the moments of its hinges [H, W]."""
     found, creases = curvature.of(model), len(model.creases)
 
     def constant(a, dtype):
@@ -81,5 +81,5 @@ def upload(model: Model, worlds: int, device) -> Plates:
     with np.errstate(invalid="ignore"):  # of hinges without triangles
         p.rest = constant(found.of(dihedral_angles(model.position, model.bends)), wp.vec3d)
     p.area, p.shape = constant(found.area, wp.float64), constant(found.shape, wp.mat22d)
-    p.moment = wp.zeros((max(creases + len(model.bends), 1), worlds), dtype=wp.float64, device=device)
+    p.moment = moments
     return p

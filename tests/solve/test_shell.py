@@ -204,7 +204,7 @@ def test_a_membrane_converges(kind, poisson):
 
 
 def test_a_shell_keeps_its_energy_while_it_swings():
-    """A square sheet let go from a twisted shape; at the recommended step and below, the balance falls with its square."""
+    """A square sheet let go from a twisted shape; the range of the balance falls with the square of the step."""
     pattern = uncreased(grid(4, 4, 0.025, 0.025))
     sheet = Sheet(pattern, thickness=1e-3, modulus=1e6, density=1000.0, membrane_damping=0.0).shell(poisson=0.4)
     model, parameters = sheet.fix(nodes=[0, 1, 5]).build()
