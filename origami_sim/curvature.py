@@ -57,6 +57,8 @@ class Curvature:
         area: [T] [m^2]. shape: [T, 2, 2] inverse of the edges 0-1 and 0-2 (columns) in these axes [1/m].
         loose: [T, 3] edges (0-1, 1-2, 2-0) without a neighbour on the same sheet.
         normal: [T, 3, 2] outward normals of the edges in the triangle's axes.
+        side: [T, 3] number of each edge, which neighbours share. arc_start, arc_hinge, arc_weight: rows for these edges
+            of length / sqrt(12) times the curvature along them, the mean of both sides' [-].
     """
 
     start: np.ndarray
@@ -70,6 +72,33 @@ class Curvature:
     shape: np.ndarray
     loose: np.ndarray
     normal: np.ndarray
+    side: np.ndarray
+    arc_start: np.ndarray
+    arc_hinge: np.ndarray
+    arc_weight: np.ndarray
+
+    @property
+    def dual(self) -> np.ndarray:
+        """[T, 3, 3] strain 11, 22 and twice 12 (rows) of a unit strain along each edge (columns) alone."""
+        return np.linalg.inv(_directions(self.normal))
+
+    def arcs(self, angles: np.ndarray) -> np.ndarray:
+        """Length / sqrt(12) times the curvature along each edge, of hinge angles [Q]."""
+        out = np.zeros(len(self.arc_start) - 1)
+        np.add.at(
+            out, np.repeat(np.arange(len(out)), np.diff(self.arc_start)), angles[self.arc_hinge] * self.arc_weight
+        )
+        return out
+
+    def reach(self, triangles: np.ndarray, bends: np.ndarray) -> np.ndarray:
+        """[T, n] nodes that the membrane of each triangle feels by its corners and arcs, repeated to equal numbers."""
+        of = np.split(self.arc_hinge, self.arc_start[1:-1])
+        found = [
+            np.unique(np.concatenate([corners, *(bends[of[s]].ravel() for s in sides)]))
+            for corners, sides in zip(triangles, self.side, strict=True)
+        ]
+        width = max(map(len, found), default=0)
+        return np.array([np.resize(f, width) for f in found], np.int64).reshape(len(triangles), width)
 
     @property
     def row(self) -> np.ndarray:
@@ -127,6 +156,12 @@ def _cached(position, triangles, bends, free) -> Curvature:
     x, mask = (np.frombuffer(data, float).reshape(shape) for data, shape in (position, free))
     t, b = (np.frombuffer(data, np.int64).reshape(shape) for data, shape in (triangles, bends))
     return _Mesh(x, t, b, mask).curvature()
+
+
+def _directions(normal: np.ndarray) -> np.ndarray:
+    """Strain or curvature [T, 3, 3] along each edge of components 11, 22 and twice 12, from the edges' normals."""
+    t = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+    return np.stack([t[..., 0] ** 2, t[..., 1] ** 2, t[..., 0] * t[..., 1]], axis=-1)
 
 
 def _turns_of_unit_curvature(flat: np.ndarray, edge: np.ndarray, outward: np.ndarray) -> np.ndarray:
@@ -195,7 +230,28 @@ class _Mesh:
             shape=np.linalg.inv(np.stack([self.flat[:, 1], self.flat[:, 2]], axis=2)),
             loose=self.loose,
             normal=self.outward,
+            **self._arcs(own),
         )
+
+    def _arcs(self, own: list[dict[int, np.ndarray]]) -> dict[str, np.ndarray]:
+        """Rows of curvature along the edges, and the edges of the triangles."""
+        directions = _directions(self.outward)
+        side, rows = np.full(self.loose.shape, -1, np.int32), []
+        borders = [((t, k),) for t, k in zip(*np.nonzero(self.loose), strict=True)]
+        for sides in [*self.pairs.values(), *borders]:
+            row: dict[int, float] = {}
+            for t, k in sides:
+                side[t, k] = len(rows)
+                by = self.length[t, k] / np.sqrt(12.0) / len(sides) * directions[t, k]
+                for f, v in own[t].items():
+                    row[f] = row.get(f, 0.0) + float(by @ v)
+            rows.append({} if any(self.held[t] for t, _ in sides) else row)
+        return {
+            "side": side,
+            "arc_start": np.cumsum([0, *map(len, rows)]).astype(np.int32),
+            "arc_hinge": np.array([f for row in rows for f in row], np.int32),
+            "arc_weight": np.array([v for row in rows for v in row.values()], float),
+        }
 
     def _kept(self, t: int, entries: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
         """Entries that are not rounding."""

@@ -276,8 +276,7 @@ class _Composer:
         for family in HINGES:
             self._hinges(t, mode, family)
         if mode != "rigid":  # panels that neither bend nor stretch
-            self._membranes(t, mode)
-            self._plates(t, mode)
+            self._sheets(t, mode)
         self._triangles(t, mode)
         self._contacts(t, mode)
         for i, e in enumerate(self.effects):
@@ -414,35 +413,9 @@ class _Composer:
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("angle = kinematics.unwrap(g.angle, angles[r, w])")
 
-    def _membranes(self, t: _Text, mode: str):
-        effects = self.family("membrane")
-        if not effects:
-            return
-        with t.block("for row in range(triangles.shape[0]):"):
-            t("c = row & NATURAL")
-            for i in (1, 2, 3):
-                t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
-            t("shape = plates.shape[c]")
-            self._strain(t)
-            for e in effects:
-                i = self.number(e)
-                with self.acting(t, e):
-                    self.apply_law(t, e, "c", mode, f"N{i}")
-                    self.add_energy(t, e, "c", mode, "plates.area[c]")
-                    t(f"R{i} = shells.pull(y1, y2, y3, shape, plates.area[c] * N{i})")
-                    corners = [f"kinematics.corner(R{i}, {k})" for k in range(3)]
-                    for k, corner in enumerate(corners):
-                        self.scatter(t, e, f"n{k + 1}", corner, mode)
-                    self.add_work(t, e, " + ".join(f"wp.dot({f}, V[n{k + 1}, w])" for k, f in enumerate(corners)), mode)
-
-    def _strain(self, t: _Text):
-        """A triangle's strain, and the corners at which its gradient is taken."""
-        for i in (1, 2, 3):
-            t(f"y{i} = X[n{i}, w]")
-        t("strain = shells.strain(y1, y2, y3, shape)")
-
-    def _plates(self, t: _Text, mode: str):
-        effects = self.family("plate")
+    def _sheets(self, t: _Text, mode: str):
+        """Membrane forces and moments, whose shares of the hinges are collected before they become forces."""
+        effects = self.family(*SHELLS)
         if not effects:
             return
         hinges = "for row in range(crease_count, hinges.shape[0]):"
@@ -457,25 +430,56 @@ class _Composer:
             with t.block(hinges):
                 at_hinge()
                 t("angles[r, w] = angle")
-        for e in effects:
-            i = self.number(e)
-            with self.acting(t, e):
-                with t.block(hinges):
-                    t("plates.moment[row, w] = scalar(0.0)")
-                with t.block("for row in range(plates.triangle.shape[0]):"):
-                    t("c = plates.triangle[row] & NATURAL")
-                    t("whole = plates.whole[row]")
-                    t("curvature = shells.bent(plates, angles, row, w)")
-                    self.apply_law(t, e, "c", mode, f"M{i}")
-                    self.add_energy(t, e, "c", mode, "plates.share[row]")
-                    t(f"shells.spread(plates, row, w, plates.share[row] * M{i})")
-                with t.block(hinges):
-                    at_hinge()
-                    t("moment = plates.moment[r, w]")
-                    for node in "ijkl":
-                        self.scatter(t, e, node, f"moment * g.g{node}", mode)
+        apart = mode == "evaluate" or any(e.exchanges_work for e in effects)
+        for group in [[e] for e in effects] if apart else [effects]:
+            with t.block(hinges):
+                t("plates.moment[row, w] = scalar(0.0)")
+            for e in group:
+                with self.acting(t, e):
+                    (self._membrane if e.family == "membrane" else self._plate)(t, e, mode)
+            with t.block(hinges):
+                at_hinge()
+                t("moment = plates.moment[r, w]")
+                for node in "ijkl":
+                    self.scatter(t, group[0], node, f"moment * g.g{node}", mode)
+                if apart:
                     rate = " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl")
-                    self.add_work(t, e, f"moment * ({rate})", mode)
+                    self.add_work(t, group[0], f"moment * ({rate})", mode)
+
+    def _membrane(self, t: _Text, e: Effect, mode: str):
+        i = self.number(e)
+        with t.block("for row in range(triangles.shape[0]):"):
+            t("c = row & NATURAL")
+            for k in (1, 2, 3):
+                t(f"n{k} = triangles[c][{k - 1}] & NATURAL")
+            t("shape = plates.shape[c]")
+            self._strain(t)
+            t("arcs = shells.arcs(plates, angles, c, w)")
+            t("strain = strain + shells.bow(plates, c, arcs)")
+            self.apply_law(t, e, "c", mode, f"N{i}")
+            self.add_energy(t, e, "c", mode, "plates.area[c]")
+            t(f"shells.unbow(plates, c, w, arcs, plates.area[c] * N{i})")
+            t(f"R{i} = shells.pull(y1, y2, y3, shape, plates.area[c] * N{i})")
+            corners = [f"kinematics.corner(R{i}, {k})" for k in range(3)]
+            for k, corner in enumerate(corners):
+                self.scatter(t, e, f"n{k + 1}", corner, mode)
+            self.add_work(t, e, " + ".join(f"wp.dot({f}, V[n{k + 1}, w])" for k, f in enumerate(corners)), mode)
+
+    def _strain(self, t: _Text):
+        """A triangle's strain, and the corners at which its gradient is taken."""
+        for i in (1, 2, 3):
+            t(f"y{i} = X[n{i}, w]")
+        t("strain = shells.strain(y1, y2, y3, shape)")
+
+    def _plate(self, t: _Text, e: Effect, mode: str):
+        i = self.number(e)
+        with t.block("for row in range(plates.triangle.shape[0]):"):
+            t("c = plates.triangle[row] & NATURAL")
+            t("whole = plates.whole[row]")
+            t("curvature = shells.bent(plates, angles, row, w)")
+            self.apply_law(t, e, "c", mode, f"M{i}")
+            self.add_energy(t, e, "c", mode, "plates.share[row]")
+            t(f"shells.spread(plates, row, w, plates.share[row] * M{i})")
 
     def _triangles(self, t: _Text, mode: str):
         effects = self.family("triangle")

@@ -14,6 +14,7 @@ class Plates:
     """Rows of `curvature.Curvature` with hinges counted from the first crease, and room for the hinges' moments.
 
     rest: curvature of the rows in the reference state [1/m]; moment: [H, W] [N m].
+    arc_rest: [T] half the squared arcs of each triangle's edges in the reference state.
     """
 
     start: wp.array(dtype=wp.int32)
@@ -25,6 +26,12 @@ class Plates:
     rest: wp.array(dtype=wp.vec3d)
     area: wp.array(dtype=wp.float64)
     shape: wp.array(dtype=wp.mat22d)
+    dual: wp.array(dtype=wp.mat33d)
+    side: wp.array(dtype=wp.vec3i)
+    arc_start: wp.array(dtype=wp.int32)
+    arc_hinge: wp.array(dtype=wp.int32)
+    arc_weight: wp.array(dtype=wp.float64)
+    arc_rest: wp.array(dtype=wp.vec3d)
     moment: wp.array2d(dtype=wp.float64)
 
 
@@ -43,6 +50,43 @@ def spread(p: Plates, row: int, w: int, moment: wp.vec3d):
     for e in range(p.start[row], p.start[row + 1]):
         h = p.hinge[e]
         p.moment[h, w] = p.moment[h, w] - wp.dot(p.weight[e], moment)
+
+
+@wp.func
+def arc(p: Plates, angles: wp.array2d(dtype=wp.float64), edge: int, w: int):
+    """Length / sqrt(12) times the curvature along an edge."""
+    q = scalar(0.0)
+    for e in range(p.arc_start[edge], p.arc_start[edge + 1]):
+        q += angles[p.arc_hinge[e], w] * p.arc_weight[e]
+    return q
+
+
+@wp.func
+def arcs(p: Plates, angles: wp.array2d(dtype=wp.float64), c: int, w: int):
+    """The same of the three edges of a triangle."""
+    side = p.side[c]
+    return wp.vec3d(arc(p, angles, side[0], w), arc(p, angles, side[1], w), arc(p, angles, side[2], w))
+
+
+@wp.func
+def bow(p: Plates, c: int, q: wp.vec3d):
+    """Strain by which a triangle with curved edges is longer than its chords, less that of the reference state.
+
+    An arc of length l and curvature k is longer than its chord by the share (k l)^2 / 24. Without it, flat triangles
+    would have to stretch where the sheet only bends, all but those in line with the bend.
+    """
+    return p.dual[c] * (scalar(0.5) * wp.cw_mul(q, q) - p.arc_rest[c])
+
+
+@wp.func
+def unbow(p: Plates, c: int, w: int, q: wp.vec3d, n: wp.vec3d):
+    """Adds to the moments of the hinges what membrane forces times the area [N m] do on the arcs of a triangle."""
+    m = wp.cw_mul(q, wp.transpose(p.dual[c]) * n)
+    side = p.side[c]
+    for k in range(3):
+        for e in range(p.arc_start[side[k]], p.arc_start[side[k] + 1]):
+            h = p.arc_hinge[e]
+            p.moment[h, w] = p.moment[h, w] - p.arc_weight[e] * m[k]
 
 
 @wp.func
@@ -79,7 +123,12 @@ def upload(model: Model, moments: wp.array, device) -> Plates:
     p.weight, p.triangle = constant(found.weight, wp.vec3d), constant(found.triangle, wp.int32)
     p.whole, p.share = constant(found.whole, wp.float64), constant(found.share, wp.float64)
     with np.errstate(invalid="ignore"):  # of hinges without triangles
-        p.rest = constant(found.of(dihedral_angles(model.position, model.bends)), wp.vec3d)
+        rest = dihedral_angles(model.position, model.bends)
+    p.rest = constant(found.of(rest), wp.vec3d)
     p.area, p.shape = constant(found.area, wp.float64), constant(found.shape, wp.mat22d)
+    p.dual, p.side = constant(found.dual, wp.mat33d), constant(found.side, wp.vec3i)
+    p.arc_start, p.arc_hinge = constant(found.arc_start, wp.int32), constant(found.arc_hinge + creases, wp.int32)
+    p.arc_weight = constant(found.arc_weight, wp.float64)
+    p.arc_rest = constant(0.5 * found.arcs(rest)[found.side] ** 2, wp.vec3d)
     p.moment = moments
     return p

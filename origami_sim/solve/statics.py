@@ -19,6 +19,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from scipy.linalg.lapack import dpotrf, dpotrs
 
+from origami_sim import curvature
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
 from origami_sim.effects import CONTACTS, get
@@ -429,10 +430,10 @@ class _System:
         for family, elements in (("bar", m.bars), ("crease", m.creases), ("bend", m.bends), ("triangle", m.triangles)):
             if family in families:
                 groups.append(elements)
-        if "membrane" in families:
-            groups.append(m.triangles)
         if "plate" in families:
             groups.append(gradient_norms(m, "plate")[0])
+        if "membrane" in families:
+            groups.append(curvature.of(m).reach(m.triangles, m.bends))
         if families & set(CONTACTS):
             groups.append(m.contacts)
         if any(get(e).interacts for e in m.laws):

@@ -34,20 +34,28 @@ def mesh(kind, nx, ny=None, size=(1.0, 1.0), seed=0):
     return np.column_stack([p * size, np.zeros(len(p))]), triangles
 
 
+def joined(*parts):
+    """Meshes joined at nodes in the same place."""
+    x = np.concatenate([p for p, _ in parts])
+    first = np.cumsum([0, *(len(p) for p, _ in parts)])
+    triangles = np.concatenate([t + n for (_, t), n in zip(parts, first, strict=False)])
+    every, index = np.unique(np.round(x, 9), axis=0, return_inverse=True)
+    used, triangles = np.unique(index.ravel()[triangles], return_inverse=True)
+    return every[used], triangles.reshape(-1, 3)
+
+
 def rimmed(kind, n):
     """The unit square with a row of cells around it, to be held: its border is clamped."""
-    x, triangles = mesh(kind if kind != "crossed" else "diagonal", n)
-    if kind == "crossed":
-        x, triangles = mesh(kind, n)
     rim, around = mesh("diagonal", n + 2)
     rim[:, :2] = (rim[:, :2] - 0.5) * (n + 2) / n + 0.5
     middle = rim[around].mean(axis=1)[:, :2]
-    around = around[np.any((middle < 0) | (middle > 1), axis=1)]
-    every, index = np.unique(np.round(np.concatenate([x, rim]), 9), axis=0, return_inverse=True)
-    index = index.ravel()
-    triangles = np.concatenate([index[triangles], index[around + len(x)]])
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return every[used], triangles.reshape(-1, 3)
+    return joined(mesh(kind, n), (rim, around[np.any((middle < 0) | (middle > 1), axis=1)]))
+
+
+def rimmed_end(kind, nx, ny, width):
+    """A strip of unit length with one more column of cells before its beginning, to be held."""
+    held, triangles = mesh("diagonal", 1, ny, size=(1 / nx, width))
+    return joined(mesh(kind, nx, ny, size=(1.0, width)), (held - [1 / nx, 0, 0], triangles))
 
 
 def plate(x, triangles, *, thickness=1e-3, modulus=1e9, held=(), axes="xyz", **shell):

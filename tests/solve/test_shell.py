@@ -6,7 +6,7 @@ import scipy.sparse.linalg as spla
 from effects.kit import random_rotation
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from solve.sheets import KINDS, at, border, mesh, plate, rimmed, tributary
+from solve.sheets import KINDS, at, border, mesh, plate, rimmed, rimmed_end, tributary
 
 from origami_sim import (
     Drive,
@@ -67,9 +67,8 @@ def test_plates_of_sixteen_cells_are_right_to_two_percent(kind, case):
 @pytest.mark.parametrize("kind", KINDS)
 def test_plates_converge(kind, case):
     """Largest error over Poisson's ratios, so that no zero between two meshes is taken for convergence."""
-    cells = [8, 16, 32]
-    errors = [max(abs(plate_error(kind, n, case, nu)) for nu in (0.0, 0.3, 0.49)) for n in cells]
-    assert -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.5
+    coarse, fine = (max(abs(plate_error(kind, n, case, nu)) for nu in (0.0, 0.3, 0.49)) for n in (16, 32))
+    assert np.log2(coarse / fine) > 1.5
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -112,15 +111,18 @@ def test_a_membrane_stretches_and_shears_exactly(kind):
     assert report.energies["shell_membrane"][0] == pytest.approx(density, rel=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "cells"), [("diagonal", 40)])
-def test_an_elastica_of_forty_cells_is_right_to_two_per_mille(kind, cells):
-    """A cantilever strip under a dead load across its end that bends it by 60 degrees, thickness/length 1e-3."""
-    load, width = 3.0, 0.05
-    x, triangles = mesh(kind, cells + 2, 2, size=(1 + 2 / cells, width))
-    x[:, 0] -= 2 / cells
+@pytest.mark.parametrize(("kind", "cells"), [("diagonal", 40), ("crossed", 16), ("random", 16)])
+def test_an_elastica_is_right_to_two_per_mille(kind, cells):
+    """A cantilever strip under a dead load across its end that bends it by 60 degrees, thickness/length 1e-3.
+
+    Flat triangles that did not know of their bow would be 4.5 % too stiff on the crossed mesh (membrane locking).
+    """
+    load, rows = 3.0, 2 if cells == 40 else 4
+    width = rows / cells
+    x, triangles = rimmed_end(kind, cells, rows, width)
     model, parameters = plate(x, triangles, held=np.flatnonzero(x[:, 0] < 1e-9), poisson=0.0)
     end = np.flatnonzero(x[:, 0] > 1 - 1e-9)
-    share = np.array([0.25, 0.5, 0.25])[np.argsort(np.argsort(x[end, 1]))]
+    share = np.where((x[end, 1] < 1e-9) | (x[end, 1] > width - 1e-9), 0.5, 1.0) / rows
     parameters.set("load", "force_z", share * load * E * THICKNESS**3 / 12 * width, end)
     state = None
     for part in np.linspace(0.2, 1.0, 5):
