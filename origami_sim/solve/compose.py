@@ -8,7 +8,7 @@ by hand. The source is composed as text (see `Program.sources`), compiled once p
 import functools
 import hashlib
 import linecache
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ import warp as wp
 from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, SHELLS, Effect, get
 from origami_sim.solve import articulated, plates, runge_kutta, templates
+from origami_sim.solve.compose_sheets import Sheets, Text
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
@@ -51,27 +52,6 @@ CPU_FLAGS = "-fno-slp-vectorize -ffp-contract=fast"
 Products and sums are fused across statements, as on CUDA. The other kernels round every one, so that a law without
 strength adds exactly nothing.
 """
-
-
-class _Text:
-    """Lines of source at a current depth."""
-
-    def __init__(self, depth: int):
-        self.depth, self.lines = depth, []
-
-    def __call__(self, line: str = "", shift: int = 0):
-        self.lines.append("    " * (self.depth + shift) + line if line else "")
-
-    @contextmanager
-    def block(self, head: str):
-        """Lines that belong to a head such as an `if`."""
-        self(head)
-        self.depth += 1
-        yield
-        self.depth -= 1
-
-    def __str__(self):
-        return "\n".join(self.lines)
 
 
 @dataclass(frozen=True)
@@ -153,7 +133,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
     return scope[name]
 
 
-class _Composer:
+class _Composer(Sheets):
     def __init__(self, effects: tuple[Effect, ...], shared: bool = False):
         self.effects, self.shared = effects, shared
         self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
@@ -172,7 +152,7 @@ class _Composer:
 
     def hoist(self) -> str:
         """Parameter addresses of this world, read once."""
-        t = _Text(1)
+        t = Text(1)
         for i, (owner, _) in enumerate(self.slots):
             if owner != "drive":
                 t(f"o{i} = layout[{i}, 0] + w * layout[{i}, 2]")
@@ -212,14 +192,14 @@ class _Composer:
                 given.append(renamed.get(name, name))
         return f"{effect.name}_{which}({', '.join(given)})"
 
-    def acting(self, t: _Text, effect: Effect):
+    def acting(self, t: Text, effect: Effect):
         """Begins a block that worlds in which an effect has no strength pass over, so that it costs next to nothing."""
         if not (self.shared and effect.strengths):
             return nullcontext()
         word, bit = divmod(self.number(effect), BITS)
         return t.block(f"if (on{word} & wp.int64({1 << bit})) != wp.int64(0):")
 
-    def apply_law(self, t: _Text, effect: Effect, entity: str, mode: str, result: str):
+    def apply_law(self, t: Text, effect: Effect, entity: str, mode: str, result: str):
         """Calls a force law with its memory read before and, in a rollout, written after."""
         outputs = [result]
         writes = []
@@ -242,24 +222,24 @@ class _Composer:
                 for line in writes:
                     t(line)
 
-    def add_energy(self, t: _Text, effect: Effect, entity: str, mode: str, times: str = ""):
+    def add_energy(self, t: Text, effect: Effect, entity: str, mode: str, times: str = ""):
         if mode == "evaluate" and effect.energy is not None:
             i = self.number(effect)
             law = self.call(effect, "energy", entity)
             t(f"energies[{i}, w] = energies[{i}, w] + {f'{times} * {law}' if times else law}")
 
-    def add_work(self, t: _Text, effect: Effect, power: str, mode: str):
+    def add_work(self, t: Text, effect: Effect, power: str, mode: str):
         if mode in MOVING and effect.exchanges_work:
             t(f"power_{effect.name} += {power}")
 
-    def scatter(self, t: _Text, effect: Effect, node: str, force: str, mode: str):
+    def scatter(self, t: Text, effect: Effect, node: str, force: str, mode: str):
         """Adds to the node: to the effect's own array when reporting, to the sum otherwise."""
         target = f"forces[{self.number(effect)}, {node}, w]" if mode == "evaluate" else f"F[{node}, w]"
         t(f"{target} = {target} + {force}")
 
     def body(self, mode: str) -> str:
         """The force evaluation. Modes: 'rollout', 'rigid', 'total' (summed) and 'evaluate' (by effect)."""
-        t = _Text({"rollout": 2, "rigid": 4}.get(mode, 1))
+        t = Text({"rollout": 2, "rigid": 4}.get(mode, 1))
         if "field" in self.drives:
             t(f"uniform_field = vec3({', '.join(self.channel(str(FIELD + i)) for i in range(3))})")
         if "gradient" in self.drives:
@@ -292,7 +272,7 @@ class _Composer:
                         t(f"power[{i}, w] = power_{e.name}")
         return str(t)
 
-    def _nodes(self, t: _Text, mode: str):
+    def _nodes(self, t: Text, mode: str):
         effects = self.family("node")
         if not effects:
             return
@@ -311,7 +291,7 @@ class _Composer:
                 self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
         t.depth -= 1
 
-    def _bars(self, t: _Text, mode: str):
+    def _bars(self, t: Text, mode: str):
         effects = self.family("bar")
         if not effects:
             return
@@ -344,13 +324,13 @@ class _Composer:
             t("F[q, w] = F[q, w] - pull")
         t.depth -= 1
 
-    def _span(self, t: _Text):
+    def _span(self, t: Text):
         """A bar's length and its gradient at the bar's second node."""
         t("span = X[q, w] - X[p, w]")
         t("length = wp.length(span)")
         t("along = span * (scalar(1.0) / length)")
 
-    def _hinges(self, t: _Text, mode: str, family: str):
+    def _hinges(self, t: Text, mode: str, family: str):
         effects = self.family(family)
         if not effects and family != "crease":  # fold angles are followed also where no law asks for them
             return
@@ -408,80 +388,12 @@ class _Composer:
                 t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
         t.depth -= 1
 
-    def _fold(self, t: _Text):
+    def _fold(self, t: Text):
         """A hinge's angle, continued from its last one, and its gradients."""
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("angle = kinematics.unwrap(g.angle, angles[r, w])")
 
-    def _sheets(self, t: _Text, mode: str):
-        """Membrane forces and moments, whose shares of the hinges are collected before they become forces."""
-        effects = self.family(*SHELLS)
-        if not effects:
-            return
-        hinges = "for row in range(crease_count, hinges.shape[0]):"
-
-        def at_hinge():
-            t("r = row & NATURAL")
-            for i, node in enumerate("ijkl"):
-                t(f"{node} = hinges[r][{i}] & NATURAL")
-            self._fold(t)
-
-        if not self.family("bend"):  # whose laws have brought the angles up to date
-            with t.block(hinges):
-                at_hinge()
-                t("angles[r, w] = angle")
-        apart = mode == "evaluate" or any(e.exchanges_work for e in effects)
-        for group in [[e] for e in effects] if apart else [effects]:
-            with t.block(hinges):
-                t("plates.moment[row, w] = scalar(0.0)")
-            for e in group:
-                with self.acting(t, e):
-                    (self._membrane if e.family == "membrane" else self._plate)(t, e, mode)
-            with t.block(hinges):
-                at_hinge()
-                t("moment = plates.moment[r, w]")
-                for node in "ijkl":
-                    self.scatter(t, group[0], node, f"moment * g.g{node}", mode)
-                if apart:
-                    rate = " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl")
-                    self.add_work(t, group[0], f"moment * ({rate})", mode)
-
-    def _membrane(self, t: _Text, e: Effect, mode: str):
-        i = self.number(e)
-        with t.block("for row in range(triangles.shape[0]):"):
-            t("c = row & NATURAL")
-            for k in (1, 2, 3):
-                t(f"n{k} = triangles[c][{k - 1}] & NATURAL")
-            t("shape = plates.shape[c]")
-            self._strain(t)
-            t("arcs = shells.arcs(plates, angles, c, w)")
-            t("strain = strain + shells.bow(plates, c, arcs)")
-            self.apply_law(t, e, "c", mode, f"N{i}")
-            self.add_energy(t, e, "c", mode, "plates.area[c]")
-            t(f"shells.unbow(plates, c, w, arcs, plates.area[c] * N{i})")
-            t(f"R{i} = shells.pull(y1, y2, y3, shape, plates.area[c] * N{i})")
-            corners = [f"kinematics.corner(R{i}, {k})" for k in range(3)]
-            for k, corner in enumerate(corners):
-                self.scatter(t, e, f"n{k + 1}", corner, mode)
-            self.add_work(t, e, " + ".join(f"wp.dot({f}, V[n{k + 1}, w])" for k, f in enumerate(corners)), mode)
-
-    def _strain(self, t: _Text):
-        """A triangle's strain, and the corners at which its gradient is taken."""
-        for i in (1, 2, 3):
-            t(f"y{i} = X[n{i}, w]")
-        t("strain = shells.strain(y1, y2, y3, shape)")
-
-    def _plate(self, t: _Text, e: Effect, mode: str):
-        i = self.number(e)
-        with t.block("for row in range(plates.triangle.shape[0]):"):
-            t("c = plates.triangle[row] & NATURAL")
-            t("whole = plates.whole[row]")
-            t("curvature = shells.bent(plates, angles, row, w)")
-            self.apply_law(t, e, "c", mode, f"M{i}")
-            self.add_energy(t, e, "c", mode, "plates.share[row]")
-            t(f"shells.spread(plates, row, w, plates.share[row] * M{i})")
-
-    def _triangles(self, t: _Text, mode: str):
+    def _triangles(self, t: Text, mode: str):
         effects = self.family("triangle")
         if not effects:
             return
@@ -511,7 +423,7 @@ class _Composer:
                     self.add_work(t, e, " + ".join(corners), mode)
         t.depth -= 1
 
-    def _stray(self, t: _Text, effect: Effect):
+    def _stray(self, t: Text, effect: Effect):
         """Field of all magnets but its own, at a triangle's magnet."""
         t("stray = vec3(scalar(0.0), scalar(0.0), scalar(0.0))")
         t("stray_gradient = wp.mat33d()")
@@ -530,7 +442,7 @@ class _Composer:
         t("stray_gradient = stray_gradient + magnetostatics.dipole_gradient(at - there, source)")
         t.depth -= 2
 
-    def _contacts(self, t: _Text, mode: str):
+    def _contacts(self, t: Text, mode: str):
         effects = self.family(*CONTACTS)
         if not effects:
             return
@@ -615,7 +527,7 @@ class _Composer:
                             t(f"memory[m_{e.name}_{m.name} + {m.size} * c + {k}, w] = scalar(0.0)")
         t.depth -= 1
 
-    def _contact_force(self, t: _Text, effect: Effect, force: str, mode: str):
+    def _contact_force(self, t: Text, effect: Effect, force: str, mode: str):
         if mode != "evaluate":
             t(f"push = push + {force}")
             return

@@ -94,21 +94,21 @@ class _Averager(compose._Composer):
     So stiff bars do not feel that the straight path of a node cuts the corner of its turn.
     """
 
-    def _span(self, t: compose._Text):
+    def _span(self, t: compose.Text):
         t("before = X0[q] - X0[p]")
         t("after = X1[q, w] - X1[p, w]")
         t("length = wp.length(before) + fraction * (wp.length(after) - wp.length(before))")
         # the mean of the gradient along the path: times the change of the span it is the change of the length
         t("along = (before + after) * (scalar(1.0) / (wp.length(before) + wp.length(after)))")
 
-    def _strain(self, t: compose._Text):
+    def _strain(self, t: compose.Text):
         ends = [f"X0[n{i}]" for i in (1, 2, 3)], [f"X1[n{i}, w]" for i in (1, 2, 3)]
         for i, (a, b) in enumerate(zip(*ends, strict=True), 1):
             t(f"y{i} = scalar(0.5) * ({a} + {b})")
         t(f"before_strain = shells.strain({', '.join(ends[0])}, shape)")
         t(f"strain = before_strain + fraction * (shells.strain({', '.join(ends[1])}, shape) - before_strain)")
 
-    def _fold(self, t: compose._Text):
+    def _fold(self, t: compose.Text):
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
         t("last = kinematics.dihedral(X1[i, w], X1[j, w], X1[k, w], X1[l, w])")
         # likewise the mean of the gradient, at both points
