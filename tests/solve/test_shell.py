@@ -240,3 +240,66 @@ def test_what_no_sheet_can_be_is_refused():
         Sheet(pattern, thickness=1e-3, panels="rigid").shell()
     with pytest.raises(InputError, match="neither bend nor stretch"):
         rigid(*sheet.shell().build())
+
+
+@pytest.mark.parametrize("kind", ["diagonal", "crossed", "random"])
+def test_a_curved_sheet_is_right_to_two_per_mille(kind):
+    """A quarter of a cylinder clamped at its lower end, pushed at its upper one: pi P R^3 / (4 E I)."""
+    width, rows, thickness = 0.4, 4, 1e-2
+    x, triangles = rimmed_end(kind, 16, rows, width)
+    s = x[:, 0] * np.pi / 2
+    arch = np.column_stack([np.sin(s), x[:, 1], 1 - np.cos(s)])
+    before = x[:, 0] < 0
+    arch[before] = np.column_stack([s, x[:, 1], 0 * s])[before]
+    r = random_rotation(np.random.default_rng(2))
+    held, end = np.flatnonzero(x[:, 0] < 1e-9), np.flatnonzero(x[:, 0] > 1 - 1e-9)
+    model, parameters = plate(arch @ r.T, triangles, held=held, poisson=0.0, thickness=thickness, modulus=E)
+    share = np.where((x[end, 1] < 1e-9) | (x[end, 1] > width - 1e-9), 0.5, 1.0) / rows
+    force = 1e-6 * E * thickness**3 * width
+    for axis, part in zip("xyz", force * r[:, 0], strict=True):
+        parameters.set("load", f"force_{axis}", share * part, end)
+    found = equilibrium(model, parameters, Drive(load=1.0), tolerance=1e-9)
+    moved = share @ ((found.x - model.position) @ r)[end]
+    assert moved[0] == pytest.approx(np.pi * force / (4 * E * thickness**3 / 12 * width), rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["diagonal", "crossed", "random"])
+def test_a_sheet_with_natural_curvature_rolls_up(kind):
+    """Into an arc of 86 degrees, without stress: its end lies on the circle."""
+    bend, width, rows = 1.5, 0.25, 4
+    x, triangles = rimmed_end(kind, 16, rows, width)
+    model, parameters = plate(x, triangles, held=np.flatnonzero(x[:, 0] < 1e-9), poisson=0.0)
+    end, state = np.flatnonzero(x[:, 0] > 1 - 1e-9), None
+    for part in np.linspace(0.25, 1.0, 4):
+        parameters.set("shell_bending", "natural_11", part * bend)
+        found = equilibrium(model, parameters, Drive(), state=state, tolerance=1e-8)
+        state = found.state
+    assert found.converged, found.message
+    tip = found.x[end].mean(axis=0)
+    assert [tip[0], tip[2]] == pytest.approx([np.sin(bend) / bend, (1 - np.cos(bend)) / bend], abs=0.002)
+
+
+def test_a_crease_in_a_shell_is_a_hinge_between_beams():
+    """A strip with a soft crease across its middle, under a load at its end: P L^3 / (3 E I) + P (L / 2)^2 / K.
+
+    The sheet's own turn beside the crease is left out, half a cell on each side: at most P h / (4 E I).
+    """
+    cells, width, load = 16, 0.125, 1e-9
+    pattern = uncreased(grid(cells + 2, 2, 1 / cells, width / 2))
+    middle = (cells // 2 + 2) / cells
+    x = pattern.vertices[pattern.edges]
+    across = np.flatnonzero(np.all(np.isclose(x[:, :, 0], middle), axis=1))
+    for e in across:
+        pattern.assignments[e] = "V"
+    s = Sheet(pattern, thickness=THICKNESS, modulus=E, density=1000.0, membrane_damping=0.0).shell(poisson=0.0)
+    rigidity = E * THICKNESS**3 / 12 * width
+    s.crease(stiffness=0.5 * rigidity, rest_angle=0.0).on("load")
+    start = 2 / cells
+    model, parameters = s.fix(nodes=np.flatnonzero(pattern.vertices[:, 0] < start + 1e-9)).build()
+    end = np.flatnonzero(model.position[:, 0] > start + 1 - 1e-9)
+    force = np.zeros(len(model.position))
+    force[end] = load * np.array([0.25, 0.5, 0.25])
+    w = deflections(model, parameters, force)
+    expected = load / (3 * rigidity) + load * 0.25 / (len(across) * 0.5 * rigidity)
+    found = w[end] @ np.array([0.25, 0.5, 0.25])
+    assert expected - load / cells / (4 * rigidity) <= found <= expected
