@@ -303,3 +303,15 @@ def test_a_crease_in_a_shell_is_a_hinge_between_beams():
     expected = load / (3 * rigidity) + load * 0.25 / (len(across) * 0.5 * rigidity)
     found = w[end] @ np.array([0.25, 0.5, 0.25])
     assert expected - load / cells / (4 * rigidity) <= found <= expected
+
+
+def test_the_gpu_finds_the_forces_of_the_cpu(cuda):
+    x, triangles = mesh("random", 6)
+    model, parameters = plate(x, triangles, poisson=0.3)
+    rng = np.random.default_rng(0)
+    worlds = x[:, None] + 0.02 * rng.normal(size=(len(x), 70, 3))
+    one, two = (Batch(model, parameters, Drive(), State.at_rest(model, 70, worlds), device=d) for d in ("cpu", cuda))
+    expected, found = one.evaluate(0.0), two.evaluate(0.0)
+    for name, force in expected.forces.items():
+        assert np.abs(found.forces[name] - force).max() <= 1e-11 * np.abs(force).max()
+    assert np.abs(two.total_force(0.0) - one.total_force(0.0)).max() <= 1e-11 * np.abs(one.total_force(0.0)).max()
