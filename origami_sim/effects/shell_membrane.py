@@ -1,4 +1,4 @@
-"""Membrane of a thin sheet: constant strain in every triangle, at any rotation."""
+"""Membrane of a thin sheet: constant strain in every triangle, at any rotation, with the arcs of its curved edges."""
 
 import warp as wp
 
@@ -42,7 +42,8 @@ EFFECT = Effect(
     parameters=stiffnesses("A", "N/m", "membrane stiffness"),
     needs=tuple(p.name for p in stiffnesses("A", "N/m", "")),
     stiffness=largest,
-    formula="N = A E,  E = (F^T F - 1) / 2,  A = E t / (1 - nu^2) [[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]",
+    formula="N = A E,  E = (F^T F - 1) / 2 and (k l)^2 / 24 along edges of curvature k and length l,  "
+    "A = Y t / (1 - nu^2) [[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]] with Young's modulus Y",
     source="St. Venant-Kirchhoff membrane on linear triangles (Turner, Clough, Martin & Topp 1956)",
     matters="sheets that stretch or shear; converges to the plane-stress solution on any mesh, as bars do not",
     confused_with="nothing at the angles seen; a soft membrane shows as panels that stretch",
