@@ -18,8 +18,8 @@ import numpy as np
 
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Free, Hypothesis, suspects
-from origami_sim.diagnose.refit import Fit, Weights, fit
+from origami_sim.fit.hypothesis import Free, Hypothesis, suspects
+from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.recording import Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import cube_toss, falling_ball

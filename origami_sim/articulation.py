@@ -167,6 +167,25 @@ class Articulation:
             turn = Rotation.align_vectors(x[mine] - middle, self.model.position[mine] - self._centre)[0].as_matrix()
         return Pose(turn[None], middle[None], np.asarray(angles, float)[self.creases, None])
 
+    def poses_of(self, x: np.ndarray, angles: np.ndarray) -> Pose:
+        """The poses of panels at positions x [N, W, 3] [m] of rigid panels, with fold angles of all creases [C, W]."""
+        mine = self._nodes[self.root]
+        middle, worlds = x[mine].mean(axis=0), x.shape[1]
+        turn = np.tile(np.eye(3), (worlds, 1, 1))
+        if self.floating:
+            spread = np.einsum("nwa,nb->wab", x[mine] - middle, self.model.position[mine] - self._centre)
+            u, _, vt = np.linalg.svd(spread)  # Kabsch 1976
+            u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+            turn = u @ vt
+        return Pose(turn, middle, np.asarray(angles, float)[self.creases])
+
+    def rates_of(self, pose: Pose, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Rates [m, W] of the coordinates that give nodes at x [N, W, 3] [m] the velocities v [N, W, 3] [m/s]."""
+        corners = len(x) - len(self.model.carriers)  # mass points go along
+        by = np.moveaxis(self.jacobian(pose, x)[:, :corners], 2, 0).reshape(x.shape[1], self.size, -1)
+        right = by @ np.moveaxis(v[:corners], 1, 0).reshape(x.shape[1], -1, 1)
+        return np.linalg.solve(by @ np.swapaxes(by, 1, 2), right)[:, :, 0].T
+
     def jacobian(self, pose: Pose, x: np.ndarray | None = None) -> np.ndarray:
         """Velocities of the nodes for unit rates of the coordinates, [m, N, W, 3]."""
         x = self.positions(pose) if x is None else x

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.diagnose.articulation import Articulation
+from origami_sim.articulation import Articulation
 from origami_sim.diagnose.diagnosis import REVERSAL, Acting, Curve
 from origami_sim.diagnose.locate import Motion, against, bins, way
 

@@ -13,9 +13,9 @@ import numpy as np
 from origami_sim.diagnose.compare import Score
 from origami_sim.diagnose.diagnosis import Baseline
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.diagnose.locate import motion
-from origami_sim.diagnose.refit import Fit, Weights, fit
+from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
+from origami_sim.fit.least_squares import Fit, Weights, fit
 
 KNOTS = 9
 

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
-from origami_sim.diagnose.hypothesis import PLAUSIBLE, Hypothesis
-from origami_sim.diagnose.refit import Fit, Weights
+from origami_sim.fit.hypothesis import PLAUSIBLE, Hypothesis
+from origami_sim.fit.least_squares import Fit, Weights
 from origami_sim.recording import Recording
 
 FOLDS = 5

@@ -8,9 +8,9 @@ from origami_sim.diagnose.acting import acting
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
 from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.locate import locate, motions_of
-from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.static import CurveForward
 from origami_sim.effects import get
+from origami_sim.fit.curves import CurveForward
+from origami_sim.fit.least_squares import Fit
 
 NEAR = 1.25
 """What another action may leave, times what the best leaves, to be named beside it."""

@@ -8,20 +8,17 @@ from pathlib import Path
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.acting import acting
 from origami_sim.diagnose.baselines import baselines
-from origami_sim.diagnose.channels import units_of
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.describe import unnamed
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.experiment import propose
-from origami_sim.diagnose.hypothesis import suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.locate import locate, motions_of
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
-from origami_sim.diagnose.refit import carried_on
 from origami_sim.diagnose.screen import screen
 from origami_sim.diagnose.search import (
     chosen,
@@ -37,10 +34,13 @@ from origami_sim.diagnose.search import (
     widened,
 )
 from origami_sim.diagnose.several import combine, pairs
-from origami_sim.diagnose.static import CurveForward
-from origami_sim.diagnose.subject import Source, subject_of
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
 from origami_sim.effects import get
+from origami_sim.fit.channels import units_of
+from origami_sim.fit.curves import CurveForward
+from origami_sim.fit.hypothesis import suspects
+from origami_sim.fit.least_squares import carried_on
+from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.refit import Fit, Linearisation, Weights, linearise
-from origami_sim.diagnose.static import CurveForward
 from origami_sim.drive import Drive, Signal
+from origami_sim.fit.curves import CurveForward
+from origami_sim.fit.least_squares import Fit, Linearisation, Weights, linearise
 from origami_sim.model import Parameters
 
 WANTED = 5.0

@@ -10,10 +10,10 @@ import numpy as np
 from origami_sim.diagnose.diagnosis import Impulse
 from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.locate import dynamics, loose, touching
-from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.track import Track, track
 from origami_sim.distort import distorted
 from origami_sim.effects import CONTACTS, get
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.track import Track, track
 
 FEWEST, MOST = 3, 8
 """Frames before and after a blow that give a rate."""

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Hypothesis
-from origami_sim.diagnose.refit import Fit
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.least_squares import Fit
 
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from origami_sim.diagnose.articulation import Pose
+from origami_sim.articulation import Pose
 from origami_sim.diagnose.diagnosis import REVERSAL, Curve, Place
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.track import track
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.track import track
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.diagnose.forward import Forward, seen_first, stacked
-from origami_sim.diagnose.prescribed import PATH
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.fit.prescribed import PATH
 from origami_sim.model import Model
 from origami_sim.observe import _index, body_point
 from origami_sim.recording import Channel, Recording, by_component

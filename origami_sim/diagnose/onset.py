@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from origami_sim.diagnose.refit import Fit, Linearisation, Weights, fit, linearise
+from origami_sim.fit.least_squares import Fit, Linearisation, Weights, fit, linearise
 
 ALARM = 0.01
 """Chance of a departure being reported where there is none, over all recordings together."""

@@ -9,6 +9,7 @@ class Options:
     """How thoroughly to look; the defaults keep the promise of a minute for four panels and ten seconds.
 
     Attributes:
+        panels: "rigid", "elastic", or "auto": rigid where bending could not show.
         segment: length of a segment [s], each with a start of its own; None: chosen from how fast starts are forgotten
             or amplified.
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
@@ -20,6 +21,7 @@ class Options:
         seed: of the null draws. threads: see `Batch`.
     """
 
+    panels: str = "auto"
     segment: float | None = None
     start: str | None = None
     rate: float = 200.0

@@ -9,12 +9,12 @@ import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.forward import Block, Forward, stacked
-from origami_sim.diagnose.hypothesis import Hypothesis, Suspect
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.refit import Fit
 from origami_sim.diagnose.several import numbers_kept
-from origami_sim.diagnose.static import CurveForward, Static
 from origami_sim.effects import get
+from origami_sim.fit.curves import CurveForward, Static
+from origami_sim.fit.hypothesis import Hypothesis, Suspect
+from origami_sim.fit.least_squares import Fit
 from origami_sim.model import Model, dihedral_angles
 from origami_sim.recording import Channel
 from origami_sim.replay import Overlay, write_overlay

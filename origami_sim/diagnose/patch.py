@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
-from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.entities import WAYS, located
 from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Settings
 

@@ -9,12 +9,12 @@ import numpy as np
 from origami_sim.diagnose import verdict as words
 from origami_sim.diagnose.compare import Score, better, score, weights_from
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.diagnose.options import Options
-from origami_sim.diagnose.refit import Fit, Weights, fit
 from origami_sim.diagnose.screen import Screening, Signature, again, reweighted
 from origami_sim.diagnose.search import NEAR, contest, distinct, finished, leader, look_elsewhere, refit, roughly
 from origami_sim.effects import get
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
+from origami_sim.fit.least_squares import Fit, Weights, fit
 
 MORE = 4.0
 """Times as much as a signature promises that a fit is thought to gain, at most."""

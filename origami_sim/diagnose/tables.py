@@ -3,12 +3,12 @@
 import numpy as np
 
 from origami_sim.diagnose import verdict as words
-from origami_sim.diagnose.channels import units_of
 from origami_sim.diagnose.compare import difference, probabilities, supported
 from origami_sim.diagnose.diagnosis import Candidate, Correlation, Number, Suspected, Trace
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.refit import Fit, Weights
 from origami_sim.diagnose.screen import Screening, Signature
+from origami_sim.fit.channels import units_of
+from origami_sim.fit.least_squares import Fit, Weights
 
 
 def table(forward, fits: list[Fit], scores, judged) -> list[Candidate]:

@@ -20,10 +20,10 @@ from origami_sim.diagnose.compare import (
     together,
 )
 from origami_sim.diagnose.onset import onset
-from origami_sim.diagnose.refit import LITTLE, Fit, whitened
 from origami_sim.diagnose.screen import Screening
 from origami_sim.diagnose.trust import trust
 from origami_sim.effects import get
+from origami_sim.fit.least_squares import LITTLE, Fit, whitened
 from origami_sim.recording.units import quantity
 
 FLOOR = 1.3

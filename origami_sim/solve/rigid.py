@@ -18,7 +18,7 @@ TOLERANCE = 1e-10
 """Largest error of one step [rad], or part of the device's size; ten times less costs 1.6 times the steps."""
 
 FINEST = 1e-7
-"""Part of the asked step below which a world is given up as unstable."""
+"""Part of the asked step below which a world is given up as unstable, unless a batch's `finest` says another."""
 
 FARTHER = 0.3
 """Part of a radian, and of the size, by which the root is moved to see what holds it: any angle that is not small."""
@@ -49,7 +49,7 @@ class RigidBatch(Batch):
         self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options
     ):
         super().__init__(model, parameters, drive, state, **options)
-        self.tolerance = tolerance
+        self.tolerance, self.finest = tolerance, FINEST
         self.tree_of = Topology(model)
         self._fresh = 1
         self._tree = self._made(state)
@@ -183,7 +183,7 @@ class RigidBatch(Batch):
                 wp.float64(dt),
                 wp.float64(self.tolerance),
                 wp.float64(self.size),
-                wp.float64(0.0 if fixed else FINEST * dt),
+                wp.float64(0.0 if fixed else self.finest * dt),
                 every,
                 film,
                 angles,

@@ -15,7 +15,7 @@ from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay
 from origami_sim.diagnose.observed import assumed
 from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.report import read_report
-from origami_sim.diagnose.subject import spreads
+from origami_sim.fit.subject import spreads
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
@@ -167,8 +167,8 @@ def test_the_replay_shows_the_recorded_object_over_both_simulations(diagnosed):
 def test_films_are_what_was_fitted(recorded, monkeypatch):
     """The drawn simulation has the channels of the fit, and the drawn recording those that were measured."""
     from origami_sim.diagnose.forward import Forward
-    from origami_sim.diagnose.hypothesis import Hypothesis
-    from origami_sim.diagnose.refit import Weights, fit
+    from origami_sim.fit.hypothesis import Hypothesis
+    from origami_sim.fit.least_squares import Weights, fit
     from origami_sim.observe import panel_angle
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
@@ -195,8 +195,8 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
 
 def test_an_error_of_one_channel_moves_no_node(recorded):
     from origami_sim.diagnose.forward import Forward
-    from origami_sim.diagnose.hypothesis import Free, Hypothesis, Suspect
-    from origami_sim.diagnose.refit import Weights, fit
+    from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
+    from origami_sim.fit.least_squares import Weights, fit
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
     forward = Forward(subject, [recording], segment=0.4)
@@ -243,7 +243,7 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
 def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded):
     """Another start, number, site or recording never finds a stored prediction; a damaged file is computed again."""
     from origami_sim.diagnose.forward import Forward
-    from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+    from origami_sim.fit.hypothesis import Hypothesis, suspects
 
     module, s = single()
     recording = read_recording(recorded).window(0.0, 1.0)
@@ -286,8 +286,8 @@ def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypat
     import warp as wp
 
     from origami_sim.diagnose.forward import Forward
-    from origami_sim.diagnose.hypothesis import Hypothesis, suspects
-    from origami_sim.diagnose.refit import Weights, fit
+    from origami_sim.fit.hypothesis import Hypothesis, suspects
+    from origami_sim.fit.least_squares import Weights, fit
 
     @wp.func
     def moment(angle: scalar, runaway: scalar):

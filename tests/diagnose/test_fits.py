@@ -24,9 +24,9 @@ from origami_sim.diagnose.compare import (
     together,
 )
 from origami_sim.diagnose.forward import CALM, FINER, NEAR, UNSEEN, Forward, local_line, refined, shifted
-from origami_sim.diagnose.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
+from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting, steady
-from origami_sim.diagnose.refit import UTMOST, Linearisation, Weights, fit, linearise
+from origami_sim.fit.least_squares import UTMOST, Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
 from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
 from origami_sim.diagnose.trust import trust
@@ -275,7 +275,7 @@ def test_a_derivative_that_is_not_finite_where_a_fit_ends_is_said(stiff, monkeyp
         line = linearise(*given, **also)
         return line if also["known"] is None else replace(line, tangent=[np.nan * t for t in line.tangent])
 
-    monkeypatch.setattr("origami_sim.diagnose.refit.linearise", broken)
+    monkeypatch.setattr("origami_sim.fit.least_squares.linearise", broken)
     line = linearise(forward, Hypothesis((one,)), (*base.free, *one.free), np.append(base.theta, 0.0), base.local,
                      base.blocks, weights)  # fmt: skip
     given = {"theta": np.append(base.theta, 0.0), "local": base.local, "known": base.linear, "kept": len(base.free)}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import diagnose
-from origami_sim.diagnose.articulation import Articulation
+from origami_sim.articulation import Articulation
 from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Hypothesis, suspects
+from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.model import State

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from origami_sim.diagnose.hypothesis import Hypothesis
-from origami_sim.diagnose.prescribed import curves
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.prescribed import curves
 from origami_sim.observe import follow, observe_equilibria
 from origami_sim.prove import STRUCTURES, battery, case
 from origami_sim.recording import read_recording
@@ -142,7 +142,7 @@ def test_a_concealed_couple_of_magnets_conserves_energy(truth):
 @pytest.mark.parametrize("structure", ["hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold"])
 def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
     """Rigid bodies in MuJoCo and panels of bars move alike, within the half step by which MuJoCo's velocities lag."""
-    from origami_sim.diagnose.articulation import Articulation
+    from origami_sim.articulation import Articulation
     from origami_sim.drive import Drive, sine
     from origami_sim.model import State
     from origami_sim.solve.dynamics import simulate

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.diagnose.hypothesis import Free, Hypothesis
+from origami_sim.fit.hypothesis import Free, Hypothesis
+from origami_sim.fit.linear import Linearisation, Weights
+from origami_sim.fit.predictor import Prediction, Predictor
 
 STEPS = (1.0, 0.4, 0.1, 0.01)
 """Fractions of a Gauss-Newton step that are tried, until one keeps its promise."""
@@ -23,8 +25,6 @@ SHORT = 0.2
 SLOWEST, UTMOST = 2.5, 10.0
 """How many times smaller than where a fit begins the solver's step may become, and than without any suspect."""
 
-FAINT = 1e-7
-"""Changes of a start that show so much less than others, and of which nothing else is known, are left alone."""
 
 STALE, OWN, ALL = range(3)
 """Which derivatives belong to the present point: none, those by the hypothesis' own numbers, all."""
@@ -34,18 +34,6 @@ DONE = 3e-3
 
 LITTLE = 0.2
 """An improvement of the weighted squares that decides nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class Weights:
-    """How much a residual counts: a standard deviation per component, and the part of samples that are independent.
-
-    Attributes:
-        deviation: (D,) [SI]. part: effective number of samples over their number, in (0, 1].
-    """
-
-    deviation: np.ndarray
-    part: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,101 +101,6 @@ class Fit:
         return replace(self, linear=line, misfit=misfit, covariance=_covariance(self.free, line))
 
 
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """Whitened residuals of the fitted blocks, and their derivatives by the numbers and by the starts.
-
-    After the rows of the data come L rows of what is known of the start (`Block.known`), as if it had been measured.
-
-    Attributes:
-        residual: per block (r,). tangent: per block [r, P] by theta / scale. slopes: per block [r, L] by the starts.
-        basis: per block [r, l] orthonormal directions of the starts; project with `clear`. starts: per block, from
-            projected changes to starts.
-    """
-
-    residual: list[np.ndarray]
-    tangent: list[np.ndarray]
-    slopes: list[np.ndarray]
-    basis: list[np.ndarray]
-    starts: list[np.ndarray]
-
-    @classmethod
-    def of(cls, residual: list[np.ndarray], tangent: list[np.ndarray], slopes: list[np.ndarray]) -> "Linearisation":
-        basis, starts = [], []
-        for s in slopes:
-            # of a start whose simulation fails nothing is known
-            u, sv, vt = np.linalg.svd(s if np.all(np.isfinite(s)) else np.zeros_like(s), full_matrices=False)
-            good = sv > max(FAINT * sv.max(initial=0.0), 1e-300)
-            basis.append(u[:, good])
-            starts.append(vt[good].T / sv[good])
-        return cls(residual, tangent, slopes, basis, starts)
-
-    def data(self, b: int) -> slice:
-        """The rows of the data."""
-        return slice(0, len(self.residual[b]) - self.slopes[b].shape[1])
-
-    def below(self, b: int, columns: np.ndarray) -> np.ndarray:
-        """Columns of the data's rows, with the rows of the start, on which they have no effect."""
-        return np.concatenate([columns, np.zeros((len(self.residual[b]) - len(columns), *columns.shape[1:]))])
-
-    def clear(self, b: int, columns: np.ndarray) -> np.ndarray:
-        """Columns [r, ...] without what a change of the start could explain."""
-        q = self.basis[b]
-        return columns - q @ (q.T @ columns)
-
-    def at(self, residual: list[np.ndarray]) -> "Linearisation":
-        """The same derivatives with other residuals."""
-        return Linearisation(residual, self.tangent, self.slopes, self.basis, self.starts)
-
-    def only(self, blocks: Sequence[int]) -> "Linearisation":
-        """That of some blocks, by their place in the lists."""
-        parts = (self.residual, self.tangent, self.slopes, self.basis, self.starts)
-        return Linearisation(*([p[n] for n in blocks] for p in parts))
-
-    def beside(self, columns: list[np.ndarray], kept: int) -> "Linearisation":
-        """The first `kept` columns of the tangent, and others after them."""
-        joined = [np.concatenate([t[:, :kept], c], axis=1) for t, c in zip(self.tangent, columns, strict=True)]
-        return Linearisation(self.residual, joined, self.slopes, self.basis, self.starts)
-
-    def cut(self, count: int, width: int) -> "Linearisation":
-        """One block, of frames of so many components, as so many stretches of it.
-
-        Its start is shared by them: the first columns of the tangent are those by the start, without its own rows.
-        """
-        frames = self.data(0).stop // width
-        rows = np.array_split(np.arange(frames * width), np.arange(1, count) * frames // count * width)
-        slopes = self.slopes[0] if np.all(np.isfinite(self.slopes[0])) else np.zeros_like(self.slopes[0])
-        both = np.concatenate([slopes, self.tangent[0]], axis=1)
-        return Linearisation.of(
-            [self.residual[0][r] for r in rows], [both[r] for r in rows], [np.zeros((len(r), 0)) for r in rows]
-        )
-
-    def reweighted(self, old: Weights, new: Weights) -> "Linearisation":
-        """The same for other weights."""
-        if old is new:
-            return self
-        factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
-        rows = []
-        for n, r in enumerate(self.residual):
-            count = self.data(n).stop
-            rows.append(np.concatenate([np.tile(factor, count // len(factor)), np.ones(len(r) - count)]))
-        return Linearisation.of(
-            [f * r for f, r in zip(rows, self.residual, strict=True)],
-            [f[:, None] * t for f, t in zip(rows, self.tangent, strict=True)],
-            [f[:, None] * s for f, s in zip(rows, self.slopes, strict=True)],
-        )
-
-
-def whitened(values: np.ndarray, weights: Weights) -> np.ndarray:
-    """Residuals [..., n, D] as (..., n D) numbers of unit variance; missing ones are zero."""
-    return _scaled(np.nan_to_num(values), weights)
-
-
-def _scaled(values: np.ndarray, weights: Weights) -> np.ndarray:
-    scaled = values / weights.deviation * np.sqrt(weights.part)
-    return scaled.reshape(*values.shape[:-2], values.shape[-2] * values.shape[-1])
-
-
 def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
     """Sum of squares of the departures from what was known before."""
     return float(
@@ -216,19 +109,18 @@ def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
 
 
 def linearise(
-    forward,
+    forward: Predictor,
     hypothesis: Hypothesis,
-    free,
-    theta,
-    local,
-    blocks,
+    free: Sequence[Free],
+    theta: np.ndarray,
+    local: np.ndarray,
+    blocks: Sequence[int],
     weights: Weights,
     *,
     fixed: bool = False,
     known: Linearisation | None = None,
     kept: int = 0,
     residual: list[np.ndarray] | None = None,
-    soft: bool = False,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
@@ -236,66 +128,89 @@ def linearise(
         fixed: leave theta out (only the starts are to be fitted).
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
         residual: whitened residuals at this point, if they are known.
-        soft: of softer panels, see `Forward.soften`. Derivatives by starts and nominal numbers need to be exact to
-            the part that those which hardly show are of those that show most, to which softer panels are not.
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
-    size = 0 if known is not None else local.shape[1]
+    size = 0 if known is not None else forward.local
+    fresh = count - kept
     steps = np.array([_step(f, t) for f, t in zip(free, theta, strict=True)])[:count]
     nudges = start_steps(forward)
-    thetas = np.repeat(theta[None], 1 + count - kept + size, axis=0)
-    locals_ = np.repeat(local[None], 1 + count - kept + size, axis=0)
+    thetas = np.repeat(theta[None], 1 + fresh + size, axis=0)
+    locals_ = np.repeat(local[None], 1 + fresh + size, axis=0)
     for row, p in enumerate(range(kept, count)):
         thetas[1 + row, p] += steps[p]
     for i in range(size):
-        locals_[1 + count - kept + i, :, i] += nudges[i]
+        locals_[1 + fresh + i, :, i] += nudges[i]
     if residual is None:
-        residual = residuals(forward, hypothesis, theta, local, blocks, weights, soft=soft)
+        residual = residuals(forward, hypothesis, theta, local, blocks, weights)
+    tied = ties(forward, blocks)
     if len(thetas) > 1:
-        predicted = forward.predict(hypothesis, thetas, locals_, blocks, soft=soft)
-    else:
-        predicted = [forward.blocks[b].values[None] for b in blocks]  # nothing to derive by
-    told = _told(forward, hypothesis, thetas[: 1 + count - kept])
-    tangent, starts = [], []
-    for b, values in zip(blocks, predicted, strict=True):
-        seen = np.isfinite(forward.blocks[b].values)
-        slopes = _scaled(np.where(seen, values[1:] - values[0], 0.0), weights).T
-        columns = slopes[:, : count - kept]
-        if forward.local:
-            columns = np.concatenate([columns, -((told[1:, b] - told[0, b]) / forward.blocks[b].known).T])
-        tangent.append(columns * ([f.scale for f in free[kept:count]] / steps[kept:]))
-        by = slopes[:, count - kept :] / nudges[:size]
-        starts.append(np.concatenate([by, np.diag(1.0 / forward.blocks[b].known)]) if size else by)
+        shot = forward.shoot(hypothesis, thetas, locals_, blocks)
+        changes = changed(forward, shot, weights, blocks)
+    else:  # nothing to derive by
+        changes = [np.zeros((0, forward.blocks[b].rows(t).count)) for b, t in zip(blocks, tied, strict=True)]
+    scale = np.array([f.scale for f in free[kept:count]]) / steps[kept:]
+    tangent = [c[:fresh].T * scale for c in changes]
     if known is not None:
         return known.at(residual).beside(tangent, kept)
-    return Linearisation.of(residual, tangent, starts)
+    slopes, tie, rows = [], [], []
+    for b, t, c in zip(blocks, tied, changes, strict=True):
+        block = forward.blocks[b]
+        own = block.rows(t)
+        slope = c[fresh:].T / nudges[:size]
+        if own.start:
+            slope[own.data : own.data + own.start] = np.diag(1.0 / block.known)
+        slopes.append(slope)
+        tie.append(None if block.reach is None else 1.0 / (weights.gap * block.reach))
+        rows.append(own)
+    return Linearisation(rows, residual, tangent, slopes, tie)
 
 
-def residuals(forward, hypothesis: Hypothesis, theta, local, blocks, weights: Weights, *, soft: bool = False):
-    """Whitened residuals of the blocks, each with that of its start; nan where a prediction failed."""
+def ties(forward: Predictor, blocks: Sequence[int]) -> list[bool]:
+    """Whether each of these blocks is tied to the one before; all of a chain have to be asked for in order.
+
+    Raises:
+        ValueError: blocks of which one is tied to another that is not among them.
+    """
+    out, before = [], None
+    for b in blocks:
+        tied = b > 0 and forward.blocks[b - 1].reach is not None
+        if tied != (before is not None) or (tied and before != b - 1):
+            raise ValueError(f"block {b} is tied to another")
+        out.append(tied)
+        before = b if forward.blocks[b].reach is not None else None
+    return out
+
+
+def changed(forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int]) -> list[np.ndarray]:
+    """Per block, whitened changes [K - 1, r] of what is predicted, from the first world to each of the others."""
     out = []
-    predicted = forward.predict(hypothesis, theta[None], local[None], blocks, soft=soft)
-    for b, values in zip(blocks, predicted, strict=True):
-        measured = forward.blocks[b].values
-        gap = _scaled(np.where(np.isfinite(measured), measured - values[0], 0.0), weights)
-        out.append(gap)
-    return _with_starts(forward, hypothesis, theta, blocks, out, local)
+    for n, (b, tied) in enumerate(zip(blocks, ties(forward, blocks), strict=True)):
+        block, values, ends = forward.blocks[b], shot.values[n], shot.ends[n]
+        data = weights.whitened(np.where(block.seen(), values[1:] - values[0], 0.0))
+        lost = np.any(np.isnan(values[1:] - values[0]) & block.seen(), axis=(1, 2))
+        data[lost] = np.nan
+        parts = [data, np.zeros((len(data), block.rows(tied).start))]
+        if block.reach is not None and ends is not None:
+            parts.append((ends[1:] - ends[0]) / (weights.gap * block.reach))
+        out.append(np.concatenate(parts, axis=1))
+    return out
 
 
-def _with_starts(forward, hypothesis: Hypothesis, theta: np.ndarray, blocks, gaps, local: np.ndarray):
-    """Whitened residuals of blocks, each with that of its start."""
-    if not forward.local:
-        return gaps
-    away = local - forward.told(hypothesis, theta)
-    return [np.concatenate([g, -away[b] / forward.blocks[b].known]) for b, g in zip(blocks, gaps, strict=True)]
-
-
-def _told(forward, hypothesis: Hypothesis, thetas: np.ndarray) -> np.ndarray:
-    """[K, B, L] what recordings tell of the starts, for several theta."""
-    if not forward.local:
-        return np.zeros((len(thetas), 0, 0))
-    return np.stack([forward.told(hypothesis, t) for t in thetas])
+def residuals(forward: Predictor, hypothesis: Hypothesis, theta, local, blocks, weights: Weights) -> list[np.ndarray]:
+    """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed."""
+    shot = forward.shoot(hypothesis, theta[None], local[None], blocks)
+    out = []
+    for n, (b, tied) in enumerate(zip(blocks, ties(forward, blocks), strict=True)):
+        block, values, ends = forward.blocks[b], shot.values[n][0], shot.ends[n]
+        gap = np.where(block.seen(), block.values - values, 0.0)
+        parts = [(gap / weights.deviation * np.sqrt(weights.part)).ravel()]
+        if forward.local and not tied:
+            parts.append(-local[b] / block.known)
+        if block.reach is not None and ends is not None:
+            parts.append((local[b + 1] - ends[0]) / (weights.gap * block.reach))
+        out.append(np.concatenate(parts))
+    return out
 
 
 def start_steps(forward) -> np.ndarray:
@@ -352,7 +267,7 @@ def fit(
     width = 0 if fixed else len(free)
 
     def derived(theta, local, near: Linearisation | None, residual) -> Linearisation:
-        also = {"known": near, "kept": kept if near else 0, "residual": residual, "soft": near is not None}
+        also = {"known": near, "kept": kept if near else 0, "residual": residual}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
     def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
@@ -457,22 +372,21 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     change = np.zeros(len(free))
     if width:
         prior = _precision(free)
-        rows = [line.clear(n, t) for n, t in enumerate(line.tangent)]
-        right = [line.clear(n, r) for n, r in enumerate(line.residual)]
-        a = np.concatenate([*rows, np.diag(prior)])
-        y = np.concatenate([*right, prior * (np.array([f.start for f in free]) - theta) / scale])
+        a = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])
+        right = prior * (np.array([f.start for f in free]) - theta) / scale
+        y = np.concatenate([*line.cleared(line.residual), right])
         norms = np.linalg.norm(a, axis=0)
         a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
         y = np.concatenate([y, np.zeros(len(free))])
         q, r = np.linalg.qr(a)  # a small system with the same least squares
         low, high = (lower - theta) / scale, (upper - theta) / scale
         change = np.asarray(lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, float)
+    left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
     moves, promised = np.zeros_like(local), penalty(free, theta + change * scale)
-    for n, b in enumerate(blocks):
-        left = line.residual[n] - line.tangent[n] @ change[:width]
-        moves[b] = line.starts[n] @ (line.basis[n].T @ left) if forward.local else 0.0
-        rest = line.clear(n, left)
-        promised += float(rest @ rest)
+    if forward.local:
+        for b, move in zip(blocks, line.starts(left), strict=True):
+            moves[b] = move
+    promised += sum(float(rest @ rest) for rest in line.cleared(left))
     return change, moves, promised
 
 
@@ -487,7 +401,7 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) ->
     residuals = []
     for n, b in enumerate(blocks):
         r = line.residual[n][line.data(n)].reshape(-1, dims) * back
-        residuals.append(np.where(np.isfinite(forward.blocks[b].values), r, np.nan))
+        residuals.append(np.where(forward.blocks[b].seen(), r, np.nan))
     misfit = float(sum(r @ r for r in line.residual))
     scale = np.array([f.scale for f in free])
     lower, upper = np.array([f.lower for f in free]), np.array([f.upper for f in free])
@@ -513,7 +427,7 @@ def _covariance(free: Sequence[Free], line: Linearisation) -> np.ndarray:
     if not line.tangent[0].shape[1]:
         return np.zeros((len(free), len(free)))
     scale = np.array([f.scale for f in free])
-    a = np.concatenate([*(line.clear(n, t) for n, t in enumerate(line.tangent)), np.diag(_precision(free))])
+    a = np.concatenate([*line.cleared(line.tangent), np.diag(_precision(free))])
     return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
 
 

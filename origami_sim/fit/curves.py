@@ -9,28 +9,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.diagnose.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Curve, Place
-from origami_sim.diagnose.forward import (
-    Block,
-    Forward,
-    angle_mask,
-    at_channel,
-    component_names,
-    continuous,
-    distinct_motions,
-    drive_of,
-    shared,
-    stacked,
-)
-from origami_sim.diagnose.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
 from origami_sim.diagnose.locate import BINS, PASSIVE
-from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.track import coordinates
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
+from origami_sim.fit.channels import angle_mask, stacked
+from origami_sim.fit.drives import drive_of
+from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.measured import at_channel, continuous
+from origami_sim.fit.predictor import Block, Prediction
+from origami_sim.fit.rollouts import distinct_motions
+from origami_sim.fit.track import coordinates
+from origami_sim.fit.worlds import Worlds
 from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
@@ -57,40 +50,27 @@ ITERATIONS = 12
 """Tangents of a load step, and Broyden's steps with each."""
 
 
-class CurveForward(Forward, ABC):
-    """What curves have in common: no starts to fit, all blocks of a recording in one pass.
+class Curves(Worlds, ABC):
+    """What curves have in common: no starts to fit, all blocks of a recording in one pass. See `Predictor`.
 
     Args:
         subject: how to build the model. recordings: of one object. pieces: blocks of each curve.
-
-    Attributes:
-        blocks, components, local (0), start ("rest"), separate (False): as in `Forward`.
     """
 
-    separate = False
+    separate, start, local, panels, curve = False, "rest", 0, "", True
 
     def __init__(
         self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
     ):
-        self.subject, self.recordings, self.start, self.threads = subject, list(recordings), "rest", threads
-        self.values = {f.name: f.start for f in subject.nominals}
-        self._given = np.array([f.start for f in subject.nominals])
-        self.model, self.parameters, self.drive = subject.build(self.values)
+        super().__init__(subject, recordings, threads)
         for e in self.model.effects:
             if get(e).on_body:
                 raise InputError(
                     "curves do not tell how panels turn under a marker", field=e, allowed="recordings of a motion"
                 )
-        self.articulation = Articulation(self.model)
-        self.shared = shared(self.model, self.recordings, self.drive, self.parameters)
         silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
         self._drives = [drive_of(self._driven(r), silent) for r in self.recordings]
-        self._built: dict[tuple, tuple[Model, Parameters]] = {}
-        self._arms = {self.model.position.tobytes(): self.articulation}
-        self.components = component_names(self.recordings[0])
-        self.local = 0
         self._rested: dict[int, list[Drive]] = {}
-        self.blocks: list[Block] = []
         pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
         for index, r in enumerate(self.recordings):
             values, noise = stacked(r)
@@ -102,27 +82,13 @@ class CurveForward(Forward, ABC):
         """The recording with the drives that the simulator knows."""
         return recording
 
-    def predict(
-        self,
-        hypothesis: Hypothesis | Sequence[Hypothesis],
-        theta: Sequence[np.ndarray] | np.ndarray,
-        local: np.ndarray | None = None,
-        blocks: Sequence[int] | None = None,
-        *,
-        soft: bool = False,
-    ) -> list[np.ndarray]:
-        """Predicted channels of each block, a list of [K, n, D]; nan from where a world has no equilibrium.
-
-        See `Forward.predict`; there is nothing local to a block, and nothing that softer panels would save.
-        """
-        wanted = range(len(self.blocks)) if blocks is None else blocks
-        each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
+    def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
-        worlds, impossible = self._worlds(each, theta, effects)
-        moves, of = distinct_motions(worlds)
-        curves = {}
+        curves, impossible = {}, {}
         for r in sorted({self.blocks[b].recording for b in wanted}):
             recording = self.recordings[r]
+            worlds, impossible[r] = self.worlds_of(each, theta, effects, r)
+            moves, of = distinct_motions(worlds)
             curve = self._curve(r, [worlds[m] for m in moves])
             first = np.repeat(stacked(recording)[0][0][:, None], len(moves), axis=1)
             continuous(curve, angle_mask(recording), first)
@@ -132,15 +98,16 @@ class CurveForward(Forward, ABC):
             block = self.blocks[b]
             rows = slice(block.first, block.first + len(block.times))
             out.append(np.moveaxis(curves[block.recording][rows], 2, 0).copy())
-            out[-1][impossible] = np.nan
-        return out
+            out[-1][impossible[block.recording]] = np.nan
+        return Prediction(out, [None] * len(out))
 
-    def soften(self) -> None:
-        """Statics takes no steps."""
-
-    def step(self, hypothesis: Hypothesis, theta: np.ndarray, *, soft: bool = False) -> float:
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """Curves have no time step: 1, or 0 if no model can be built."""
-        return 0.0 if self._worlds([hypothesis], [theta], hypothesis.effects)[1] else 1.0
+        try:
+            self.world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return 0.0
+        return 1.0
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
         """The suspects that curves can be asked about.
@@ -196,9 +163,9 @@ class CurveForward(Forward, ABC):
         """Residual moments by crease, most suspicious first; empty where they cannot be told."""
         ...
 
-    def menu(self) -> list[tuple[str, "CurveForward"]]:
+    def menu(self) -> list[tuple[str, "Curves"]]:
         """Experiments like those recorded that a user could make: what, and its predictions."""
-        out: list[tuple[str, CurveForward]] = [("repeat the same curve", self._other())]
+        out: list[tuple[str, Curves]] = [("repeat the same curve", self._other())]
         if any(not s.is_zero for d in self._drives for s in d.signals.values()):
             names = sorted({n.split("_")[0] for d in self._drives for n, s in d.signals.items() if not s.is_zero})
             for gain, words in ((0.3, "at 0.3 times the level"), (2.0, "at twice the level"), (-1.0, "reversed")):
@@ -207,13 +174,13 @@ class CurveForward(Forward, ABC):
                 out.append((f"{' and '.join(names)} {words}", other))
         return out
 
-    def _other(self) -> "CurveForward":
+    def _other(self) -> "Curves":
         out = copy.copy(self)
         out.blocks, out._built = list(self.blocks), {}
         return out
 
 
-class Static(CurveForward):
+class Static(Curves):
     """Predictions for curves by load step (`recording.by_step`): chains of equilibria.
 
     Every world follows its own equilibria from step to step. A step begins where the world was, moved as the nominal
@@ -229,7 +196,7 @@ class Static(CurveForward):
         self._systems: dict[tuple[str, ...], _System] = {}
         self._nominal: dict[int, np.ndarray] = {}
 
-    def _other(self) -> CurveForward:
+    def _other(self) -> Curves:
         out = super()._other()
         assert isinstance(out, Static)
         out._nominal = {}
@@ -237,7 +204,7 @@ class Static(CurveForward):
 
     def _curve(self, r: int, worlds):
         if r not in self._nominal:
-            start = self._world(Hypothesis(), np.array([f.start for f in self.subject.nominals]), ())
+            start = self.world(Hypothesis(), np.array([f.start for f in self.subject.nominals]), ())
             self._nominal[r] = self._chain(r, [start], None)[0][:, 0]
         x, angles, alive = self._chain(r, worlds, self._nominal[r])
         recording = self.recordings[r]
@@ -295,7 +262,7 @@ class Static(CurveForward):
             if given is None:
                 return []
             q, noise = given
-            model, parameters = self._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
+            model, parameters = self.world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
             model = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
             parameters = parameters.for_model(model)
             drives = self._resting(r, model, parameters)

@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
-from origami_sim.diagnose.articulation import Articulation
+from origami_sim.articulation import Articulation
 from origami_sim.diagnose.diagnosis import Place
-from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.hypothesis import Subject
-from origami_sim.diagnose.refit import Fit
-from origami_sim.diagnose.static import HOLD, PIECES, CurveForward, Static, onward, places
 from origami_sim.distort import distorted
 from origami_sim.errors import InputError
+from origami_sim.fit.curves import HOLD, PIECES, Curves, Static, onward, places
+from origami_sim.fit.hypothesis import Subject
+from origami_sim.fit.least_squares import Fit
 from origami_sim.model import Parameters, State
 from origami_sim.observe import _index
 from origami_sim.recording import Recording
@@ -26,7 +25,7 @@ KIND = "moment"
 """Kind of the channels that are predicted: the moment applied to a crease, positive towards valley."""
 
 
-class Prescribed(CurveForward):
+class Prescribed(Curves):
     """Moments along prescribed fold angles, in time or by load step.
 
     All panels move as rigid bodies, exactly as prescribed; the moment is that which holds the crease against all
@@ -129,7 +128,7 @@ class Prescribed(CurveForward):
         names = self.articulation.names()
         return places([names[k] for k in rows], found)
 
-    def menu(self) -> list[tuple[str, CurveForward]]:
+    def menu(self) -> list[tuple[str, Curves]]:
         out = super().menu()
         rest = self.articulation.reference().angles
         changes = [
@@ -156,7 +155,7 @@ def _returning(q: np.ndarray) -> np.ndarray:
     return q[:, np.round(np.interp(np.arange(n), [0, (n - 1) / 2, n - 1], [0, n - 1, 0])).astype(int)]
 
 
-def curves(subject: Subject, recordings: Sequence[Recording], threads: int | None = None) -> Forward | None:
+def curves(subject: Subject, recordings: Sequence[Recording], threads: int | None = None) -> Curves | None:
     """Predictions for recordings that are curves; None for motions in time.
 
     Raises:

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
+from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.entities import tune
@@ -106,6 +108,9 @@ class Hypothesis:
         return Hypothesis((*self.suspects, suspect))
 
 
+Build = Callable[[Mapping[str, float]], tuple[Model, Parameters, Drive]]
+
+
 @dataclass(frozen=True)
 class Subject:
     """The object under suspicion: how to build its model for any values of its uncertain numbers.
@@ -114,11 +119,23 @@ class Subject:
         build: from values by name [SI] to model, parameters (one world) and drive.
         nominals: the uncertain numbers with what was known of them.
         name: for reports.
+        build_rigid: the same with rigid panels; None: those of what `build` gives.
     """
 
-    build: Callable[[Mapping[str, float]], tuple[Model, Parameters, Drive]]
+    build: Build
     nominals: tuple[Free, ...]
     name: str = "model"
+    build_rigid: Build | None = None
+
+    def with_rigid_panels(self) -> "Subject":
+        """The same object with panels that do not bend (see `bodies.rigid`)."""
+
+        def build(values: Mapping[str, float]):
+            model, parameters, drive = self.build(values)
+            return *rigid(model, parameters), drive
+
+        made = self.build_rigid or build
+        return Subject(made, self.nominals, self.name, made)
 
     @classmethod
     def from_scene(
@@ -150,29 +167,44 @@ class Subject:
         Its value is a factor on the given parameters (start 1).
         """
 
-        def build(values: Mapping[str, float]):
-            out = parameters.copy()
-            for name, factor in values.items():
-                owner, _, parameter = name.partition(".")
-                if factor != 1.0:
-                    out.set(owner, parameter, parameters[owner, parameter] * factor)
-            return model, out, drive or Drive()
+        def built(make: Callable[[], tuple[Model, Parameters]]) -> Build:
+            def build(values: Mapping[str, float]):
+                own, given = make()
+                out = given.copy()
+                for name, factor in values.items():
+                    owner, _, parameter = name.partition(".")
+                    if factor != 1.0:
+                        old = given[owner, parameter]
+                        there = np.flatnonzero(np.any(old.reshape(len(old), -1) != 0.0, axis=1))  # bodies have masses
+                        out.set(owner, parameter, old[there] * factor, there)
+                return own, out, drive or Drive()
 
-        return cls(build, tuple(nominals))
+            return build
+
+        stiff = cache(lambda: rigid(model, parameters))
+        return cls(built(lambda: (model, parameters)), tuple(nominals), build_rigid=built(stiff))
 
     def tuned(self, numbers: Sequence[Free]) -> "Subject":
         """The same with numbers that change a parameter of some entities of the model; see `entities.tune`."""
         own = {f.name: f.start for f in numbers}
 
-        def build(values: Mapping[str, float]):
-            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in own})
-            out = parameters.copy()
-            for label, start in own.items():
-                if values.get(label, start) != start:
-                    tune(out, model, label, values[label])
-            return model, out, drive
+        def tuned(made: Build) -> Build:
+            def build(values: Mapping[str, float]):
+                model, parameters, drive = made({n: v for n, v in values.items() if n not in own})
+                out = parameters.copy()
+                for label, start in own.items():
+                    if values.get(label, start) != start:
+                        tune(out, model, label, values[label])
+                return model, out, drive
 
-        return Subject(build, (*self.nominals, *numbers), self.name) if numbers else self
+            return build
+
+        return self._changed(tuned, numbers) if numbers else self
+
+    def _changed(self, change: Callable[[Build], Build], numbers: Sequence[Free]) -> "Subject":
+        """The same with numbers of which a change of what is built makes use."""
+        stiff = change(self.with_rigid_panels().build)
+        return Subject(change(self.build), (*self.nominals, *numbers), self.name, stiff)
 
     def beside(self, numbers: Sequence[Free]) -> "Subject":
         """The same with effects that act in any case, as strongly as the fit says: such as a clock that may be late.
@@ -182,20 +214,23 @@ class Subject:
         owners = dict.fromkeys(f.name.partition(".")[0] for f in numbers)
         own = {f.name: f.start for f in numbers}
 
-        def build(values: Mapping[str, float]):
-            model, parameters, drive = self.build({n: v for n, v in values.items() if n not in own})
-            lacking = [e for e in owners if e not in model.effects]
-            richer = model.with_effects(*lacking)
-            out = apply(parameters, Hypothesis(tuple(Suspect(e, "", "", ()) for e in lacking)), (), richer)
-            for effect in lacking:
-                for name, value in silent(effect).items():
-                    out.set(effect, name, value)
-            for label, start in own.items():
-                effect, _, name = label.partition(".")
-                out.set(effect, name, np.clip(values.get(label, start), *get(effect).parameter(name).bounds))
-            return richer, out, drive
+        def beside(made: Build) -> Build:
+            def build(values: Mapping[str, float]):
+                model, parameters, drive = made({n: v for n, v in values.items() if n not in own})
+                lacking = [e for e in owners if e not in model.effects]
+                richer = model.with_effects(*lacking)
+                out = apply(parameters, Hypothesis(tuple(Suspect(e, "", "", ()) for e in lacking)), (), richer)
+                for effect in lacking:
+                    for name, value in silent(effect).items():
+                        out.set(effect, name, value)
+                for label, start in own.items():
+                    effect, _, name = label.partition(".")
+                    out.set(effect, name, np.clip(values.get(label, start), *get(effect).parameter(name).bounds))
+                return richer, out, drive
 
-        return Subject(build, (*self.nominals, *numbers), self.name) if numbers else self
+            return build
+
+        return self._changed(beside, numbers) if numbers else self
 
 
 def silent(effect: str) -> dict[str, float]:

@@ -1,0 +1,195 @@
+"""How recordings are predicted: as curves, by rigid panels, or by bars where panels visibly bend."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.articulation import Articulation
+from origami_sim.diagnose.options import Options
+from origami_sim.errors import InputError
+from origami_sim.fit.bars import BarRollouts
+from origami_sim.fit.channels import stacked, units_of
+from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.prescribed import curves
+from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.fit.rollouts import Rollouts
+from origami_sim.fit.starts import channel_tangent, local_line
+from origami_sim.recording import Recording
+from origami_sim.solve.timestep import stable_step
+
+GROWTH = 30.0
+"""Growth of a difference in the start within a segment: numbers are found by linear steps only where it is small.
+
+Segments half or twice as long change what a diagnosis says by less than its rounding.
+"""
+
+STEADY = 10.0
+"""The same for what begins at rest and is predicted by bars, beyond which it is cut into segments."""
+
+LONGEST = 0.1
+"""Length of a segment, at most, as a part of the recording: what is missing has to show at several times."""
+
+FEWEST = 8
+"""Segments that a single recording is cut into at least, where bars predict it."""
+
+BENDING = 0.3
+"""Change by the bending of panels, over the noise, up to which they are taken as rigid."""
+
+JOINTS = 16
+"""Creases of rigid panels beyond which their dense equations are slower than bars."""
+
+PROBED = 0.3
+"""Time over which bending is looked for, in a few places [s]."""
+
+
+def arranged(subject: Subject, recordings: list[Recording], o: Options) -> tuple[Predictor, list[str]]:
+    """What predicts the recordings, with segments that are short enough to be predictable; and notes.
+
+    Raises:
+        InputError: a segment that is too short; rigid panels that are asked for and impossible.
+    """
+    curve = curves(subject, recordings, o.threads)
+    if curve is not None:
+        return curve, []
+    shortest = 8 * max(float(np.median(np.diff(r.times))) for r in recordings)
+    if o.segment is not None and not shortest <= o.segment < np.inf:
+        raise InputError(
+            "a segment needs frames to be compared", field="segment", value=o.segment, allowed=f">= {shortest:.3g} s"
+        )
+    if o.panels != "elastic":
+        try:
+            found = rigid_rollouts(subject, recordings, o)
+        except InputError:
+            if o.panels == "rigid":
+                raise
+        else:
+            if found is not None:
+                return found
+    return bar_rollouts(subject, recordings, o), []
+
+
+def rigid_rollouts(subject: Subject, recordings: list[Recording], o: Options) -> tuple[Predictor, list[str]] | None:
+    """Predictions by rigid panels; None if bending shows and rigid panels were not asked for.
+
+    Raises:
+        InputError: panels that cannot be rigid.
+    """
+    whole = min(float(r.times[-1] - r.times[0]) for r in recordings)
+    forced = o.panels == "rigid"
+    probe = RigidRollouts(subject, recordings, segment=max(LONGEST * whole, 1e-9), tied=False, threads=o.threads)
+    if len(probe.articulation.creases) > JOINTS and not forced:
+        return None
+    touching = bool(len(probe.model.contacts))
+    notes = []
+    if not forced:
+        bent = bending(subject, recordings, o)
+        if bent > BENDING:
+            return None
+        notes.append(
+            f"Panels are taken as rigid: with those of the model, bending would change what is measured by {bent:.2g} "
+            "times its noise."
+        )
+    if touching:  # a contact is no smooth function of a start
+        start = o.start or starting(subject, recordings)
+        return RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads), notes
+    length = o.segment or min(LONGEST * whole, predictable(probe, GROWTH))
+    return RigidRollouts(subject, recordings, segment=length, threads=o.threads), notes
+
+
+def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
+    """Root mean square change by the bending of panels, over the noise, of the model as it is given."""
+    whole = min(float(r.times[-1] - r.times[0]) for r in recordings)
+    length = min(PROBED, whole)
+    try:
+        bars = BarRollouts(subject, recordings, segment=length, most=2, threads=o.threads)
+    except InputError:
+        return np.inf
+    rigid = RigidRollouts(subject, recordings, segment=length, tied=False, threads=o.threads)
+    rigid.blocks = [replace(rigid.segment(b.recording, b.first, len(b.times)), values=b.values) for b in bars.blocks]
+    theta = np.array([f.start for f in subject.nominals])[None]
+    squares = [
+        ((a[0] - b[0]) / block.noise)[block.seen()] ** 2
+        for a, b, block in zip(
+            bars.predict(Hypothesis(), theta), rigid.predict(Hypothesis(), theta), bars.blocks, strict=True
+        )
+    ]
+    found = np.concatenate(squares)
+    return float(np.sqrt(np.mean(found))) if len(found) else 0.0
+
+
+def bar_rollouts(subject: Subject, recordings: list[Recording], o: Options) -> Predictor:
+    """Predictions by bars, from rest or from free starts."""
+    whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
+    start = o.start or ("fit" if o.segment is not None else starting(subject, recordings))
+    if start == "rest" and o.start is None and not steady(subject, recordings, whole, o.threads):
+        start = "fit"
+    if start == "rest":  # later segments would not begin there
+        return BarRollouts(subject, recordings, start="rest", threads=o.threads)
+    step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
+    step = min(step, float(np.median(np.diff(recordings[0].times))))  # without stiffness any step is stable
+    length = o.segment
+    if length is None:
+        count = FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings))
+        length = min(whole / count, max(o.steps * step / FEWEST, whole / 100))
+        length = min(length, predictable(BarRollouts(subject, recordings, segment=length, most=4, threads=o.threads)))
+    most = max(FEWEST, int(o.steps * step / length)) // len(recordings)
+    return BarRollouts(subject, recordings, segment=length, most=max(1, most), threads=o.threads)
+
+
+def starting(subject: Subject, recordings: list[Recording]) -> str:
+    """ "rest" if all recordings begin at rest in the reference state, else "fit"."""
+    model, *_ = subject.build({f.name: f.start for f in subject.nominals})
+    arm = Articulation(model)
+    for recording in recordings:
+        values, noise = stacked(recording)
+        head = slice(0, max(4, len(values) // 100))
+        now, _ = channel_tangent(model, arm, recording, arm.reference(), values[0])
+        # a start on the ground is better guessed than fitted: where feet touch turns on micrometres
+        standing = arm.floating and len(model.contacts) and len(set(units_of(recording))) == 1
+        with np.errstate(invalid="ignore"):
+            begun = np.nanmedian(values[head], axis=0)
+            away = begun - now
+            drift = 1.4826 * np.nanmedian(np.abs(values[head] - begun), axis=0)  # whatever one frame shows
+        scale = np.maximum(np.nanstd(values, axis=0), 5 * noise)
+        # what does not move at all, such as a marker across the plane of a motion, scatters by its noise
+        moves = np.hypot(np.maximum(0.2 * scale, 0.05 * scale.max() if standing else 0.0), 3 * noise)
+        near = np.maximum(0.05 * scale, 5 * noise)
+        still = np.all(np.abs(away) <= near) and np.all(drift <= moves)
+        if not still and not _just_begun(recording.times, values, noise, now, near):
+            return "fit" if arm.size else "rest"
+    return "rest"
+
+
+def _just_begun(times: np.ndarray, values: np.ndarray, noise: np.ndarray, reference: np.ndarray, near) -> bool:
+    """Whether a motion that is under way within a few frames was at rest in its first, near the reference."""
+    level, rate, error = local_line(times, values, noise, 0)
+    fast = np.nanstd(np.gradient(values, times, axis=0), axis=0)
+    calm = (np.abs(level - reference) <= near) & (np.abs(rate) <= np.maximum(0.05 * fast, 4 * error))
+    return bool(np.all(calm & (error < 0.5 * fast)))
+
+
+def steady(subject: Subject, recordings: list[Recording], whole: float, threads: int | None) -> bool:
+    """Whether a difference in the start hardly grows in a whole recording; where feet stand, that is not asked."""
+    forward = BarRollouts(subject, recordings, segment=whole, threads=threads)
+    if forward.articulation.floating or not forward.articulation.size:
+        return True
+    return predictable(forward, STEADY) >= whole
+
+
+def predictable(forward: Rollouts, growth: float = GROWTH) -> float:
+    """Time over which a difference in the start grows less than so many times [s]."""
+    m = forward.local
+    local = np.zeros((m + 1, len(forward.blocks), m))
+    for k in range(m):
+        local[1 + k, :, k] = 1e-6 if k < m // 2 else 1e-5
+    theta = np.array([f.start for f in forward.subject.nominals])
+    predicted = forward.predict(Hypothesis(), [theta] * (m + 1), local)
+    shortest = np.inf
+    for block, values in zip(forward.blocks, predicted, strict=True):
+        moved = np.linalg.norm(np.nan_to_num(values[1:] - values[0], nan=np.inf), axis=2)  # [m, n]
+        early = np.maximum.accumulate(moved, axis=1)
+        first = np.maximum(early[:, max(2, len(block.times) // 20)], 1e-9)
+        beyond = np.any(moved > growth * first[:, None], axis=0)
+        shortest = min(shortest, block.times[np.argmax(beyond)] if np.any(beyond) else block.times[-1] + 1e-9)
+    return max(float(shortest), 8 * float(np.median(np.diff(forward.recordings[0].times))))

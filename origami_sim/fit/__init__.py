@@ -1,0 +1,1 @@
+"""The estimator: numbers with priors, what a hypothesis predicts, least squares and evidence."""

@@ -1,0 +1,175 @@
+"""Evidence of a linear Gaussian model: how probable recordings are under a set of added effects, everything else summed out.
+
+About a fit, whitened residuals are
+
+    e = N dn + H dh + G_J a + sum_j b_j g_j + D c + noise
+
+with nominal numbers N, the fit's own effects H, further effects G_J, *flaws* b (every suspect of the catalogue acts a
+little in every device), a *discrepancy* c that is smooth in each channel, and one in the forces, which is the variance
+of the gaps between tied segments (see `linear`). All priors are normal but those of strengths, which are mixtures of
+normals on the scale of detectability d'. So all that is unknown is summed out in closed form, in Laplace's
+approximation for strengths (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.fit.linear import Linearisation
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns of one effect in a linear problem.
+
+    Attributes:
+        columns: their indices. strengths: how many of them, the first ones, are strengths.
+        at: (k,) values where the problem is linearised, from where they begin, over the scale of the column.
+        side: 1 or -1 where physics allows one sign of the first strength, else 0.
+        spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
+    """
+
+    columns: tuple[int, ...]
+    strengths: int
+    at: np.ndarray
+    side: int
+    spread: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linearisation, for one size of the gaps: Gram matrices of all columns with the nominal numbers projected out.
+
+    Attributes:
+        gram: [C + K + 1, C + K + 1] of the columns of effects (C), of the channels' discrepancy (K) and of the residual.
+        columns: C. constant: of the log evidence.
+    """
+
+    gram: np.ndarray
+    columns: int
+    constant: float
+
+
+def problem(
+    line: Linearisation,
+    nominal: np.ndarray,
+    precision: np.ndarray,
+    away: np.ndarray,
+    effects: list[np.ndarray],
+    smooth: list[np.ndarray],
+) -> Problem:
+    """Eliminates starts and nominal numbers.
+
+    Args:
+        nominal: indices of the nominal numbers' columns in the tangent. precision: (P,) scale over prior standard
+            deviation of all numbers. away: (P,) prior mean minus value, over the scale.
+        effects: per segment [r, C]. smooth: per segment [r, K].
+    """
+    parts = [
+        np.concatenate([t[:, nominal], x, d, r[:, None]], axis=1)
+        for t, x, d, r in zip(line.tangent, effects, smooth, line.residual, strict=True)
+    ]
+    whole = np.concatenate(line.cleared(parts))
+    p = len(nominal)
+    below = np.zeros((p, whole.shape[1]))
+    below[:, :p] = np.diag(precision[nominal])
+    below[:, -1] = precision[nominal] * away[nominal]
+    # numbers without a prior: a very wide one, the same for all hypotheses
+    whole = np.concatenate([whole, below])
+    constant = -line.spread
+    if p:
+        q, r = np.linalg.qr(whole[:, :p])
+        size = np.abs(np.diag(r))
+        keep = size > 1e-10 * size.max(initial=1e-300)
+        rest = whole[:, p:] - q[:, keep] @ (q[:, keep].T @ whole[:, p:])
+        constant -= float(np.sum(np.log(size[keep])))
+    else:
+        rest = whole
+    return Problem(rest.T @ rest, effects[0].shape[1], constant)
+
+
+@dataclass(frozen=True, eq=False)
+class Summed:
+    """A problem with flaws and discrepancy summed out: Gram matrix of effects and residual, and what it is about.
+
+    Attributes:
+        gram: [C + 1, C + 1]. log: constant of the log evidence.
+    """
+
+    gram: np.ndarray
+    log: float
+
+    def of(
+        self, sets: np.ndarray, groups: Sequence[Group], own: int = 0, hyper: Hyper = HYPER
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Log evidence (n,) of sets of groups [n, g] with as many columns each, and values [n, k] of their columns.
+
+        Args:
+            own: how many groups, the first ones, the problem is linearised with; of those that a set lacks the strength
+                is taken back to zero.
+        """
+        n = len(sets)
+        present = np.zeros((n, own), bool)
+        for k in range(own):
+            present[:, k] = np.any(sets == k, axis=1) if sets.shape[1] else False
+        # what the residual would be without what a set lacks
+        back = np.zeros((n, len(self.gram) - 1))
+        for k in range(own):
+            g = groups[k]
+            strong = list(g.columns[: g.strengths])
+            back[:, strong] = np.where(present[:, k, None], 0.0, g.at[: g.strengths])
+        right = self.gram[:-1, -1] + back @ self.gram[:-1, :-1]
+        square = self.gram[-1, -1] + np.einsum("nc,nc->n", back, self.gram[:-1, -1] + right)
+        if not sets.shape[1]:
+            return self.log - 0.5 * square, np.zeros((n, 0))
+        columns = np.array([[c for g in row for c in groups[g].columns] for row in sets])
+        k = columns.shape[1]
+        a = self.gram[columns[:, :, None], columns[:, None, :]]
+        b = np.take_along_axis(right, columns, axis=1)
+
+        def each(of) -> np.ndarray:
+            return np.array([np.concatenate([of(groups[g]) for g in row]) for row in sets])
+
+        at, spread = each(lambda g: g.at), each(lambda g: g.spread)
+        strength = each(lambda g: np.arange(len(g.columns)) < g.strengths)
+        side = each(lambda g: np.where(np.arange(len(g.columns)) == 0, g.side, 0))
+        norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
+        # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
+        tight = np.where(strength, norm / hyper.widest, 1.0 / np.where(np.isfinite(spread), spread, 1e6))
+        full = a + np.eye(k) * (tight**2)[:, None, :]
+        move = np.linalg.solve(full, (b - at * tight**2)[:, :, None])[:, :, 0]
+        value = at + move
+        sd = np.sqrt(np.maximum(np.linalg.inv(full)[:, range(k), range(k)], 1e-300))
+        left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
+        out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
+        slab = _log_slab(value * norm, hyper) + np.log(norm)
+        shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
+        out += np.sum(np.where(strength, slab, shape), axis=1)
+        out += np.sum(np.where(side != 0, np.log(2.0) + log_ndtr(side * value / sd), 0.0), axis=1)
+        return out, value
+
+
+def summed(p: Problem, smooth: float, hyper: Hyper = HYPER) -> Summed:
+    """Sums out flaws and a discrepancy of the channels whose size is `smooth` standard deviations of noise."""
+    c, k = p.columns, len(p.gram) - 1 - p.columns
+    norms = np.sqrt(np.maximum(np.diag(p.gram)[:c], 1e-12))
+    share = hyper.flaws / np.sqrt(max(c, 1))
+    scale = np.concatenate([np.where(norms > 1e-5, share / norms, 0.0), np.full(k, smooth)])
+    u = p.gram[: c + k, : c + k] * scale[:, None] * scale
+    rows = [*range(c), len(p.gram) - 1]
+    cross = p.gram[: c + k][:, rows] * scale[:, None]
+    m = np.eye(c + k) + u
+    root = np.linalg.cholesky(m)
+    by = np.linalg.solve(root, cross)
+    gram = p.gram[np.ix_(rows, rows)] - by.T @ by
+    return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
+
+
+def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log density of a strength at detectability d': a mixture of normals."""
+    widths = np.array(hyper.slabs)
+    log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
+    return logsumexp(log, axis=-1) - np.log(len(widths))

@@ -1,0 +1,188 @@
+"""Linear least squares of recordings cut into segments whose starts are unknown, tied to each other or free.
+
+A recording is predicted segment by segment, each from a start of its own (multiple shooting; Bock & Plitt 1984). Where
+motion is continuous, the end of a segment is the start of the next but for a small gap, of which the standard deviation
+is that of the impulses that the model lacks. With everything linear, the starts are eliminated one after the other by
+orthogonal transformations (a square-root information filter; Bierman 1977, chapter 5): what is left of each segment are
+its innovations, which no choice of the starts can explain, and which are independent of each other.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """What a residual is measured by.
+
+    Attributes:
+        deviation: (D,) standard deviation of each component [SI].
+        part: effective number of samples over their number, in (0, 1]: residuals with a memory count less.
+        gap: standard deviation of the gaps between tied segments, as a part of `Segment.reach`.
+    """
+
+    deviation: np.ndarray
+    part: float = 1.0
+    gap: float = 1.0
+
+    def whitened(self, values: np.ndarray) -> np.ndarray:
+        """Residuals [..., n, D] as (..., n D) numbers of unit variance; missing ones are zero."""
+        scaled = np.nan_to_num(values) / self.deviation * np.sqrt(self.part)
+        return scaled.reshape(*values.shape[:-2], values.shape[-2] * values.shape[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """How many rows the data, the known start and the tie to the next segment have, in this order.
+
+    Attributes:
+        data: n D. start: L of what is known of a start that is not tied to the segment before, else 0.
+        tie: L of the gap to the next segment, else 0.
+    """
+
+    data: int
+    start: int = 0
+    tie: int = 0
+
+    @property
+    def count(self) -> int:
+        return self.data + self.start + self.tie
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Whitened residuals of segments, and their derivatives by numbers and starts.
+
+    Attributes:
+        rows: of each segment. residual: per segment (r,), measured minus predicted.
+        tangent: per segment [r, P] derivative of what is predicted by theta / scale.
+        slopes: per segment [r, L] by its own start.
+        tie: per segment (L,) one over the standard deviations of the gap to the next; None where that is not tied.
+    """
+
+    rows: list[Rows]
+    residual: list[np.ndarray]
+    tangent: list[np.ndarray]
+    slopes: list[np.ndarray]
+    tie: list[np.ndarray | None]
+
+    def data(self, n: int) -> slice:
+        """The rows of the data of a segment."""
+        return slice(0, self.rows[n].data)
+
+    @cached_property
+    def _factors(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Per segment, the factors Q, R of its columns: of its own start, then of the next one."""
+        out, carry = [], None
+        for rows, slopes, tie in zip(self.rows, self.slopes, self.tie, strict=True):
+            size = slopes.shape[1]
+            own = slopes if np.all(np.isfinite(slopes)) else np.zeros_like(slopes)
+            both = np.zeros((rows.count, size * (1 if tie is None else 2)))
+            both[:, :size] = own
+            if tie is not None:
+                both[rows.count - size :, size:] = -np.diag(tie)
+            if carry is not None:
+                above = np.zeros((len(carry), both.shape[1]))
+                above[:, :size] = carry
+                both = np.concatenate([above, both])
+            q, r = np.linalg.qr(both) if size else (np.zeros((len(both), 0)), np.zeros((0, 0)))
+            out.append((q, r))
+            carry = r[size:, size:] if tie is not None else None
+        return out
+
+    def _swept(self, parts: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Innovations [c + r, ...] per segment (c rows are carried over), and coefficients of the starts."""
+        left, coefficients, carry = [], [], None
+        for (q, _), part, slopes, tie in zip(self._factors, parts, self.slopes, self.tie, strict=True):
+            x = part if carry is None else np.concatenate([carry, part])
+            c = q.T @ x
+            left.append(x - q @ c)
+            coefficients.append(c)
+            carry = None if tie is None else c[slopes.shape[1] :]
+        return left, coefficients
+
+    def cleared(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Columns [r, ...] of each segment as innovations: without what any starts could explain.
+
+        Sums of products over all segments are those of the columns with the starts projected out; each segment's are
+        independent of those before, given the numbers.
+        """
+        return self._swept(parts)[0]
+
+    def starts(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The changes of the starts [L, ...] that explain columns [r, ...] best."""
+        _, coefficients = self._swept(parts)
+        out: list[np.ndarray] = []
+        for (_, r), c, slopes, tie in zip(
+            reversed(self._factors), reversed(coefficients), reversed(self.slopes), reversed(self.tie), strict=True
+        ):
+            size = slopes.shape[1]
+            right = c[:size] if tie is None else c[:size] - r[:size, size:] @ out[-1]
+            diagonal = np.abs(np.diag(r)[:size])
+            safe = np.where(diagonal > 1e-12 * diagonal.max(initial=1e-300), np.diag(r)[:size], np.inf)
+            own = np.where(np.isinf(safe)[:, None], 0.0, r[:size, :size])
+            own[np.diag_indices(size)] = np.where(np.isinf(safe), 1.0, np.diag(r)[:size])
+            right = np.where(np.isinf(safe).reshape(-1, *[1] * (right.ndim - 1)), 0.0, right)
+            out.append(solve_triangular(own, right) if size else np.zeros((0, *right.shape[1:])))
+        return out[::-1]
+
+    def smoothed(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Columns [r, ...] of each segment, in its own rows, without what the best starts explain."""
+        found, out = self.starts(parts), []
+        for n, (part, slopes, tie) in enumerate(zip(parts, self.slopes, self.tie, strict=True)):
+            rest = part - slopes @ found[n]
+            if tie is not None:
+                rest[len(part) - len(tie) :] += tie.reshape(-1, *[1] * (part.ndim - 1)) * found[n + 1]
+            out.append(rest)
+        return out
+
+    @cached_property
+    def spread(self) -> float:
+        """Log determinant of the starts' precision, half of it: what eliminating them costs a marginal likelihood."""
+        total = 0.0
+        for (_, r), slopes, tie in zip(self._factors, self.slopes, self.tie, strict=True):
+            size = slopes.shape[1]
+            total += float(np.sum(np.log(np.maximum(np.abs(np.diag(r)[:size]), 1e-300))))
+            if tie is not None:
+                total -= float(np.sum(np.log(tie)))
+        return total
+
+    def padded(self, n: int, columns: np.ndarray) -> np.ndarray:
+        """Columns of the rows of a segment's data, with zeros for all other rows."""
+        return np.concatenate([columns, np.zeros((self.rows[n].count - len(columns), *columns.shape[1:]))])
+
+    def at(self, residual: list[np.ndarray]) -> "Linearisation":
+        """The same derivatives with other residuals."""
+        return self._keeping(replace(self, residual=residual))
+
+    def beside(self, columns: list[np.ndarray], kept: int) -> "Linearisation":
+        """The first `kept` columns of the tangent, and others after them."""
+        joined = [np.concatenate([t[:, :kept], c], axis=1) for t, c in zip(self.tangent, columns, strict=True)]
+        return self._keeping(replace(self, tangent=joined))
+
+    def _keeping(self, other: "Linearisation") -> "Linearisation":
+        """Another one of the same starts, which need not be factored again."""
+        if "_factors" in self.__dict__:
+            other.__dict__["_factors"] = self._factors
+        return other
+
+    def reweighted(self, old: Weights, new: Weights) -> "Linearisation":
+        """The same for other weights."""
+        if old is new:
+            return self
+        factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
+        scales = []
+        for r in self.rows:
+            data = np.tile(factor, r.data // max(len(factor), 1))
+            scales.append(np.concatenate([data, np.ones(r.start), np.full(r.tie, old.gap / new.gap)]))
+        return Linearisation(
+            self.rows,
+            [f * r for f, r in zip(scales, self.residual, strict=True)],
+            [f[:, None] * t for f, t in zip(scales, self.tangent, strict=True)],
+            [f[:, None] * s for f, s in zip(scales, self.slopes, strict=True)],
+            [None if t is None else t * (old.gap / new.gap) for t in self.tie],
+        )

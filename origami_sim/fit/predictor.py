@@ -1,0 +1,130 @@
+"""What a hypothesis predicts for recordings: the protocol that rollouts of bars, of rigid panels, and curves share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from origami_sim.articulation import Articulation, Pose
+from origami_sim.drive import Drive
+from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
+from origami_sim.fit.linear import Rows
+from origami_sim.model import Model, Parameters
+from origami_sim.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A segment of a recording that is predicted from a start of its own.
+
+    Attributes:
+        recording: index of the recording. first: index of its first frame. times: (n,) since that frame [s].
+        values: (n, D) all components of all channels [SI]; nan where missing.
+        noise: (D,) their standard deviations.
+        pose, rates: the start about which `local` numbers shift: coordinates, and their rates.
+        known: (L,) standard deviations of the start about it; empty where it is not fitted.
+        reach: (L,) gaps to the next segment are measured by these; None where that is not tied to this one.
+        lasting: time until the next segment begins, if it is tied to this one [s].
+        begin: (D,) what was measured at the first frame, which tells the turn of angles.
+    """
+
+    recording: int
+    first: int
+    times: np.ndarray
+    values: np.ndarray
+    noise: np.ndarray
+    pose: Pose
+    rates: np.ndarray
+    known: np.ndarray
+    reach: np.ndarray | None = None
+    lasting: float = 0.0
+    begin: np.ndarray | None = None
+
+    def rows(self, tied: bool) -> Rows:
+        """How many rows of a least-squares problem it has, `tied` or not to the segment before."""
+        size = len(self.known)
+        return Rows(self.values.size, 0 if tied else size, 0 if self.reach is None else size)
+
+    def seen(self) -> np.ndarray:
+        """[n, D] which values were measured."""
+        return np.isfinite(self.values)
+
+    def held_back(self) -> "Block":
+        """The same, not tied to the next."""
+        return replace(self, reach=None, lasting=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Of K worlds, per block: values [K, n, D] of all components, and ends [K, L] of those that the next is tied to.
+
+    An end is where the motion arrives at the next block's first frame, as a shift from that block's own start.
+    """
+
+    values: list[np.ndarray]
+    ends: list[np.ndarray | None]
+
+
+class Predictor(Protocol):
+    """Predicts recordings of one object under hypotheses; whoever asks does not know by which kind of simulation.
+
+    Attributes:
+        subject: how the model is built. recordings: of one object. model, parameters, drive: as given.
+        articulation: coordinates of rigid panels. components: names of the D components.
+        blocks: the segments. local: L, numbers of each segment's start (coordinates, then rates); 0 if none is fitted.
+        start: "fit" or "rest". panels: "elastic", "rigid" or "" (of curves). separate: whether a segment is predicted
+            without those before it.
+        curve: whether these are load steps or slow loads, each of which has an equilibrium.
+    """
+
+    subject: Subject
+    recordings: list[Recording]
+    model: Model
+    parameters: Parameters
+    drive: Drive
+    articulation: Articulation
+    components: list[str]
+    blocks: list[Block]
+    local: int
+    start: str
+    panels: str
+    separate: bool
+    curve: bool
+    threads: int | None
+
+    def shoot(
+        self,
+        hypothesis: Hypothesis | Sequence[Hypothesis],
+        theta: Sequence[np.ndarray] | np.ndarray,
+        local: np.ndarray | None = None,
+        blocks: Sequence[int] | None = None,
+    ) -> Prediction:
+        """Predicts blocks from their starts.
+
+        Args:
+            hypothesis: one for all K worlds, or one for each.
+            theta: K times the nominals, then the hypothesis' numbers [SI].
+            local: [K, B, L] shifts of the starts, for all blocks. blocks: which to predict (default all).
+
+        A world that goes unstable, or of whose numbers no model can be built, gives nan.
+        """
+        ...
+
+    def predict(
+        self,
+        hypothesis: Hypothesis | Sequence[Hypothesis],
+        theta: Sequence[np.ndarray] | np.ndarray,
+        local: np.ndarray | None = None,
+        blocks: Sequence[int] | None = None,
+    ) -> list[np.ndarray]:
+        """The values of `shoot`: per block [K, n, D]."""
+        ...
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """The solver's step for one world [s]; 0 if no model can be built."""
+        ...
+
+    def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
+        """The suspects that these recordings can be asked about."""
+        ...

@@ -1,0 +1,142 @@
+"""Rollouts of rigid panels: recordings cut into short segments that are tied to each other, so that all frames count."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.articulation import Pose
+from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.fit.predictor import Block
+from origami_sim.fit.rollouts import Rollouts, Shots, film, joined_poses
+from origami_sim.model import Parameters, State
+from origami_sim.recording import Recording
+from origami_sim.solve.rigid import RigidBatch, Topology
+
+FEWEST = 8
+"""Frames of a segment, at least: as many as tell its start's rate."""
+
+FINEST = 1e-4
+"""Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
+
+Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
+"""
+
+
+class RigidRollouts(Rollouts):
+    """A `Predictor` of devices whose panels do not visibly bend.
+
+    Args:
+        segment: length of a segment [s]; None: a recording is one segment. tied: whether a segment begins where the one
+            before ends. The rest as for `Rollouts`.
+
+    Raises:
+        InputError: what rigid panels refuse; closed loops, a root that is held in part.
+    """
+
+    panels = "rigid"
+
+    def __init__(
+        self,
+        subject: Subject,
+        recordings: Sequence[Recording],
+        *,
+        segment: float | None = None,
+        start: str = "fit",
+        tied: bool = True,
+        threads: int | None = None,
+    ):
+        super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
+        check_tree(Topology(self.model), self.articulation.floating)
+        for index, recording in enumerate(self.recordings):
+            self.blocks += self._segments(index, recording, segment, tied)
+
+    def _segments(self, index: int, recording: Recording, segment: float | None, tied: bool) -> list[Block]:
+        step, count = float(np.median(np.diff(recording.times))), len(recording.times)
+        frames = count if segment is None or self.start != "fit" else max(FEWEST, round(segment / step))
+        pieces = max(1, round(count / frames))
+        firsts = np.linspace(0, count, pieces + 1).round().astype(int)
+        out = [self.segment(index, int(a), int(b - a)) for a, b in zip(firsts[:-1], firsts[1:], strict=True)]
+        if not tied or self.start != "fit":
+            return out
+        usual = self.usual_rates(index)
+        for n, (block, after) in enumerate(zip(out[:-1], out[1:], strict=True)):
+            lasting = float(recording.times[after.first] - recording.times[block.first])
+            # a force that is missing by chance changes rates, and coordinates by their integral
+            reach = np.concatenate([usual * lasting / np.sqrt(3.0), usual])
+            out[n] = replace(block, reach=reach, lasting=lasting)
+        return out
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """A frame [s], since steps adapt themselves; 0 if no model can be built."""
+        try:
+            self.world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return 0.0
+        return float(np.median(np.diff(self.recordings[0].times)))
+
+    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+        recording, model = self.recordings[shots.recording], shots.worlds[0][0]
+        parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
+        state = self._state(shots)
+        memory = self._memory(shots)
+        if memory is not None:
+            state.memory[:] = memory
+        batch = self._batch(model, parameters, self._driven(shots, model, parameters), state)
+        if isinstance(batch, RigidBatch):
+            batch.finest = FINEST
+        raw = film(batch, recording, shots.ends + 1 if shots.ends else shots.frames, 1, shots.step)
+        ends = self._arrived(shots, batch.state()) if shots.ends else None
+        if shots.ends and shots.frames > shots.ends + 1:
+            raw += film(batch, recording, shots.frames - shots.ends - 1, 1, shots.step, first=False)
+        out = np.concatenate(raw)
+        lost = batch.status() >= 0
+        out[:, :, lost] = np.nan
+        if ends is not None:
+            ends[:, lost] = np.nan
+        return out, ends
+
+    def _arrived(self, shots: Shots, state: State) -> np.ndarray:
+        """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""
+        arm, count = self.articulation, len(shots.blocks)
+        following = {(b.recording, b.first): b for b in self.blocks}
+        frames = [b.first + len(b.times) for b in shots.blocks]
+        after = [following[shots.recording, f] for f in frames]
+        base = joined_poses([b.pose for b in after])
+        rates = np.stack([b.rates for b in after], axis=1)
+        out = np.empty((2 * arm.size, state.worlds))
+        alike: dict[bytes, list[int]] = {}
+        for n, (own, _) in enumerate(shots.worlds):
+            alike.setdefault(own.position.tobytes(), []).append(n)
+        for key, mine in alike.items():
+            at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
+            own, b = self._arms[key], np.tile(np.arange(count), len(mine))
+            pose = own.poses_of(state.x[:, at], state.angles[:, at])
+            out[: arm.size, at] = shift_between(base.select(b), pose, arm.floating)
+            out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
+        return out
+
+
+def shift_between(base: Pose, pose: Pose, floating: bool) -> np.ndarray:
+    """Small displacement [m, W] of the coordinates that leads from one pose to another; angles by less than a turn."""
+    from scipy.spatial.transform import Rotation
+
+    angles = pose.angles - base.angles
+    angles = angles - 2 * np.pi * np.round(angles / (2 * np.pi))
+    if not floating:
+        return angles
+    turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
+    return np.concatenate([(pose.centre - base.centre).T, turn.T, angles])
+
+
+def check_tree(tree: Topology, floating: bool) -> None:
+    """Refuses what has other coordinates than the fold angles of a tree and the six of a free root.
+
+    Raises:
+        InputError: closed loops; a root that is held in part.
+    """
+    if len(tree.row_node):
+        raise InputError("panels that close a loop are predicted with bars", field="panels", allowed="elastic")
+    if len(tree.turns) != 6 * floating:
+        raise InputError("a panel that is held in part is predicted with bars", field="panels", allowed="elastic")

@@ -1,0 +1,388 @@
+"""Predictions by simulation: batches of rollouts that start where segments of recordings do."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from origami_sim.articulation import Articulation, Pose
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.fit.channels import angle_mask, channel_values, depths, stacked, turned_axes
+from origami_sim.fit.drives import drive_of, shifted
+from origami_sim.fit.hypothesis import (
+    Hypothesis,
+    Subject,
+    Suspect,
+    along_every_axis,
+    at_several_times,
+    told_apart,
+)
+from origami_sim.fit.measured import continuous, lateness, measured, read_until, spline
+from origami_sim.fit.predictor import Block, Prediction
+from origami_sim.fit.starts import CAREFUL, NEAR, channel_tangent, read_start, seen_first, spans
+from origami_sim.fit.track import coordinates
+from origami_sim.fit.worlds import World, Worlds
+from origami_sim.model import Model, Parameters, State
+from origami_sim.recording import Recording
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.rigid import batch_of
+
+LEAD = 1500
+"""Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
+
+FASTEST = 3.0
+"""Frames below which a time constant is not told from none."""
+
+SPARE = 3
+"""Frames simulated beyond a segment, for measurements that lag."""
+
+FILMED = 64e6
+"""Bytes of positions that are kept before they are read; more would not be faster."""
+
+TOGETHER = 4096
+"""Rollouts that are made at once, which bounds memory; more would not be faster."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """Rollouts that begin together: worlds times blocks of equal times.
+
+    Attributes:
+        recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
+            [s]. local: [K, B, L] shifts of starts, or None. step: between frames [s]. frames: of each rollout. ends: the
+            frame at which the next blocks begin; 0: none is tied to them.
+    """
+
+    recording: int
+    blocks: list[Block]
+    worlds: list[World]
+    late: np.ndarray
+    local: np.ndarray | None
+    step: float
+    frames: int
+    ends: int
+
+
+class Rollouts(Worlds, ABC):
+    """A `Predictor` that simulates; see there for what is public.
+
+    Args:
+        subject: how to build the model. recordings: of one object.
+        start: "fit" if segments have starts that are fitted, "rest" if recordings start from rest in the model's
+            reference state. threads: see `Batch`.
+    """
+
+    panels, separate, curve = "", True, False
+
+    def __init__(
+        self, subject: Subject, recordings: Sequence[Recording], *, start: str = "fit", threads: int | None = None
+    ):
+        super().__init__(subject, recordings, threads)
+        self.start = start
+        self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._paths: dict[int, np.ndarray | None] = {}
+        self._usual: dict[int, np.ndarray] = {}
+        self.local = 2 * self.articulation.size if start == "fit" else 0
+
+    # --- segments
+
+    def segment(self, index: int, first: int, frames: int) -> Block:
+        """The segment of so many frames of a recording that begins at a frame."""
+        recording = self.recordings[index]
+        values, noise = stacked(recording)
+        part = slice(first, first + frames)
+        arm, m = self.articulation, self.articulation.size
+        pose, rates, known = arm.reference(), np.zeros(m), np.zeros(0)
+        if self.start == "fit":
+            found = read_start(self.model, arm, recording, values, noise, first)
+            pose, rates = found.pose, found.rates
+            usual = np.maximum(self.usual_rates(index), 1e-9)
+            told = np.isfinite(found.error)
+            wide = np.hypot(CAREFUL * np.where(told, found.error, 0.0), np.maximum(usual, np.abs(rates)))
+            known = np.concatenate([spans(arm, self.model), wide])
+        times = recording.times[part] - recording.times[first]
+        return Block(
+            index, first, times, values[part].copy(), noise, pose, rates, known, begin=seen_first(values[part])
+        )
+
+    def usual_rates(self, index: int) -> np.ndarray:
+        """(m,) root mean square of the rates of the coordinates in a recording, where channels tell them.
+
+        What no channel tells is taken to move as fast as what they do tell, a radian as a device's size.
+        """
+        if index not in self._usual:
+            recording, arm = self.recordings[index], self.articulation
+            values, noise = stacked(recording)
+            picked = np.unique(np.linspace(0, len(values) - 1, 24).astype(int))
+            found = [read_start(self.model, arm, recording, values, noise, int(k)) for k in picked]
+            size = spans(arm, self.model)
+            rates = np.stack([np.where(np.isfinite(f.error), f.rates, np.nan) for f in found]) / size
+            squares = np.array([np.mean(r[np.isfinite(r)] ** 2) if np.any(np.isfinite(r)) else np.nan for r in rates.T])
+            most = np.nanmax(squares) if np.any(np.isfinite(squares)) else 1.0
+            self._usual[index] = np.sqrt(np.where(np.isfinite(squares), squares, most)) * size
+        return self._usual[index]
+
+    def tells(self, recording: Recording, values, noise, first: int) -> bool:
+        """Whether what was seen near a frame tells all coordinates that the channels can tell."""
+        near = np.isfinite(values[max(0, first - NEAR) : first + NEAR + 1]).any(axis=0)
+        ever = np.isfinite(values).any(axis=0)
+        if np.array_equal(near, ever):
+            return True
+        pose = self.articulation.reference()
+        _, tangent = channel_tangent(self.model, self.articulation, recording, pose, values[first])
+        by = tangent / noise[:, None]
+        return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
+
+    # --- predictions
+
+    def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        values: dict[int, np.ndarray] = {}
+        ends: dict[int, np.ndarray | None] = {}
+        for r in range(len(self.recordings)):
+            mine = [b for b in wanted if self.blocks[b].recording == r]
+            worlds, impossible = self.worlds_of(each, theta, effects, r) if mine else ([], [])
+            for group in _by_length(self.blocks, mine):
+                most = max(1, TOGETHER // len(group))
+                parts = [
+                    self._roll(r, group, worlds[k : k + most], None if local is None else local[k : k + most])
+                    for k in range(0, len(worlds), most)
+                ]
+                for n, b in enumerate(group):
+                    values[b] = np.concatenate([p[0][n] for p in parts])
+                    values[b][impossible] = np.nan
+                    tied = parts[0][1] is not None
+                    ends[b] = np.concatenate([p[1][n] for p in parts]) if tied else None  # type: ignore[index]
+        return Prediction([values[b] for b in wanted], [ends[b] for b in wanted])
+
+    def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
+        """See `Predictor.admitted`: those with a time constant with several. See also `told_apart`."""
+        frame = float(np.median(np.diff(self.recordings[0].times)))
+        longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
+        every = along_every_axis(told_apart(every, len(self.components)))
+        return at_several_times(every, FASTEST * frame, longest)
+
+    @abstractmethod
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """See `Predictor.step`."""
+
+    def _roll(self, r: int, group: list[int], worlds: list[World], local):
+        """Per block values [K, n, D] and ends [K, L]; the batch runs over worlds, then over blocks."""
+        recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
+        k, count = len(worlds), len(blocks)
+        model, times = worlds[0][0], blocks[0].times
+        step = float(np.median(np.diff(recording.times)))
+        ends = round(blocks[0].lasting / step)
+        if ends:  # the next block begins at a frame of the film
+            step = blocks[0].lasting / ends
+        begins = recording.times[[b.first for b in blocks]] - recording.times[0]
+        once = Parameters.join([p for _, p in worlds])
+        late, shown = lateness(model, once, k, begins, self.start == "fit")
+        last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
+        frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
+        starts = None if local is None else local[:, group]
+        moves, of = distinct_motions(worlds, late, starts)
+        some = None if starts is None else starts[moves]
+        shots = Shots(r, blocks, [worlds[m] for m in moves], late[moves], some, step, max(frames, ends + 1), ends)
+        raw, arrived = self._filmed(shots)
+        turning = angle_mask(recording)
+        begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
+        continuous(raw[:, : len(turning)], turning, begun)
+        columns = (of[:, None] * count + np.arange(count)).ravel()
+        channels = raw[:, :, columns]
+        plain = channels[:, : len(turning)]  # without the depths
+        grid = np.arange(len(raw)) * step
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        if distort:
+            parameters = Parameters.join([p for _, p in worlds], repeat=count)
+            rested = self.start != "fit"
+            values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
+        elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+            values = plain[: len(times)]
+        else:
+            values = spline(grid, plain)(times)
+        values = values.reshape(len(times), -1, k, count)
+        tied = None if arrived is None else arrived[:, columns].reshape(-1, k, count)
+        return (
+            [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
+            None if tied is None else [tied[:, :, b].T for b in range(count)],
+        )
+
+    @abstractmethod
+    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+        """Channels and depths [frames, D + k, K B] before anything measures them, and ends [L, K B] of tied blocks."""
+
+    def _driven(self, shots: Shots, model: Model, parameters: Parameters) -> Drive:
+        """The drive that reaches every rollout."""
+        recording, span = self.recordings[shots.recording], shots.frames * shots.step
+        begins = recording.times[[b.first for b in shots.blocks]] - recording.times[0]
+        given = self._drives[shots.recording]
+        if np.any(shots.late):
+            drive = shifted(given, (begins + shots.late).ravel(), span, 1)
+        else:
+            drive = shifted(given, begins, span, len(shots.worlds))
+        return distorted(model, parameters, drive, span)
+
+    def _state(self, shots: Shots) -> State:
+        """The starts of all rollouts [world, block]."""
+        worlds, blocks, local = shots.worlds, shots.blocks, shots.local
+        count, model = len(blocks), worlds[0][0]
+        if self.start != "fit":
+            x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
+            return State.at_rest(model, x.shape[1], position=x)
+        m = self.articulation.size
+        base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
+        x = np.empty((len(model.position), len(worlds) * count, 3))
+        v = np.empty_like(x)
+        alike: dict[bytes, list[int]] = {}
+        for n, (own, _) in enumerate(worlds):
+            alike.setdefault(own.position.tobytes(), []).append(n)
+        for key, mine in alike.items():
+            if key not in self._arms:
+                self._arms[key] = Articulation(worlds[mine[0]][0])
+            arm = self._arms[key]
+            pose, u = base.select(np.tile(np.arange(count), len(mine))), np.tile(rates, len(mine))
+            if local is not None:
+                shift = local[mine].reshape(-1, 2 * m).T
+                pose, u = arm.moved(pose, shift[:m]), u + shift[m:]
+            at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
+            x[:, at] = own_x = arm.positions(pose)
+            v[:, at] = np.einsum("mnwa,mw->nwa", arm.jacobian(pose, own_x), u)
+        state = State.at_rest(model, x.shape[1], position=x)
+        state.v[:] = v
+        return state
+
+    def _memory(self, shots: Shots) -> np.ndarray | None:
+        """Memory [M, K B] of the laws where segments start: that of the recorded motion up to there; None: no memory.
+
+        All nodes are held and carried along as recorded, from segment to segment, so that the laws feel the motion
+        without changing it. Before that they rest.
+        """
+        r, worlds, blocks = shots.recording, shots.worlds, shots.blocks
+        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
+        every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
+        every = np.union1d(every, [b.first for b in blocks])
+        if not len(State.at_rest(model).memory) or not np.any(every):
+            return None
+        path = self.path(r)
+        if path is None:
+            return None
+        times = self.recordings[r].times - self.recordings[r].times[0]
+        step = float(np.median(np.diff(times)))
+        held = replace(model, free=np.zeros_like(model.free))
+
+        def rested(frame: int) -> Batch:
+            """The worlds held as they were at a frame, where they have rested, driven as from there on."""
+            span = float(times[-1] - times[frame]) + step
+            drive = distorted(model, parameters, shifted(self._drives[r], times[[frame]], span, len(worlds)), span)
+            state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
+            batch = self._batch(held, parameters, drive.held(0.0), state)
+            batch.carry(path[[frame, frame], :, None], LEAD * step)
+            return self._batch(held, parameters, drive, replace(state, memory=batch.state().memory))
+
+        out: dict[int, np.ndarray] = {}
+        last, batch = -LEAD - 1, None
+        for first in map(int, every[every <= max(b.first for b in blocks)]):
+            if batch is None or first - last > LEAD:
+                last = max(first - LEAD, 0)
+                batch = rested(last)
+            if first > last:
+                batch.carry(path[last : first + 1, :, None], step)
+            last, out[first] = first, batch.state().memory
+        return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
+
+    def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
+        return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)
+
+    def path(self, r: int) -> np.ndarray | None:
+        """Positions [F, N, 3] of the recorded motion, smoothed; None if the channels do not give them."""
+        if r not in self._paths:
+            found = coordinates(self, r)
+            self._paths[r] = None
+            if found is not None:
+                q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
+                arm = self.articulation
+                pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
+                self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
+        return self._paths[r]
+
+
+def joined_poses(poses: Sequence[Pose]) -> Pose:
+    """Poses as one of as many worlds."""
+    return Pose(
+        np.concatenate([p.rotation for p in poses]),
+        np.concatenate([p.centre for p in poses]),
+        np.concatenate([p.angles for p in poses], axis=1),
+    )
+
+
+def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two move alike, and (K,) which of them each world moves like: a measurement moves nothing.
+
+    Args:
+        more: what else makes worlds differ, [K, ...] each.
+    """
+    shown = {e for e in worlds[0][0].effects if get(e).family == "measurement"}
+    found: dict[tuple, int] = {}
+    first, of = [], []
+    for k, (model, parameters) in enumerate(worlds):
+        felt = b"".join(parameters[p].tobytes() for p in parameters if p[0] not in shown)
+        key = (model.position.tobytes(), felt, *(m[k].tobytes() for m in more if m is not None))
+        if key not in found:
+            found[key] = len(first)
+            first.append(k)
+        of.append(found[key])
+    return first, np.array(of)
+
+
+def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):
+    """Channels of the next frames and what else is asked of markers (`pictured`), in parts [f, D + k, W].
+
+    With the present state as the first frame, if `first`.
+    """
+    model, out, left = batch.model, [], frames
+    lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
+    limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
+    if first:
+        batch.advance(0, step / substeps, limit)
+        x, angles = batch.motion()
+        out.append(pictured(model, recording, x[None], angles[None]))
+        left -= 1
+    most = max(1, int(FILMED / (24 * len(model.position) * batch.worlds)))
+    while left > 0:
+        part = min(left, most)
+        out.append(pictured(model, recording, *batch.film(part, substeps, step / substeps, limit)))
+        left -= part
+    return out
+
+
+def pictured(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W]."""
+    parts = [channel_values(model, recording, x, angles), depths(model, recording, x)]
+    if any(get(e).on_body for e in model.effects):
+        parts.append(turned_axes(model, recording, x))
+    return np.concatenate(parts, axis=1)
+
+
+def _begin(block: Block) -> np.ndarray:
+    return block.values[0] if block.begin is None else block.begin
+
+
+def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
+    """Blocks that share their frame times, and the time until the next."""
+    groups: list[list[int]] = []
+    for i in indices:
+        for g in groups:
+            a, b = blocks[g[0]], blocks[i]
+            alike = len(a.times) == len(b.times) and (a.reach is None) == (b.reach is None)
+            slack = 1e-7 * max(1.0, a.times[-1])
+            if alike and np.allclose(a.times, b.times, atol=slack) and abs(a.lasting - b.lasting) < slack:
+                g.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
