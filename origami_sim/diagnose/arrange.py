@@ -10,25 +10,30 @@ from origami_sim.errors import InputError
 from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.fit.least_squares import linearise
+from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.prescribed import curves
 from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.rollouts import Rollouts
-from origami_sim.fit.starts import channel_tangent, local_line
+from origami_sim.fit.starts import channel_tangent, local_line, spans
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import stable_step
 
-GROWTH = 30.0
+GROWTH = 3.0
 """Growth of a difference in the start within a segment: numbers are found by linear steps only where it is small.
 
 Segments half or twice as long change what a diagnosis says by less than its rounding.
 """
 
+FRAMES = 50
+"""Frames of a segment of rigid panels, at most: what a force that is missing does within one has to be small.
+
+As many tell the rates at its start to a few parts in a thousand; half or twice as many make no difference.
+"""
+
 STEADY = 10.0
 """The same for what begins at rest and is predicted by bars, beyond which it is cut into segments."""
-
-LONGEST = 0.1
-"""Length of a segment, at most, as a part of the recording: what is missing has to show at several times."""
 
 FEWEST = 8
 """Segments that a single recording is cut into at least, where bars predict it."""
@@ -57,11 +62,14 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> tuple
         raise InputError(
             "a segment needs frames to be compared", field="segment", value=o.segment, allowed=f">= {shortest:.3g} s"
         )
+    given = subject.build({f.name: f.start for f in subject.nominals})[0].panels
+    if given == "rigid" and o.panels == "elastic":
+        raise InputError("the model's panels are rigid", field="panels", value=o.panels, allowed="auto, rigid")
     if o.panels != "elastic":
         try:
-            found = rigid_rollouts(subject, recordings, o)
+            found = rigid_rollouts(subject, recordings, o, forced="rigid" in (o.panels, given))
         except InputError:
-            if o.panels == "rigid":
+            if "rigid" in (o.panels, given):
                 raise
         else:
             if found is not None:
@@ -69,15 +77,16 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> tuple
     return bar_rollouts(subject, recordings, o), []
 
 
-def rigid_rollouts(subject: Subject, recordings: list[Recording], o: Options) -> tuple[Predictor, list[str]] | None:
+def rigid_rollouts(
+    subject: Subject, recordings: list[Recording], o: Options, *, forced: bool
+) -> tuple[Predictor, list[str]] | None:
     """Predictions by rigid panels; None if bending shows and rigid panels were not asked for.
 
     Raises:
         InputError: panels that cannot be rigid.
     """
-    whole = min(float(r.times[-1] - r.times[0]) for r in recordings)
-    forced = o.panels == "rigid"
-    probe = RigidRollouts(subject, recordings, segment=max(LONGEST * whole, 1e-9), tied=False, threads=o.threads)
+    frame = max(float(np.median(np.diff(r.times))) for r in recordings)
+    probe = RigidRollouts(subject, recordings, segment=FRAMES * frame, tied=False, threads=o.threads)
     if len(probe.articulation.creases) > JOINTS and not forced:
         return None
     touching = bool(len(probe.model.contacts))
@@ -93,12 +102,15 @@ def rigid_rollouts(subject: Subject, recordings: list[Recording], o: Options) ->
     if touching:  # a contact is no smooth function of a start
         start = o.start or starting(subject, recordings)
         return RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads), notes
-    length = o.segment or min(LONGEST * whole, predictable(probe, GROWTH))
+    length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
     return RigidRollouts(subject, recordings, segment=length, threads=o.threads), notes
 
 
 def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
-    """Root mean square change by the bending of panels, over the noise, of the model as it is given."""
+    """Root mean square change by the bending of panels, over the noise, of the model as it is given.
+
+    What numbers of the model (within their priors) and starts could take the place of does not count.
+    """
     whole = min(float(r.times[-1] - r.times[0]) for r in recordings)
     length = min(PROBED, whole)
     try:
@@ -107,15 +119,24 @@ def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
         return np.inf
     rigid = RigidRollouts(subject, recordings, segment=length, tied=False, threads=o.threads)
     rigid.blocks = [replace(rigid.segment(b.recording, b.first, len(b.times)), values=b.values) for b in bars.blocks]
-    theta = np.array([f.start for f in subject.nominals])[None]
-    squares = [
-        ((a[0] - b[0]) / block.noise)[block.seen()] ** 2
-        for a, b, block in zip(
-            bars.predict(Hypothesis(), theta), rigid.predict(Hypothesis(), theta), bars.blocks, strict=True
-        )
-    ]
-    found = np.concatenate(squares)
-    return float(np.sqrt(np.mean(found))) if len(found) else 0.0
+    free, every = subject.nominals, list(range(len(bars.blocks)))
+    theta, local = np.array([f.start for f in free]), np.zeros((len(every), rigid.local))
+    weights = Weights(bars.blocks[0].noise)
+    line = linearise(rigid, Hypothesis(), free, theta, local, every, weights)
+    gaps = []
+    for n, (one, other) in enumerate(
+        zip(bars.predict(Hypothesis(), theta[None]), rigid.predict(Hypothesis(), theta[None]), strict=True)
+    ):
+        change = weights.whitened(np.where(bars.blocks[n].seen(), one[0] - other[0], 0.0))
+        gaps.append(line.padded(n, change))
+    if not all(np.all(np.isfinite(g)) for g in gaps):
+        return np.inf
+    prior = np.diag([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
+    a = np.concatenate([*line.cleared(line.tangent), prior])
+    y = np.concatenate([*line.cleared(gaps), np.zeros(len(free))])
+    x, *_ = np.linalg.lstsq(a, y, rcond=1e-10)
+    count = sum(b.seen().sum() for b in bars.blocks)
+    return float(np.linalg.norm(y - a @ x) / np.sqrt(max(count, 1)))
 
 
 def bar_rollouts(subject: Subject, recordings: list[Recording], o: Options) -> Predictor:
@@ -178,18 +199,23 @@ def steady(subject: Subject, recordings: list[Recording], whole: float, threads:
 
 
 def predictable(forward: Rollouts, growth: float = GROWTH) -> float:
-    """Time over which a difference in the start grows less than so many times [s]."""
-    m = forward.local
-    local = np.zeros((m + 1, len(forward.blocks), m))
-    for k in range(m):
-        local[1 + k, :, k] = 1e-6 if k < m // 2 else 1e-5
+    """Time over which a difference in the start grows less than so many times [s].
+
+    Shifts of all coordinates and rates, each as a part of its usual size, are followed through every segment; what the
+    channels show of them together is compared with what they show in the first frames.
+    """
+    half = forward.local // 2
+    local = np.zeros((2 * half + 1, len(forward.blocks), 2 * half))
+    size = spans(forward.articulation, forward.model)
+    for b, block in enumerate(forward.blocks):
+        nudges = 1e-6 * np.concatenate([size, forward.usual_rates(block.recording)])
+        local[1:, b][np.diag_indices(2 * half)] = nudges
     theta = np.array([f.start for f in forward.subject.nominals])
-    predicted = forward.predict(Hypothesis(), [theta] * (m + 1), local)
+    predicted = forward.predict(Hypothesis(), [theta] * (2 * half + 1), local)
     shortest = np.inf
     for block, values in zip(forward.blocks, predicted, strict=True):
-        moved = np.linalg.norm(np.nan_to_num(values[1:] - values[0], nan=np.inf), axis=2)  # [m, n]
-        early = np.maximum.accumulate(moved, axis=1)
-        first = np.maximum(early[:, max(2, len(block.times) // 20)], 1e-9)
-        beyond = np.any(moved > growth * first[:, None], axis=0)
+        gap = np.nan_to_num((values[1:] - values[0]) / block.noise, nan=np.inf)
+        moved = np.maximum.accumulate(np.sqrt(np.sum(gap**2, axis=(0, 2))))
+        beyond = moved > growth * max(float(moved[min(2, len(moved) - 1)]), 1e-12)
         shortest = min(shortest, block.times[np.argmax(beyond)] if np.any(beyond) else block.times[-1] + 1e-9)
     return max(float(shortest), 8 * float(np.median(np.diff(forward.recordings[0].times))))

@@ -10,12 +10,11 @@ from itertools import product
 
 import numpy as np
 
-from origami_sim.diagnose.compare import Score
 from origami_sim.diagnose.diagnosis import Baseline
-from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.locate import motion
 from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.fit.least_squares import Fit, Weights, fit
+from origami_sim.fit.predictor import Predictor
 
 KNOTS = 9
 
@@ -44,9 +43,9 @@ LIBRARY: dict[str, Callable] = {
 }
 
 
-def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -> list[Baseline]:
+def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.ndarray) -> list[Baseline]:
     """Held-out rms of each baseline [SI], on two halves of the segments learnt on the other half."""
-    out = [Baseline("best parameter-only refit", reference.rms.tolist())]
+    out = [Baseline("best parameter-only refit", reference.tolist())]
 
     def without(why: str) -> list[Baseline]:
         nan = [float("nan")] * len(forward.components)
@@ -81,7 +80,7 @@ def baselines(forward: Forward, base: Fit, weights: Weights, reference: Score) -
     return out
 
 
-def _halves(forward: Forward) -> list[list[int]]:
+def _halves(forward: Predictor) -> list[list[int]]:
     blocks = np.arange(len(forward.blocks))
     recordings = np.array([b.recording for b in forward.blocks])
     if recordings.max() > 0:
@@ -89,7 +88,7 @@ def _halves(forward: Forward) -> list[list[int]]:
     return [list(map(int, part)) for part in np.array_split(blocks, 2)]
 
 
-def _samples(forward: Forward, motions, k: int, held: list[int]):
+def _samples(forward: Predictor, motions, k: int, held: list[int]):
     """Angle, rate and missing moment of the tree's crease k outside the held-out segments."""
     row, parts = 6 * forward.articulation.floating + k, []
     for r, m in enumerate(motions):
@@ -184,7 +183,7 @@ def _process(a, w, y, grid_a, grid_w):
     return (cross @ alpha).reshape(len(grid_a), len(grid_w)), f"length scale {length:g}, {part:.0%} of the variance"
 
 
-def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weights) -> Fit | None:
+def _predict(forward: Predictor, base: Fit, tables, held: list[int], weights: Weights) -> Fit | None:
     """Fit of the starts of the held-out segments with the learnt moment in the model."""
     count = len(forward.subject.nominals)
     build = forward.subject.build
@@ -209,6 +208,6 @@ def _predict(forward: Forward, base: Fit, tables, held: list[int], weights: Weig
         Free(NOMINAL, f.name, f.unit, t, f.scale) for f, t in zip(base.free[:count], base.theta, strict=False)
     )
     other.subject = Subject(corrected, nominals)
-    other._built = {}
-    given = {"theta": base.theta[:count], "local": base.local, "blocks": held, "known": base.only(held).linear}
+    other._built = {}  # type: ignore[attr-defined]
+    given = {"theta": base.theta[:count], "local": base.local, "blocks": held}
     return fit(other, Hypothesis(), weights, fixed=True, **given)

@@ -12,8 +12,6 @@ from importlib import resources
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
-
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.keep import Keep
@@ -327,14 +325,13 @@ def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
 
 
 def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
-    lines = ["", f"{d.verdict}: {d.sentence}", "", f"{'explanation':48s} {'probability':>11s} {'held-out gain':>18s}"]
+    lines = ["", f"{d.verdict}: {d.sentence}", "", f"{'explanation':48s} {'probability':>11s} {'log odds':>9s}"]
     for c in d.candidates[:8]:
         if c.failed:
             lines.append(f"{c.label:48s}      failed: {c.failed}")
             continue
         mark = f"   {c.distrust}" if c.distrust else ""
-        error = f"{c.error:5.1f}" if np.isfinite(c.error) else "    -"
-        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.gain:9.1f} +- {error}{mark}")
+        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.odds:9.1f}{mark}")
     best = patched(d)
     for n in best.numbers if best is not None else []:
         bound = ", at its bound" if n.at_bound else ""

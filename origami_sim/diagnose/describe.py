@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.diagnose.acting import acting
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
-from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.locate import locate, motions_of
+from origami_sim.diagnose.where import located
 from origami_sim.effects import get
-from origami_sim.fit.curves import CurveForward
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
 
 NEAR = 1.25
 """What another action may leave, times what the best leaves, to be named beside it."""
@@ -94,14 +92,12 @@ def _symmetry(c: Curve) -> str:
     return "odd" if odd > PURE * even else "even" if even > PURE * odd else ""
 
 
-def unnamed(forward: Forward, base: Fit, best: Fit) -> str:
+def unnamed(forward: Predictor, base: Fit, best: Fit) -> str:
     """What the best explanation does not name, in words; or, where frames do not tell that, what it was to explain.
 
     They know no memory, and are read as recorded, without what a hypothesis says of the measurement.
     """
     lost = any(get(e).memory or get(e).family == "measurement" for e in best.hypothesis.effects)
     f, what = (base, "What is missing") if lost else (best, "What is left")
-    if isinstance(forward, CurveForward):
-        return described(forward.locate(f), [], what)
-    motions = motions_of(forward, f)
-    return described(locate(forward, motions), acting(forward.articulation, motions), what)
+    places, actions = located(forward, f)
+    return described(places, actions, what)

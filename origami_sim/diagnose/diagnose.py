@@ -1,47 +1,47 @@
 """`diagnose`: from a model and recordings to a verdict, stage by stage."""
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
-from origami_sim.diagnose import verdict as words
-from origami_sim.diagnose.acting import acting
+import numpy as np
+
+from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
-from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.describe import unnamed
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.experiment import propose
+from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.locate import locate, motions_of
+from origami_sim.diagnose.nominal import nominal_fits, weights_from
 from origami_sim.diagnose.observed import assumed, unobserved
+from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
-from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
-from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import (
-    chosen,
-    contest,
-    leader,
-    look_elsewhere,
-    lookalikes,
-    others,
-    renewed,
-    settled,
-    twins,
-    unbent,
-    widened,
-)
-from origami_sim.diagnose.several import combine, pairs
+from origami_sim.diagnose.prepare import among, prepared
+from origami_sim.diagnose.screen import Signature, screen
+from origami_sim.diagnose.search import Posterior, extended, marginals, reweighted, search
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
+from origami_sim.diagnose.verdict import judge
+from origami_sim.diagnose.where import located
 from origami_sim.effects import get
-from origami_sim.fit.channels import units_of
-from origami_sim.fit.curves import CurveForward
+from origami_sim.errors import InputError
+from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import suspects
-from origami_sim.fit.least_squares import carried_on
+from origami_sim.fit.least_squares import Fit, carried_on
+from origami_sim.fit.linear import Weights
+from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
+
+ROUNDS = 3
+"""Times that weights follow the best explanation: what it leaves is the noise that all are judged by."""
+
+SAME = 0.1
+"""Relative change of deviations below which weights have settled."""
 
 
 def diagnose(
@@ -80,19 +80,21 @@ def diagnose(
     subject = subject_of(subject, priors)
     each = [recordings] if isinstance(recordings, (Recording, str, Path)) else recordings
     recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
-    forward = arranged(subject, recordings, o)
-    forward.soften()
+    forward, noted = arranged(subject, recordings, o)
     if keep is not None:
         keep.follow(forward)
     loop = closed_loop(recordings)
-    noted = [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
-    noted = list(dict.fromkeys(noted))
+    compared = share_compared(forward)
+    frames = sum(len(r.times) for r in recordings)
+    noted = [f"{compared:.0%} of {frames:,} frames are compared.", *noted]
+    noted += [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
     unseen = unobserved(forward)
     if unseen is not None:
         noted.append(unseen)
+    if len(recordings) == 1:
+        noted.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
-    first = weights
     lap("nominal")
     tell("screen", 0.0)
     every = forward.admitted(suspects(forward.model, recordings, forward.drive, forward.parameters))
@@ -103,78 +105,60 @@ def diagnose(
             noted.append(
                 f"Not suspected, as it cannot act on this device or show in these recordings: {', '.join(idle)}."
             )
-    screening = screen(forward, every, base, weights, most=o.screened, progress=lambda part: tell("screen", part))
+    signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
-    tell("locate", 0.0)
-    motions = [] if isinstance(forward, CurveForward) else motions_of(forward, base)
-    places = forward.locate(base) if isinstance(forward, CurveForward) else locate(forward, motions)
-    actions = acting(forward.articulation, motions)
-    lap("locate")
-    finalists = chosen(screening, o.finalists)
-    fits = contest(forward, base, finalists, screening, weights, lambda part: tell("refit", part))
-    fits = renewed(fits, unbent(forward, base, every, fits, weights, o))
-    fits += pairs(forward, base, screening, fits, weights, o)
-    rough, seen = screening, (base, screening, weights)
-    screening, fits, weights = settled(forward, rough, fits, weights)
-    refined = tuple(fits)
-    alike_ones = twins(forward, rough, screening, fits, weights)
-    alike_ones += lookalikes(forward, every, screening, [*fits, *alike_ones], weights)
-    fits = renewed(fits, alike_ones)
-    # with weights that do not count the effect itself as noise
-    p_value = look_elsewhere(screening, o.draws, o.seed, fits)
-    p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
-    lap("refit")
-    tell("combine", 0.0)
-    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
-    more = combine(forward, fits, scores, screening, weights, o, tell)
-    if alike_ones or more:
-        screening, fits, weights = settled(forward, screening, [*fits, *more], weights, refined)
-    rest = others(forward, seen, fits, weights, tell)
-    if rest:
-        noted.append("No suspect that stood out left noise alone, so that all that show were fitted.")
-        screening, fits, weights = settled(forward, screening, [*fits, *rest], weights, tuple(fits))
-        alike_ones = lookalikes(forward, every, screening, fits, weights)
-        if alike_ones:
-            screening, fits, weights = settled(forward, screening, renewed(fits, alike_ones), weights, tuple(fits))
-        p_value = look_elsewhere(screening, o.draws, o.seed, fits)
-        p_small = look_elsewhere(screening, o.draws, o.seed, fits, small=words.SMALL)
-    fits = [f if f.failed else replace(f, wider=widened(forward, screening, f, weights)) for f in fits]
-    scores = {id(f): score(forward, f, weights) for f in fits if not f.failed}
-    base = fits[0]
-    best = leader(fits, scores)
-    noise = words.floor_of(forward, base if best is None else best)
-    lap("combine")
+    tell("search", 0.0)
+    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part))
+    given, base, weights, posterior = settled(forward, given, base, weights, posterior, tell)
+    lap("search")
+    lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
+    if lost:
+        noted.append(f"Not tested, because these recordings do not tell: {', '.join(lost)}.")
     tell("verdict", 0.0)
-    given = carried_on(forward, given.reweighted(first, weights), weights, fixed=True)
-    judged = words.judge(forward, given, base, noise, fits, scores, screening, (p_value, p_small), weights, o)
+    judged = judge(forward, given, base, posterior, weights, compared)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
-    if judged.verdict == "UNKNOWN":
-        judged = replace(judged, sentence=f"{judged.sentence} {unnamed(forward, base, best)}".strip())
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
-    experiments = propose(forward, judged, weights, progress=lambda part: tell("next experiment", part))
+    lap("verdict")
+    tell("locate", 0.0)
+    noted = list(dict.fromkeys([*judged.notes, *noted]))
+    places, actions = attempt(noted, "Where the mismatch is", lambda: located(forward, base), ([], []))
+    if judged.verdict == "UNKNOWN":
+        more = attempt(noted, "What is left", lambda: unnamed(forward, base, best), "")
+        judged = replace(judged, sentence=f"{judged.sentence} {more}".strip())
+    lap("locate")
+    experiments = attempt(
+        noted,
+        "The next experiment",
+        lambda: propose(forward, judged, weights, progress=lambda part: tell("next experiment", part)),
+        [],
+    )
     lap("next experiment")
     tell("baselines", 0.0)
-    beside = baselines(forward, base, weights, scores[id(base)])
+    errors = {key: held_out(forward, node.fit, weights).rms for key, node in posterior.nodes.items()}
+    refitted = errors[frozenset()]
+    beside = attempt(noted, "Baselines", lambda: baselines(forward, base, weights, refitted), [])
     lap("baselines")
-    candidates = table(forward, fits, scores, judged)
-    after = scores[id(best)]
+    after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
+    noise = forward.blocks[0].noise
+    scores = scored(posterior)
+    missed = float(sum(s.share for s in judged.budget) and base.cost)
     out = Diagnosis(
         verdict=judged.verdict,
         sentence=judged.sentence,
         probability=judged.probability,
         chosen=judged.chosen,
-        candidates=candidates,
-        screening=[suspected(s, screening) for s in (*screening.signatures, *screening.untestable)],
-        isolability_labels=[s.suspect.label for s in screening.signatures[:12]],
-        isolability=screening.overlap()[:12, :12].tolist(),
+        candidates=table(forward, posterior, base, judged, errors),
+        screening=[suspected(s, z, missed) for s, z in scores],
+        isolability_labels=[s.suspect.label for s, _ in scores[:12] if s.norm > 0],
+        isolability=overlap([s for s, _ in scores[:12] if s.norm > 0], base),
         places=places,
-        p_value=p_value,
-        p_small=p_small,
-        structure=judged.structure,
-        onset=judged.onset,
+        budget=judged.budget,
+        marginals=marginals(posterior),
+        compared=compared,
+        onset=attempt(noted, "The onset", lambda: onset(forward, base), float("nan")),
         traces=traces(forward, given, base, best, weights, noise),
         correlations=correlations(forward, base, best),
         experiments=experiments,
@@ -183,17 +167,86 @@ def diagnose(
         units=units_of(recordings[0]),
         noise=noise.tolist(),
         error_before=rms_of(given).tolist(),
-        error_refitted=scores[id(base)].rms.tolist(),
-        error_after=after.rms.tolist(),
-        notes=[*judged.notes, *noted],
+        error_refitted=refitted.tolist(),
+        error_after=after.tolist(),
+        notes=noted,
         settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
         seconds=seconds,
         patch={} if judged.verdict == "UNTESTABLE" else patch(best),
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
-        impulses=[] if isinstance(forward, CurveForward) else impulses(forward, base),
+        impulses=attempt(noted, "Impulses", lambda: impulses(forward, base), []),
         acting=actions,
     )
     tell("done", 1.0)
     return out
+
+
+def settled(
+    forward: Predictor, given: Fit, base: Fit, weights: Weights, p: Posterior, tell: Report
+) -> tuple[Fit, Fit, Weights, Posterior]:
+    """All judged by what the best explanation leaves, as given and refitted as well, and searched again."""
+    for _ in range(ROUNDS):
+        chance = p.probabilities()
+        best = max(p.nodes, key=lambda k: chance.get(k, 0.0))
+        new = weights_from(forward, p.nodes[best].fit)
+        if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
+            break
+        given = carried_on(forward, given.reweighted(weights, new), new, fixed=True, most=4)
+        base = carried_on(forward, base.reweighted(weights, new), new)
+        if base.failed or given.failed:
+            break
+        p = reweighted(p, forward, base, new)
+        p = extended(p, forward, progress=lambda part: tell("search", part))
+        weights = new
+    return given, base, weights, p
+
+
+def share_compared(forward: Predictor) -> float:
+    """Part of the frames with a value that are compared."""
+    seen = sum(np.any(b.seen(), axis=1).sum() for b in forward.blocks)
+    whole = sum(np.any(np.isfinite(stacked(r)[0]), axis=1).sum() for r in forward.recordings)
+    return float(min(seen / max(whole, 1), 1.0))
+
+
+def scored(p: Posterior) -> list[tuple[Signature, float]]:
+    """Signatures with the z by which each alone explains what the model without an effect misses, best first."""
+    node = p.nodes[frozenset()]
+    gram = node.grid[0][0].gram
+    z = np.zeros(len(p.signatures))
+    for n, o in enumerate(node.others):
+        size = np.sqrt(max(gram[n, n], 0.0))
+        z[o] = gram[n, -1] / size if size > 0 else 0.0
+        if p.signatures[o].side * z[o] < 0:
+            z[o] = 0.0
+    order = np.argsort(-np.abs(z), kind="stable")
+    return [(p.signatures[k], float(z[k])) for k in order]
+
+
+def overlap(signatures: Sequence[Signature], base: Fit) -> list[list[float]]:
+    """|cos| between signatures, without what starts and numbers could explain: 1 where two look the same."""
+    if not signatures or base.linear is None:
+        return []
+    line = base.linear
+    stacked_ = [np.stack([s.parts[n] for s in signatures], axis=1) for n in range(len(line.rows))]
+    whole = np.concatenate(
+        line.cleared([np.concatenate([t, x], 1) for t, x in zip(line.tangent, stacked_, strict=True)])
+    )
+    width = line.tangent[0].shape[1]
+    q, _ = np.linalg.qr(whole[:, :width])
+    shapes = whole[:, width:] - q @ (q.T @ whole[:, width:])
+    shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
+    return np.abs(shapes.T @ shapes).tolist()
+
+
+T = TypeVar("T")
+
+
+def attempt(notes: list[str], what: str, do: Callable[[], T], otherwise: T) -> T:
+    """What may fail without losing the verdict; a note says so."""
+    try:
+        return do()
+    except (ArithmeticError, IndexError, InputError, KeyError, ValueError, np.linalg.LinAlgError) as error:
+        notes.append(f"{what} could not be told: {error}")
+        return otherwise

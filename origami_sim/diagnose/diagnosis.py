@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.diagnose.budget import Share
+
 VERDICTS = ("ADEQUATE", "PARAMETER", "MEASUREMENT", "MECHANISM", "TIE", "SEVERAL", "UNKNOWN", "UNTESTABLE")
 
 EXIT = {name: 10 + n for n, name in enumerate(VERDICTS)}
@@ -35,8 +37,7 @@ class Candidate:
         label: effects and sites, "nominal as given" or "nominal refitted". kind: nominal, parameter, mechanism,
             measurement.
         effects, sites: of its suspects. numbers: what was fitted.
-        probability: tempered, over the table. gain: held-out log score over the refitted nominal. error: its standard
-            error.
+        probability: posterior. odds: logarithm of the posterior odds over the model without an effect.
         rms: held-out rms residual by component [SI]. fit: fit % = 100 (1 - NRMSE) by component, on all data.
         why: why it lost or won. distrust: when not to trust the row, or "". failed: why it could not be fitted, or "".
     """
@@ -47,8 +48,7 @@ class Candidate:
     sites: list[str]
     numbers: list[Number]
     probability: float
-    gain: float
-    error: float
+    odds: float
     rms: list[float]
     fit: list[float]
     why: str = ""
@@ -238,9 +238,9 @@ class Diagnosis:
     isolability_labels: list[str]
     isolability: list[list[float]]
     places: list[Place]
-    p_value: float
-    p_small: float
-    structure: tuple[float, float]
+    budget: list[Share]
+    marginals: dict[str, float]
+    compared: float
     onset: float
     traces: list[Trace]
     correlations: list[Correlation]

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Experiment
-from origami_sim.diagnose.forward import Forward
 from origami_sim.drive import Drive, Signal
-from origami_sim.fit.curves import CurveForward
-from origami_sim.fit.least_squares import Fit, Linearisation, Weights, linearise
+from origami_sim.fit.least_squares import Fit, linearise
+from origami_sim.fit.linear import Linearisation, Weights
+from origami_sim.fit.rollouts import Rollouts
 from origami_sim.model import Parameters
 
 WANTED = 5.0
@@ -19,6 +19,9 @@ WANTED = 5.0
 TOLD = 1.0
 """Separation in the best experiment of the menu below which a rival is left out: no number of repeats would do."""
 
+LENGTH = 8
+"""A proposed experiment is simulated in four stretches of this part of a recording."""
+
 CREASE, PANEL = ("crease", "stiffness"), ("panel_bending", "stiffness")
 
 CLAMPED = 300.0
@@ -26,7 +29,7 @@ CLAMPED = 300.0
 
 
 def propose(
-    forward: Forward, judged, weights: Weights, *, progress: Callable[[float], None] | None = None, most: int = 4
+    forward: Rollouts, judged, weights: Weights, *, progress: Callable[[float], None] | None = None, most: int = 4
 ) -> list[Experiment]:
     """Experiments, best first: the expected whitened separation of the best explanation from the nearest of its rivals.
 
@@ -37,7 +40,7 @@ def propose(
     rivals = rivals_of(judged)
     if not rivals:
         return []
-    menu = forward.menu() if isinstance(forward, CurveForward) else _menu(forward)
+    menu = forward.menu() if forward.curve else _menu(forward)
     apart = np.zeros((len(menu), len(rivals)))
     for n, (_, changed) in enumerate(menu):
         known = None
@@ -65,17 +68,17 @@ def rivals_of(judged, most: int = 4) -> list[Fit]:
     return tied[:most] if tied else judged.others[:1]
 
 
-def recorded(forward: Forward, f: Fit) -> bool:
+def recorded(forward: Rollouts, f: Fit) -> bool:
     """Puts what a fitted explanation predicts in the place of what was recorded; False where it goes unstable."""
     blocks = range(len(forward.blocks))
     local = np.zeros((1, len(blocks), forward.local))
-    truth = [v[0] for v in forward.predict(f.hypothesis, f.theta[None], local, blocks, soft=True)]
+    truth = [v[0] for v in forward.predict(f.hypothesis, f.theta[None], local, blocks)]
     forward.blocks = [replace(b, values=v) for b, v in zip(forward.blocks, truth, strict=True)]
     return all(np.all(np.isfinite(v)) for v in truth)
 
 
 def separation(
-    forward: Forward, rival: Fit, weights: Weights, known: Linearisation | None = None
+    forward: Rollouts, rival: Fit, weights: Weights, known: Linearisation | None = None
 ) -> tuple[float, Linearisation | None]:
     """Expected separation d' of a fitted explanation from what was recorded, and the derivatives under it.
 
@@ -85,11 +88,9 @@ def separation(
     blocks = list(range(len(forward.blocks)))
     local = np.zeros((len(blocks), forward.local))
     own = len(rival.free) - len(rival.hypothesis.free)
-    line = linearise(
-        forward, rival.hypothesis, rival.free, rival.theta, local, blocks, weights, known=known, kept=own, soft=True
-    )
-    rows = np.concatenate([line.clear(n, t) for n, t in enumerate(line.tangent)])
-    gap = np.concatenate([line.clear(n, r) for n, r in enumerate(line.residual)])
+    line = linearise(forward, rival.hypothesis, rival.free, rival.theta, local, blocks, weights, known=known, kept=own)
+    rows = np.concatenate(line.cleared(line.tangent))
+    gap = np.concatenate(line.cleared(line.residual))
     scale = np.array([f.scale for f in rival.free])
     # a number on its bound has next to no spread
     value, vector = np.linalg.eigh(rival.covariance / np.outer(scale, scale))
@@ -102,7 +103,7 @@ def separation(
     return float(np.linalg.norm(target - stacked @ x)), line
 
 
-def _menu(forward: Forward) -> list[tuple[str, Forward]]:
+def _menu(forward: Rollouts) -> list[tuple[str, Rollouts]]:
     """Variants of the recordings' own experiments that a user could make."""
     out = [("repeat the same experiment", _variant(forward))]
     if forward.start == "fit":
@@ -140,7 +141,7 @@ def _splint(parameters: Parameters) -> float:
 
 
 def _variant(
-    forward: Forward,
+    forward: Rollouts,
     *,
     size=1.0,
     stretch=1.0,
@@ -150,7 +151,7 @@ def _variant(
     tilt=0.0,
     load=1.0,
     clamped: int | None = None,
-) -> Forward:
+) -> Rollouts:
     """The same object in another experiment; recordings keep their frames, whose values are replaced by predictions."""
     out = copy.copy(forward)
     arm = forward.articulation
@@ -167,12 +168,12 @@ def _variant(
             pose = replace(pose, angles=np.where(here[:, None], arm.reference().angles, pose.angles))
             rates = np.where(np.arange(len(rates)) == len(rates) - len(here) + clamped, 0.0, rates)
         times = b.times
-        if stretch != 1.0:
-            step = times[1] - times[0]
-            times = np.arange(round((times[-1] / step) * stretch) + 1) * step
-        out.blocks.append(
-            replace(b, pose=pose, rates=rates, times=times, values=np.zeros((len(times), b.values.shape[1])))
-        )
+        step = times[1] - times[0]
+        whole = len(forward.recordings[b.recording].times) // LENGTH if b.reach is not None else 0
+        if stretch != 1.0 or whole > len(times):
+            times = np.arange(round((max(whole, len(times)) - 1) * stretch) + 1) * step
+        values = np.zeros((len(times), b.values.shape[1]))
+        out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=values, reach=None, lasting=0.0))
     if gain != 1.0 or speed != 1.0:
         out._drives = [_changed(d, gain, speed) for d in forward._drives]
     if held:
@@ -189,7 +190,7 @@ def _variant(
                 parameters.set("crease", "stiffness", _splint(parameters), c)
                 parameters.set("crease", "rest_angle", arm.reference().angles[clamped], c)
             if load != 1.0:
-                parameters.set("inertia", "mass", parameters["inertia", "mass"] * load)
+                parameters.replace("inertia", "mass", parameters["inertia", "mass"] * load)
             if tilt:
                 gx, gz = parameters["gravity", "gravity_x"], parameters["gravity", "gravity_z"]
                 parameters.set("gravity", "gravity_x", np.cos(tilt) * gx - np.sin(tilt) * gz)

@@ -8,21 +8,21 @@ times their difference is the impulse, whatever the law of the contact. Recorded
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Impulse
-from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.locate import dynamics, loose, touching
 from origami_sim.distort import distorted
 from origami_sim.effects import CONTACTS, get
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.rollouts import Rollouts
 from origami_sim.fit.track import Track, track
 
 FEWEST, MOST = 3, 8
 """Frames before and after a blow that give a rate."""
 
 
-def impulses(forward: Forward, fit: Fit) -> list[Impulse]:
+def impulses(forward: Rollouts, fit: Fit) -> list[Impulse]:
     """Blows that are seen before and after, in order; none if the device is held or its pose is not told."""
     arm = forward.articulation
-    if not arm.floating or not len(forward.model.contacts):
+    if forward.curve or not arm.floating or not len(forward.model.contacts):
         return []
     out = []
     for n, b in enumerate(fit.blocks):
@@ -35,8 +35,8 @@ def impulses(forward: Forward, fit: Fit) -> list[Impulse]:
     return out
 
 
-def _blows(forward: Forward, fit: Fit, block, recording, tracks: list[Track]) -> list[Impulse]:
-    model, parameters = loose(*forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects))
+def _blows(forward: Rollouts, fit: Fit, block, recording, tracks: list[Track]) -> list[Impulse]:
+    model, parameters = loose(*forward.world(fit.hypothesis, fit.theta, fit.hypothesis.effects))
     free = model.with_effects(without=tuple(e for e in model.laws if get(e).family in CONTACTS))
     given = parameters.for_model(free)
     step, count = float(np.median(np.diff(block.times))), len(block.times)

@@ -15,19 +15,17 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from origami_sim.articulation import Pose
 from origami_sim.diagnose.diagnosis import REVERSAL, Curve, Place
-from origami_sim.diagnose.forward import Forward
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
+from origami_sim.fit.curves import PASSIVE
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.rollouts import Rollouts
 from origami_sim.fit.track import track
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
 
 BINS = 13
 """Bins of a curve, of equal numbers of frames."""
-
-PASSIVE = ("bars", "bar_viscosity", "panel_bending", "ogden_bars")
-"""Effects that keep panels stiff; rigid panels do not need them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +78,7 @@ class Motion:
         return float(np.linalg.norm(np.convolve(point, np.ones(self.width) / self.width)) / np.linalg.norm(point))
 
 
-def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
+def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     """The smoothed motion of a recording, and what is missing in it under a fitted hypothesis.
 
     Of a device that nothing holds, frames near a contact are left out: in a blow a smoothed acceleration means nothing,
@@ -104,7 +102,7 @@ def motion(forward: Forward, fit: Fit, index: int) -> Motion | None:
     deviation = np.maximum(noise, rough.std(axis=1)) * np.linalg.norm(
         savgol_coeffs(2 * half + 1, 4, deriv=2, delta=step)
     )
-    model, parameters = forward._world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
+    model, parameters = forward.world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
     without, parameters = loose(model, parameters)
     pose = followed.at(grid + recording.times[0], smooth)
     drive = distorted(without, parameters, forward._drives[index], float(grid[-1]))
@@ -133,7 +131,7 @@ def loose(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     return without, parameters.for_model(without)
 
 
-def dynamics(forward: Forward, model: Model, parameters: Parameters, drive: Drive, pose: Pose, rate: np.ndarray):
+def dynamics(forward: Rollouts, model: Model, parameters: Parameters, drive: Drive, pose: Pose, rate: np.ndarray):
     """Generalised inertia [m, m, W], forces less centripetal ones [m, W], and gaps of all contacts [k, W].
 
     Args:
@@ -193,12 +191,12 @@ def _half_window(q: np.ndarray, noise: np.ndarray) -> int:
     return best
 
 
-def motions_of(forward: Forward, fit: Fit) -> list[Motion]:
+def motions_of(forward: Rollouts, fit: Fit) -> list[Motion]:
     """The motions of all recordings that determine one."""
     return [m for m in (motion(forward, fit, r) for r in range(len(forward.recordings))) if m is not None]
 
 
-def locate(forward: Forward, motions: Sequence[Motion]) -> list[Place]:
+def locate(forward: Rollouts, motions: Sequence[Motion]) -> list[Place]:
     """Places, most suspicious first: all coordinates of the tree; empty if the recordings do not determine them."""
     if not motions:
         return []

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.diagnose.forward import Forward, seen_first, stacked
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.fit.channels import stacked
+from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.prescribed import PATH
+from origami_sim.fit.starts import channel_tangent, seen_first
 from origami_sim.model import Model
 from origami_sim.observe import _index, body_point
 from origami_sim.recording import Channel, Recording, by_component
@@ -33,7 +35,7 @@ TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""
 
 
-def unobserved(forward: Forward) -> str | None:
+def unobserved(forward: Predictor) -> str | None:
     """One sentence on the coordinates (folds; shifts and turns of what nothing holds) that no channel tells.
 
     None if the channels tell all of them, or if forces or moments are measured, which are not read off a pose.
@@ -141,7 +143,7 @@ def _panels_of(channel: Channel, model: Model, panels: Sequence[np.ndarray]) -> 
     return {p for p, nodes in enumerate(panels) if node in nodes}
 
 
-def channel_tangents(forward: Forward) -> np.ndarray:
+def channel_tangents(forward: Predictor) -> np.ndarray:
     """[R, m] changes of all channels with the coordinates, in units of their noise, in poses of all recordings."""
     arm, rows = forward.articulation, []
     bend = BENT * np.where(np.arange(arm.size) % 2, -1.0, 1.0)[:, None]
@@ -154,7 +156,7 @@ def channel_tangents(forward: Forward) -> np.ndarray:
         picked = np.unique(np.linspace(0, len(blocks) - 1, MOST).astype(int)) if blocks else []
         poses = [arm.moved(arm.reference(), bend), *(blocks[k].pose for k in picked)]
         for pose in poses:
-            rows.append((forward._channel_tangent(recording, pose, near)[1] / noise[:, None])[told])
+            rows.append((channel_tangent(forward.model, arm, recording, pose, near)[1] / noise[:, None])[told])
     return np.concatenate(rows)
 
 

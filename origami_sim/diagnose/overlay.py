@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.forward import Block, Forward, stacked
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.several import numbers_kept
 from origami_sim.effects import get
-from origami_sim.fit.curves import CurveForward, Static
+from origami_sim.fit.channels import stacked
 from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Block, Predictor
+from origami_sim.fit.starts import channel_tangent
 from origami_sim.model import Model, dihedral_angles
 from origami_sim.recording import Channel
 from origami_sim.replay import Overlay, write_overlay
@@ -42,7 +42,7 @@ def write_overlays(folder: str | Path, keep: Keep, diagnosis: Diagnosis) -> list
     """
     forward = keep.forward
     assert forward is not None and keep.fits
-    if isinstance(forward, CurveForward) and not isinstance(forward, Static):
+    if forward.prescribed:
         return []
     if not len(forward.model.triangles):
         return []  # a body of one node has nothing to draw
@@ -56,7 +56,7 @@ def write_overlays(folder: str | Path, keep: Keep, diagnosis: Diagnosis) -> list
     return out
 
 
-def film(forward: Forward, fits: dict[str, Fit], r: int) -> Overlay:
+def film(forward: Predictor, fits: dict[str, Fit], r: int) -> Overlay:
     """Frames of one recording: the pose that its channels tell, and what the fits "before" and "after" make of it."""
     recording, model = forward.recordings[r], forward.model
     mine = [b for b in fits["after"].blocks if forward.blocks[b].recording == r]
@@ -83,11 +83,11 @@ def film(forward: Forward, fits: dict[str, Fit], r: int) -> Overlay:
     )
 
 
-def _positions(forward: Forward, fit: Fit, r: int, mine: list[int]) -> dict[int, np.ndarray]:
+def _positions(forward: Predictor, fit: Fit, r: int, mine: list[int]) -> dict[int, np.ndarray]:
     """Node positions [n, N, 3] of each block: what markers on all nodes would have read."""
     recording, count = forward.recordings[r], len(forward.model.position)
-    if not isinstance(forward, CurveForward):
-        forward._path(r)  # the recorded motion, which the copy below could not tell any more
+    if not forward.curve:
+        forward.path(r)  # type: ignore[attr-defined]  # the recorded motion, which the copy below could not tell any more
     nowhere = np.zeros((len(recording.times), 3))
     markers = {f"node {i}": Channel(f"node {i}", "marker", nowhere, "m", 1.0, {"node": i}) for i in range(count)}
     other = copy.copy(forward)
@@ -116,7 +116,7 @@ def _of_all(s: Suspect) -> bool:
     return s.entities is None and not get(s.effect).on_body
 
 
-def _recorded(forward: Forward, block: Block, frames: np.ndarray) -> np.ndarray:
+def _recorded(forward: Predictor, block: Block, frames: np.ndarray) -> np.ndarray:
     """Positions [F, N, 3] of the rigid-panel pose that fits the channels best, each from the one before."""
     recording, arm = forward.recordings[block.recording], forward.articulation
     values, noise = stacked(recording)
@@ -125,7 +125,7 @@ def _recorded(forward: Forward, block: Block, frames: np.ndarray) -> np.ndarray:
         level = values[frame]
         seen = np.isfinite(level)
         for _ in range(10 if arm.size else 0):
-            now, tangent = forward._channel_tangent(recording, pose, level)
+            now, tangent = channel_tangent(forward.model, forward.articulation, recording, pose, level)
             weight = np.where(seen, 1.0 / noise, 0.0)
             gap = np.where(seen, level - now, 0.0)
             by = np.linalg.lstsq(np.nan_to_num(tangent) * weight[:, None], gap * weight, rcond=1e-8)[0]
@@ -149,3 +149,10 @@ def _panel_gaps(model: Model, x: np.ndarray, recorded: np.ndarray) -> np.ndarray
     panels = range(int(model.triangle_panel.max(initial=-1)) + 1)
     nodes = [np.unique(model.triangles[model.triangle_panel == p]) for p in panels]
     return np.stack([np.sqrt(away[:, n].mean(axis=1)) if len(n) else np.zeros(len(x)) for n in nodes], axis=1)
+
+
+def numbers_kept(f: Fit, rest: tuple[Suspect, ...]) -> np.ndarray:
+    """The numbers of a fit that a smaller hypothesis of these suspects still has."""
+    ends = np.cumsum([len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
+    own = {s.label: f.theta[a:b] for s, a, b in zip(f.hypothesis.suspects, ends[:-1], ends[1:], strict=True)}
+    return np.concatenate([f.theta[: ends[0]], *(own[s.label] for s in rest)])

@@ -17,6 +17,7 @@ EVEN = 1.5
 FRAMES = 400
 """Frames of a recording that are compared at least, if it has as many."""
 
+
 def among(every: Sequence[Suspect], catalogue: Sequence[str]) -> list[Suspect]:
     """The suspects of some effects.
 

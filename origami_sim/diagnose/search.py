@@ -6,18 +6,18 @@ judged by the linearisation that is nearest to it: its own, if it was fitted.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 
-from origami_sim.diagnose.screen import Signature
+from origami_sim.diagnose.screen import Signature, rated
 from origami_sim.effects import get
-from origami_sim.fit.evidence import Group, Summed, problem, summed
+from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
-from origami_sim.fit.least_squares import Fit, fit
+from origami_sim.fit.least_squares import Fit, carried_on, fit
 from origami_sim.fit.linear import Linearisation, Weights
 from origami_sim.fit.predictor import Predictor
 
@@ -26,6 +26,9 @@ UNFITTED = 0.05
 
 FITS = 16
 """Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
+
+KEPT = 6
+"""Fitted sets that are fitted again when weights change: the leaders."""
 
 PARTNERS = 12
 """Leading effects of which pairs are formed with all others."""
@@ -116,17 +119,24 @@ def search(
 ) -> Posterior:
     """The posterior over sets of effects, from the refitted model without any."""
     out = Posterior(signatures, weights)
-    prior = log_priors(signatures)
-    _add(out, forward, frozenset(), base, prior)
+    _add(out, forward, frozenset(), base, log_priors(signatures))
+    return extended(out, forward, progress=progress, most=most)
+
+
+def extended(
+    out: Posterior, forward: Predictor, *, progress: Callable[[float], None] | None = None, most: int = FITS
+) -> Posterior:
+    """Fits sets until those that have not been fitted hold little of the posterior."""
+    prior = log_priors(out.signatures)
     for n in range(most):
         if progress:
             progress(n / most)
         p = out.probabilities()
         open_sets = [k for k in p if k not in out.nodes and k not in out.failed]
-        if not open_sets:
+        if not open_sets or sum(p[k] for k in open_sets) < UNFITTED:
             break
         key = max(open_sets, key=lambda k: p[k])
-        if p[key] < UNFITTED / 2 or sum(p[k] for k in open_sets) < UNFITTED:
+        if p[key] < UNFITTED / 5 and max(p, key=lambda k: p[k]) in out.nodes:
             break
         fitted = _fitted(out, forward, key)
         if fitted.failed:
@@ -135,6 +145,31 @@ def search(
             continue
         _add(out, forward, key, fitted, prior)
     return out
+
+
+def reweighted(out: Posterior, forward: Predictor, base: Fit, new: Weights) -> Posterior:
+    """The posterior with other weights: what was fitted and still matters is fitted on from where it is."""
+    factor = out.weights.deviation / new.deviation * np.sqrt(new.part / out.weights.part)
+    line = base.linear
+    assert line is not None
+    scales = []
+    for r in line.rows:
+        data = np.tile(factor, r.data // len(factor))
+        scales.append(np.concatenate([data, np.ones(r.start), np.full(r.tie, out.weights.gap / new.gap)]))
+    moved = [
+        replace(s, parts=[k * p for k, p in zip(scales, s.parts, strict=True)] if s.parts else [])
+        for s in out.signatures
+    ]
+    again = Posterior(rated(moved, base), new, out.hyper)
+    prior = log_priors(again.signatures)
+    _add(again, forward, frozenset(), base, prior)
+    chance = out.probabilities()
+    kept = [k for k in sorted(out.nodes, key=lambda k: -chance.get(k, 0.0)) if k][:KEPT]
+    for key in kept:
+        f = carried_on(forward, out.nodes[key].fit.reweighted(out.weights, new), new)
+        if not f.failed:
+            _add(again, forward, key, f, prior)
+    return again
 
 
 def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:
@@ -187,7 +222,7 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
 def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
     """Indices of a hypothesis' suspects."""
     place = {id(s.suspect): n for n, s in enumerate(out.signatures)}
-    return [place[id(s)] for s in hypothesis.suspects]
+    return [place[id(s)] for s in hypothesis.suspects]  # the same objects also after weights have changed
 
 
 def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -203,17 +238,18 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
     width: dict[tuple[int, int], list[int]] = {}
     for n, s in enumerate(sets):
         width.setdefault((len(s), sum(len(node.groups[g].columns) for g in s)), []).append(n)
+    count = len(node.grid[0][0].gram) - 1
+    laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
+    log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
     for c in order[: CELLS if len(sets) > MANY else None]:
         g, k = np.unravel_index(c, shape)
         if not np.isfinite(node.evidence[g, k]):
             continue
-        for (size, _), mine in width.items():
-            rows = np.array([sets[n] for n in mine], int).reshape(len(mine), size)
-            log, value = node.grid[g][k].of(rows, node.groups, own, out.hyper)
-            for n, e, v in zip(mine, log, value, strict=True):
-                found[n, g, k] = e + cells[g, k] + _log_prior(keys[n], prior, out.hyper)
-                if found[n, g, k] > peak[n]:
-                    peak[n], values[n] = found[n, g, k], v
+        for mine, rows in laid:
+            log, value = node.grid[g][k].of(rows, out.hyper)
+            found[mine, g, k] = log + cells[g, k] + log_prior[mine]
+            for n in np.flatnonzero(found[mine, g, k] > peak[mine]):
+                peak[mine[n]], values[mine[n]] = found[mine[n], g, k], value[n]
     for n, key in enumerate(keys):
         if key in out.nodes or key in out.failed or n not in values:
             continue
@@ -272,7 +308,8 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
     smooth = cosines(forward, f, line)
     grid, evidence = [], np.empty((len(hyper.gaps), len(hyper.smooth)))
     tied = any(t is not None for t in line.tie)
-    own = np.array([range(len(f.hypothesis.suspects))], int).reshape(1, -1)
+    own = [tuple(range(len(f.hypothesis.suspects)))]
+    laid = Sets.of(own, groups, len(own[0]), count + len(others))
     for g, gap in enumerate(hyper.gaps):
         if not tied and g:
             evidence[g] = -np.inf
@@ -282,7 +319,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         p = problem(now, nominal, precision, away, theirs, smooth)
         row = [summed(p, k, hyper) for k in hyper.smooth]
         grid.append(row)
-        evidence[g] = [s.of(own, groups, own.shape[1], hyper)[0][0] for s in row]
+        evidence[g] = [s.of(laid, hyper)[0][0] for s in row]
     return Node(key, f, evidence, groups, others, grid)
 
 

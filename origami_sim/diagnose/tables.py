@@ -2,61 +2,80 @@
 
 import numpy as np
 
-from origami_sim.diagnose import verdict as words
-from origami_sim.diagnose.compare import difference, probabilities, supported
 from origami_sim.diagnose.diagnosis import Candidate, Correlation, Number, Suspected, Trace
-from origami_sim.diagnose.forward import Forward
-from origami_sim.diagnose.screen import Screening, Signature
+from origami_sim.diagnose.screen import Signature
+from origami_sim.diagnose.search import Key, Posterior
+from origami_sim.diagnose.verdict import Judgement, log_odds, widened
+from origami_sim.diagnose.words import kind
 from origami_sim.fit.channels import units_of
-from origami_sim.fit.least_squares import Fit, Weights
+from origami_sim.fit.least_squares import LITTLE, Fit
+from origami_sim.fit.linear import Weights
+from origami_sim.fit.predictor import Predictor
 
 
-def table(forward, fits: list[Fit], scores, judged) -> list[Candidate]:
-    """All explanations that were fitted, best first, with the reason why each lost."""
-    base = fits[0]
-    rows = [f for f in fits if id(f) in scores]
-    p = probabilities(supported(rows, scores))
+def table(
+    forward: Predictor, p: Posterior, base: Fit, judged: Judgement, errors: dict[Key, np.ndarray]
+) -> list[Candidate]:
+    """All explanations that were fitted, best first, with the reason why each lost.
+
+    Args:
+        errors: (D,) held-out error of each fitted set.
+    """
+    chance = p.probabilities()
     out = []
-    for f, probability in zip(rows, p, strict=True):
-        gain, error = difference(scores[id(f)], scores[id(base)]) if f is not base else (0.0, 0.0)
-        kind = words.kind(f)
-        label = f.hypothesis.label if f.hypothesis.suspects else "nominal refitted"
+    for key, node in p.nodes.items():
+        f = widened(p, key)
         out.append(
             Candidate(
-                label,
-                kind,
+                p.label(key) if key else "nominal refitted",
+                kind(f),
                 [s.effect for s in f.hypothesis.suspects],
                 [s.site for s in f.hypothesis.suspects],
                 numbers(f),
-                float(probability),
-                gain,
-                error,
-                scores[id(f)].rms.tolist(),
-                fit_percent(forward, f).tolist(),
-                why=words.why(f, base, judged, scores),
-                distrust=words.distrust(f, base, forward),
+                chance[key],
+                log_odds(p, key),
+                errors[key].tolist(),
+                fit_percent(forward, node.fit).tolist(),
+                why=_why(key, p, judged),
+                distrust=_distrust(f),
             )
         )
-    for f in fits:
-        if f.failed:
-            empty = [float("nan")] * len(forward.components)
-            h = f.hypothesis
-            out.append(
-                Candidate(
-                    h.label,
-                    words.kind(f),
-                    [s.effect for s in h.suspects],
-                    [s.site for s in h.suspects],
-                    [],
-                    0.0,
-                    float("nan"),
-                    float("nan"),
-                    empty,
-                    empty,
-                    failed=f.failed,
-                )
-            )
+    for key, why in p.failed.items():
+        suspects = [p.suspect(n) for n in key]
+        empty = [float("nan")] * len(forward.components)
+        effects, sites = [s.effect for s in suspects], [s.site for s in suspects]
+        out.append(Candidate(p.label(key), "mechanism", effects, sites, [], 0.0, -np.inf, empty, empty, failed=why))
     return sorted(out, key=lambda c: -c.probability)
+
+
+def _why(key: Key, p: Posterior, judged: Judgement) -> str:
+    """Why a row won or lost, in words."""
+    f = p.nodes[key].fit
+    if f.hypothesis is judged.best.hypothesis:
+        return "closest, but not enough" if judged.verdict in ("UNKNOWN", "UNTESTABLE") else "chosen"
+    if any(f.hypothesis is t.hypothesis for t in judged.tied):
+        return "not told from the best"
+    if not key:
+        return "the simplest"
+    best = next(k for k, n in p.nodes.items() if n.fit.hypothesis is judged.best.hypothesis)
+    misses = f.cost - p.nodes[best].fit.cost
+    if misses < LITTLE:
+        return "no better for its further numbers"
+    return f"misses the recordings by {misses:.3g} more in squares over the noise"
+
+
+def _distrust(f: Fit) -> str:
+    """When not to trust a row."""
+    out, own = [], len(f.free) - len(f.hypothesis.free)
+    for n, t, b in zip(f.free, f.theta, f.at_bound, strict=True):
+        if b:
+            out.append(f"{n.label} lies on its bound ({t:.3g} {n.unit})")
+        elif np.isfinite(n.spread) and abs(t - n.start) > 3 * n.spread:
+            out.append(f"{n.label} left its prior by {abs(t - n.start) / n.spread:.1f} sd")
+    for n, t, d in zip(f.free[own:], f.theta[own:], f.deviations()[own:], strict=True):
+        if abs(t) < 2 * d:
+            out.append(f"{n.label} is not told from zero")
+    return "; ".join(out)
 
 
 def numbers(f: Fit) -> list[Number]:
@@ -68,15 +87,16 @@ def numbers(f: Fit) -> list[Number]:
     ]
 
 
-def suspected(s: Signature, screening: Screening) -> Suspected:
+def suspected(s: Signature, z: float, total: float) -> Suspected:
+    """A suspect in the screening, with the score z by which it alone would explain what the base fit misses."""
     u = s.suspect
-    explained = s.score**2 / screening.total if screening.total > 0 else 0.0
-    return Suspected(
-        u.label, u.effect, u.site, u.kind, s.score, s.strength, s.error, u.free[0].unit, explained, s.status
-    )
+    strength = z / s.norm * s.size if s.norm > 0 else 0.0
+    error = abs(s.size) / s.norm if s.norm > 0 else np.inf
+    share = z**2 / total if total > 0 else 0.0
+    return Suspected(u.label, u.effect, u.site, u.kind, z, strength, error, u.free[0].unit, share, s.status)
 
 
-def fit_percent(forward: Forward, f: Fit) -> np.ndarray:
+def fit_percent(forward: Predictor, f: Fit) -> np.ndarray:
     """(D,) 100 (1 - NRMSE) [%] over all fitted blocks."""
     values = np.concatenate([forward.blocks[b].values for b in f.blocks])
     spread = np.nanstd(values, axis=0)
@@ -87,7 +107,7 @@ def rms_of(f: Fit) -> np.ndarray:
     return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
 
 
-def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights, noise: np.ndarray) -> list[Trace]:
+def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weights, noise: np.ndarray) -> list[Trace]:
     """Recorded and predicted components of each recording, segment after segment."""
     out = []
     units = units_of(forward.recordings[0])
@@ -118,7 +138,7 @@ def traces(forward: Forward, given: Fit, base: Fit, best: Fit, weights: Weights,
     return out
 
 
-def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
+def correlations(forward: Predictor, base: Fit, best: Fit) -> list[Correlation]:
     """Auto- and cross-correlations of the residuals, averaged over segments."""
     out = []
     step = float(np.median(np.diff(forward.recordings[0].times)))
@@ -133,7 +153,7 @@ def correlations(forward: Forward, base: Fit, best: Fit) -> list[Correlation]:
     return out
 
 
-def varying_drive(forward: Forward):
+def varying_drive(forward: Predictor):
     """Name of the drive channel that varies most; None: nothing varies."""
     spans: dict[str, float] = {}
     for drive, r in zip(forward._drives, forward.recordings, strict=True):
@@ -144,7 +164,7 @@ def varying_drive(forward: Forward):
     return (name, f"drive {name}") if spans.get(name) else (None, "rate")
 
 
-def _against(forward: Forward, f: Fit, d: int, drive: str | None) -> list[np.ndarray]:
+def _against(forward: Predictor, f: Fit, d: int, drive: str | None) -> list[np.ndarray]:
     out = []
     for b in f.blocks:
         block = forward.blocks[b]

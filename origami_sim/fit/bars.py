@@ -33,7 +33,7 @@ class BarRollouts(Rollouts):
 
     Args:
         segment: length of a segment [s]; None: each recording is one segment. most: at most so many segments of each
-            recording, evenly spread; None: all. The rest as for `Rollouts`.
+            recording, evenly spread, for a quick look; None: all. The rest as for `Rollouts`.
     """
 
     panels = "elastic"

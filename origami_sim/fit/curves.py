@@ -4,13 +4,11 @@ import copy
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import Curve, Place
-from origami_sim.diagnose.locate import BINS, PASSIVE
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
@@ -18,7 +16,6 @@ from origami_sim.errors import InputError
 from origami_sim.fit.channels import angle_mask, stacked
 from origami_sim.fit.drives import drive_of
 from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
-from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.measured import at_channel, continuous
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.rollouts import distinct_motions
@@ -29,6 +26,9 @@ from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
+
+PASSIVE = ("bars", "bar_viscosity", "panel_bending", "ogden_bars")
+"""Effects that keep panels stiff; rigid panels do not need them."""
 
 PIECES = 6
 """Blocks that a curve is cut into: contiguous stretches, each of which is held out in its turn."""
@@ -48,6 +48,23 @@ FAR = 0.1
 ROUNDS = 12
 ITERATIONS = 12
 """Tangents of a load step, and Broyden's steps with each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Moments that are missing along a curve.
+
+    Attributes:
+        names: of the m coordinates. times: (n,) or load steps. q: [m, n] coordinates. missing, error: [m, n] moments
+            and their standard deviations [N m]. against: what else to show them against, (n,) by channel.
+    """
+
+    names: list[str]
+    times: np.ndarray
+    q: np.ndarray
+    missing: np.ndarray
+    error: np.ndarray
+    against: dict[str, np.ndarray]
 
 
 class Curves(Worlds, ABC):
@@ -159,8 +176,8 @@ class Curves(Worlds, ABC):
         return self._rested[id(commanded)]
 
     @abstractmethod
-    def locate(self, fit: Fit) -> list[Place]:
-        """Residual moments by crease, most suspicious first; empty where they cannot be told."""
+    def balance(self, hypothesis: Hypothesis, theta: np.ndarray) -> list[Balance]:
+        """Residual moments by recording; none where they cannot be told."""
         ...
 
     def menu(self) -> list[tuple[str, "Curves"]]:
@@ -252,17 +269,17 @@ class Static(Curves):
             self._systems[model.effects] = _System(model, worlds[0][1], drive, State.at_rest(model))
         return self._systems[model.effects]
 
-    # --- where
+    # --- equation error
 
-    def locate(self, fit: Fit) -> list[Place]:
-        """Equation error at the recorded angles: the moment that balances each crease beyond what the model gives."""
+    def balance(self, hypothesis: Hypothesis, theta: np.ndarray) -> list[Balance]:
+        """At the recorded angles: the moments that balance each crease beyond what the model gives."""
         found = []
         for r, recording in enumerate(self.recordings):
             given = coordinates(self, r)
             if given is None:
                 return []
             q, noise = given
-            model, parameters = self.world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
+            model, parameters = self.world(hypothesis, theta, hypothesis.effects)
             model = model.with_effects(without=tuple(e for e in PASSIVE if e in model.effects))
             parameters = parameters.for_model(model)
             drives = self._resting(r, model, parameters)
@@ -273,8 +290,8 @@ class Static(Curves):
             error = np.sqrt(np.einsum("jkn,j->kn", slope**2, noise**2))
             levels = {n: np.array([at_once(d, n) for d in drives]) for n in drives[0].signals}
             against = {n: v for n, v in levels.items() if np.ptp(v) > 0}
-            found.append((recording.times, q, moments[0], error, against))
-        return places(self.articulation.names(), found)
+            found.append(Balance(self.articulation.names(), recording.times, q, moments[0], error, against))
+        return found
 
     def _moments(self, model: Model, parameters: Parameters, drive: Drive, q: np.ndarray) -> np.ndarray:
         """Missing moments [m, n] at held coordinates [m, n]."""
@@ -488,72 +505,3 @@ def _interpolated(grid: np.ndarray, values: np.ndarray):
         return out
 
     return read
-
-
-def places(names: Sequence[str], found) -> list[Place]:
-    """Places, most suspicious first.
-
-    Args:
-        names: of the m coordinates. found: per recording times (n,), coordinates, missing moments and their errors
-            [m, n], and what else to show them against, (n,) by channel.
-    """
-    out = []
-    for k, name in enumerate(names):
-        z, power = [], []
-        for times, q, missing, error, _ in found:
-            width = max(1, len(times) // BINS)
-            cut = len(times) // width * width
-            mean, deviation = (v[k, :cut].reshape(-1, width).mean(1) for v in (missing, error))
-            z.append(mean / deviation * np.sqrt(width))
-            power.append(missing[k] * np.gradient(q[k], times))
-        times, _, missing, error, _ = found[0]
-        score = float(np.sqrt(np.mean(np.concatenate(z) ** 2)))
-        out.append(
-            Place(
-                name,
-                score,
-                0.0,
-                float(np.mean(np.concatenate(power))),
-                float("nan"),
-                times.tolist(),
-                missing[k].tolist(),
-                error[k].tolist(),
-                _curves(found, k),
-            )
-        )
-    excess = np.array([max(p.score**2 - 1.0, 0.0) for p in out])
-    for p, e in zip(out, excess, strict=True):
-        p.share = float(e / excess.sum()) if excess.sum() > 0 else 1.0 / len(out)
-    return sorted(out, key=lambda p: -p.score)
-
-
-def _curves(found, k: int) -> list[Curve]:
-    """Residual moment of a coordinate against its angle and against every drive that varies."""
-    y = np.concatenate([f[2][k] for f in found])
-    error = np.concatenate([f[3][k] for f in found])
-    against = {("angle", "rad"): np.concatenate([f[1][k] for f in found])}
-    for n in sorted(set.intersection(*(set(f[4]) for f in found))):
-        unit = {"field": "T", "voltage": "V", "gradient": "T/m", "time": "s"}.get(n.split("_")[0], "")
-        against[n, unit] = np.concatenate([f[4][n] for f in found])
-    out = []
-    for (name, unit), x in against.items():
-        parts = [p for p in np.array_split(np.argsort(x, kind="stable"), BINS) if len(p)]
-        out.append(
-            Curve(
-                name,
-                unit,
-                [float(x[p].mean()) for p in parts],
-                [float(y[p].mean()) for p in parts],
-                [float(np.sqrt(np.mean(error[p] ** 2) / len(p))) for p in parts],
-                [len(p) for p in parts],
-            )
-        )
-    return out
-
-
-def sign_changes(curve: Curve) -> list[float]:
-    """Where the residual moment changes its sign, between means that are both beyond twice their error."""
-    x, y, e = (np.array(v) for v in (curve.x, curve.mean, curve.error))
-    sure = np.flatnonzero(np.abs(y) > 2 * e)
-    pairs = [(a, b) for a, b in pairwise(sure) if y[a] * y[b] < 0]
-    return [float(x[a] + (x[b] - x[a]) * y[a] / (y[a] - y[b])) for a, b in pairs]

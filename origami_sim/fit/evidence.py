@@ -1,4 +1,4 @@
-"""Evidence of a linear Gaussian model: how probable recordings are under a set of added effects, everything else summed out.
+"""Evidence of a linear Gaussian model: how probable recordings are under a set of added effects.
 
 About a fit, whitened residuals are
 
@@ -44,7 +44,7 @@ class Problem:
     """One linearisation, for one size of the gaps: Gram matrices of all columns with the nominal numbers projected out.
 
     Attributes:
-        gram: [C + K + 1, C + K + 1] of the columns of effects (C), of the channels' discrepancy (K) and of the residual.
+        gram: [C + K + 1, C + K + 1] of the columns of effects (C), of the channels' discrepancy (K), of the residual.
         columns: C. constant: of the log evidence.
     """
 
@@ -92,6 +92,44 @@ def problem(
 
 
 @dataclass(frozen=True, eq=False)
+class Sets:
+    """Sets of groups that have as many columns each, laid out for `Summed.of`.
+
+    Attributes:
+        columns: [n, k]. at, spread, side: [n, k] of the columns, see `Group`. strength: [n, k] whether it is one.
+        back: [n, C] values of the strengths that the problem is linearised with and that a set lacks.
+    """
+
+    columns: np.ndarray
+    at: np.ndarray
+    spread: np.ndarray
+    side: np.ndarray
+    strength: np.ndarray
+    back: np.ndarray
+
+    @classmethod
+    def of(cls, sets: Sequence[tuple[int, ...]], groups: Sequence[Group], own: int, count: int) -> "Sets":
+        """Lays out sets of groups, of which the first `own` are those that a problem of `count` columns is about."""
+
+        def each(take, dtype=float) -> np.ndarray:
+            return np.array([[v for g in row for v in take(groups[g])] for row in sets], dtype).reshape(len(sets), -1)
+
+        back = np.zeros((len(sets), count))
+        for k in range(own):
+            g = groups[k]
+            lacks = np.array([k not in row for row in sets])
+            back[np.ix_(lacks, g.columns[: g.strengths])] = g.at[: g.strengths]
+        return cls(
+            each(lambda g: g.columns, int),
+            each(lambda g: g.at),
+            each(lambda g: g.spread),
+            each(lambda g: [g.side] + [0] * (len(g.columns) - 1), int),
+            each(lambda g: [n < g.strengths for n in range(len(g.columns))], bool),
+            back,
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Summed:
     """A problem with flaws and discrepancy summed out: Gram matrix of effects and residual, and what it is about.
 
@@ -102,53 +140,35 @@ class Summed:
     gram: np.ndarray
     log: float
 
-    def of(
-        self, sets: np.ndarray, groups: Sequence[Group], own: int = 0, hyper: Hyper = HYPER
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Log evidence (n,) of sets of groups [n, g] with as many columns each, and values [n, k] of their columns.
-
-        Args:
-            own: how many groups, the first ones, the problem is linearised with; of those that a set lacks the strength
-                is taken back to zero.
-        """
-        n = len(sets)
-        present = np.zeros((n, own), bool)
-        for k in range(own):
-            present[:, k] = np.any(sets == k, axis=1) if sets.shape[1] else False
+    def of(self, sets: Sets, hyper: Hyper = HYPER) -> tuple[np.ndarray, np.ndarray]:
+        """Log evidence (n,) of sets, and values [n, k] of their columns."""
         # what the residual would be without what a set lacks
-        back = np.zeros((n, len(self.gram) - 1))
-        for k in range(own):
-            g = groups[k]
-            strong = list(g.columns[: g.strengths])
-            back[:, strong] = np.where(present[:, k, None], 0.0, g.at[: g.strengths])
-        right = self.gram[:-1, -1] + back @ self.gram[:-1, :-1]
-        square = self.gram[-1, -1] + np.einsum("nc,nc->n", back, self.gram[:-1, -1] + right)
-        if not sets.shape[1]:
-            return self.log - 0.5 * square, np.zeros((n, 0))
-        columns = np.array([[c for g in row for c in groups[g].columns] for row in sets])
-        k = columns.shape[1]
-        a = self.gram[columns[:, :, None], columns[:, None, :]]
-        b = np.take_along_axis(right, columns, axis=1)
-
-        def each(of) -> np.ndarray:
-            return np.array([np.concatenate([of(groups[g]) for g in row]) for row in sets])
-
-        at, spread = each(lambda g: g.at), each(lambda g: g.spread)
-        strength = each(lambda g: np.arange(len(g.columns)) < g.strengths)
-        side = each(lambda g: np.where(np.arange(len(g.columns)) == 0, g.side, 0))
+        right, square = self.gram[:-1, -1], self.gram[-1, -1]
+        if np.any(sets.back):
+            right = right + sets.back @ self.gram[:-1, :-1]
+            square = square + np.einsum("nc,nc->n", sets.back, self.gram[:-1, -1] + right)
+        else:
+            right = np.broadcast_to(right, sets.back.shape)
+        n, k = sets.columns.shape
+        if not k:
+            return np.full(n, self.log) - 0.5 * square, np.zeros((n, 0))
+        a = self.gram[sets.columns[:, :, None], sets.columns[:, None, :]]
+        b = np.take_along_axis(right, sets.columns, axis=1)
         norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
-        tight = np.where(strength, norm / hyper.widest, 1.0 / np.where(np.isfinite(spread), spread, 1e6))
+        wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
+        tight = np.where(sets.strength, norm / hyper.widest, 1.0 / wide)
         full = a + np.eye(k) * (tight**2)[:, None, :]
-        move = np.linalg.solve(full, (b - at * tight**2)[:, :, None])[:, :, 0]
-        value = at + move
-        sd = np.sqrt(np.maximum(np.linalg.inv(full)[:, range(k), range(k)], 1e-300))
+        inverse = np.linalg.inv(full)
+        move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
+        value = sets.at + move
+        sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
         left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
         out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
         slab = _log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
-        out += np.sum(np.where(strength, slab, shape), axis=1)
-        out += np.sum(np.where(side != 0, np.log(2.0) + log_ndtr(side * value / sd), 0.0), axis=1)
+        out += np.sum(np.where(sets.strength, slab, shape), axis=1)
+        out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
         return out, value
 
 

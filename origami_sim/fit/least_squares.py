@@ -84,15 +84,6 @@ class Fit:
         """(P,) standard deviations of theta."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)
 
-    def only(self, blocks: Sequence[int]) -> "Fit":
-        """The same numbers, where only these blocks were to be fitted."""
-        assert self.linear is not None
-        index = [self.blocks.index(b) for b in blocks]
-        line = self.linear.only(index)
-        misfit = float(sum(r @ r for r in line.residual))
-        left = [self.residuals[n] for n in index]
-        return replace(self, blocks=tuple(blocks), linear=line, residuals=left, misfit=misfit)
-
     def reweighted(self, old: Weights, new: Weights) -> "Fit":
         """The same numbers, judged with other weights."""
         assert self.linear is not None
@@ -133,7 +124,7 @@ def linearise(
     kept = min(kept, count) if known is not None else 0
     size = 0 if known is not None else forward.local
     fresh = count - kept
-    steps = np.array([_step(f, t) for f, t in zip(free, theta, strict=True)])[:count]
+    steps = np.array([_step(f, t, forward.nudge) for f, t in zip(free, theta, strict=True)])[:count]
     nudges = start_steps(forward)
     thetas = np.repeat(theta[None], 1 + fresh + size, axis=0)
     locals_ = np.repeat(local[None], 1 + fresh + size, axis=0)
@@ -143,89 +134,82 @@ def linearise(
         locals_[1 + fresh + i, :, i] += nudges[i]
     if residual is None:
         residual = residuals(forward, hypothesis, theta, local, blocks, weights)
-    tied = ties(forward, blocks)
+    rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
     if len(thetas) > 1:
-        shot = forward.shoot(hypothesis, thetas, locals_, blocks)
-        changes = changed(forward, shot, weights, blocks)
+        changes = changed(forward, forward.shoot(hypothesis, thetas, locals_, blocks), weights, blocks)
     else:  # nothing to derive by
-        changes = [np.zeros((0, forward.blocks[b].rows(t).count)) for b, t in zip(blocks, tied, strict=True)]
+        changes = [np.zeros((0, r.count)) for r in rows]
     scale = np.array([f.scale for f in free[kept:count]]) / steps[kept:]
     tangent = [c[:fresh].T * scale for c in changes]
     if known is not None:
         return known.at(residual).beside(tangent, kept)
-    slopes, tie, rows = [], [], []
-    for b, t, c in zip(blocks, tied, changes, strict=True):
+    slopes, tie = [], []
+    for b, own, c in zip(blocks, rows, changes, strict=True):
         block = forward.blocks[b]
-        own = block.rows(t)
         slope = c[fresh:].T / nudges[:size]
         if own.start:
             slope[own.data : own.data + own.start] = np.diag(1.0 / block.known)
         slopes.append(slope)
-        tie.append(None if block.reach is None else 1.0 / (weights.gap * block.reach))
-        rows.append(own)
+        tie.append(1.0 / (weights.gap * block.reach) if own.tie and block.reach is not None else None)
     return Linearisation(rows, residual, tangent, slopes, tie)
 
 
-def ties(forward: Predictor, blocks: Sequence[int]) -> list[bool]:
-    """Whether each of these blocks is tied to the one before; all of a chain have to be asked for in order.
+def links(forward: Predictor, blocks: Sequence[int]) -> list[tuple[bool, bool]]:
+    """Whether each of these blocks is tied to the one before and to the one after it, if that is among them."""
+    asked = set(blocks)
 
-    Raises:
-        ValueError: blocks of which one is tied to another that is not among them.
-    """
-    out, before = [], None
-    for b in blocks:
-        tied = b > 0 and forward.blocks[b - 1].reach is not None
-        if tied != (before is not None) or (tied and before != b - 1):
-            raise ValueError(f"block {b} is tied to another")
-        out.append(tied)
-        before = b if forward.blocks[b].reach is not None else None
-    return out
+    def tied(b: int) -> bool:
+        return b >= 0 and b in asked and b + 1 in asked and forward.blocks[b].reach is not None
+
+    return [(tied(b - 1), tied(b)) for b in blocks]
 
 
 def changed(forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int]) -> list[np.ndarray]:
     """Per block, whitened changes [K - 1, r] of what is predicted, from the first world to each of the others."""
     out = []
-    for n, (b, tied) in enumerate(zip(blocks, ties(forward, blocks), strict=True)):
-        block, values, ends = forward.blocks[b], shot.values[n], shot.ends[n]
-        data = weights.whitened(np.where(block.seen(), values[1:] - values[0], 0.0))
-        lost = np.any(np.isnan(values[1:] - values[0]) & block.seen(), axis=(1, 2))
-        data[lost] = np.nan
-        parts = [data, np.zeros((len(data), block.rows(tied).start))]
-        if block.reach is not None and ends is not None:
+    for b, (before, after), values, ends in zip(blocks, links(forward, blocks), shot.values, shot.ends, strict=True):
+        block = forward.blocks[b]
+        gap = values[1:] - values[0]
+        data = weights.whitened(np.where(block.seen(), gap, 0.0))
+        data[np.any(np.isnan(gap) & block.seen(), axis=(1, 2))] = np.nan
+        parts = [data, np.zeros((len(data), block.rows(before, after).start))]
+        if after and ends is not None and block.reach is not None:
             parts.append((ends[1:] - ends[0]) / (weights.gap * block.reach))
         out.append(np.concatenate(parts, axis=1))
     return out
 
 
-def residuals(forward: Predictor, hypothesis: Hypothesis, theta, local, blocks, weights: Weights) -> list[np.ndarray]:
+def residuals(
+    forward: Predictor, hypothesis: Hypothesis, theta: np.ndarray, local: np.ndarray, blocks, weights: Weights
+) -> list[np.ndarray]:
     """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed."""
     shot = forward.shoot(hypothesis, theta[None], local[None], blocks)
     out = []
-    for n, (b, tied) in enumerate(zip(blocks, ties(forward, blocks), strict=True)):
-        block, values, ends = forward.blocks[b], shot.values[n][0], shot.ends[n]
-        gap = np.where(block.seen(), block.values - values, 0.0)
+    for b, (before, after), values, ends in zip(blocks, links(forward, blocks), shot.values, shot.ends, strict=True):
+        block = forward.blocks[b]
+        gap = np.where(block.seen(), block.values - values[0], 0.0)
         parts = [(gap / weights.deviation * np.sqrt(weights.part)).ravel()]
-        if forward.local and not tied:
+        if forward.local and not before:
             parts.append(-local[b] / block.known)
-        if block.reach is not None and ends is not None:
+        if after and ends is not None and block.reach is not None:
             parts.append((local[b + 1] - ends[0]) / (weights.gap * block.reach))
         out.append(np.concatenate(parts))
     return out
 
 
-def start_steps(forward) -> np.ndarray:
+def start_steps(forward: Predictor) -> np.ndarray:
     """Steps for derivatives by the starts: shifts [m or rad], then rates.
 
     A contact begins with a step of the solver, so that smaller changes of a start than a step's way do not move it.
     """
     m = forward.local // 2
-    shift, rate = (1e-4, 1e-2) if len(forward.model.contacts) else (1e-6, 1e-5)
+    shift, rate = (1e-4, 1e-2) if len(forward.model.contacts) else (1e-4 * forward.nudge, 1e-3 * forward.nudge)
     return np.concatenate([np.full(m, shift), np.full(m, rate)]) if forward.local else np.zeros(0)
 
 
-def _step(f: Free, value: float) -> float:
-    """Step of a derivative: a hundredth of what is noticeable, inwards at a bound."""
-    step = 0.01 * f.scale
+def _step(f: Free, value: float, nudge: float) -> float:
+    """Step of a derivative, as a part of what is noticeable, inwards at a bound."""
+    step = nudge * f.scale
     return -step if value + step > f.upper else step
 
 

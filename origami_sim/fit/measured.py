@@ -120,9 +120,9 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
 
     def at(times: np.ndarray) -> np.ndarray:
         since = times - shown
-        columns, inverse = since[:, :1], np.zeros(since.shape[1], int)
-        if np.any(since != columns):
-            columns, inverse = np.unique(since, axis=1, return_inverse=True)
+        # clocks are late and fast: their first and last readings tell them apart
+        _, some, inverse = np.unique(since[[0, -1]], axis=1, return_index=True, return_inverse=True)
+        columns = since[:, some]
         out = np.empty((len(times), values.shape[1], values.shape[2]))
         for c in range(columns.shape[1]):
             mine = np.flatnonzero(inverse.ravel() == c)

@@ -1,7 +1,7 @@
 """What a hypothesis predicts for recordings: the protocol that rollouts of bars, of rigid panels, and curves share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -41,18 +41,14 @@ class Block:
     lasting: float = 0.0
     begin: np.ndarray | None = None
 
-    def rows(self, tied: bool) -> Rows:
-        """How many rows of a least-squares problem it has, `tied` or not to the segment before."""
+    def rows(self, before: bool, after: bool) -> Rows:
+        """How many rows of a least-squares problem it has, tied or not to the segments before and after it."""
         size = len(self.known)
-        return Rows(self.values.size, 0 if tied else size, 0 if self.reach is None else size)
+        return Rows(self.values.size, 0 if before else size, size if after else 0)
 
     def seen(self) -> np.ndarray:
         """[n, D] which values were measured."""
         return np.isfinite(self.values)
-
-    def held_back(self) -> "Block":
-        """The same, not tied to the next."""
-        return replace(self, reach=None, lasting=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +71,9 @@ class Predictor(Protocol):
         blocks: the segments. local: L, numbers of each segment's start (coordinates, then rates); 0 if none is fitted.
         start: "fit" or "rest". panels: "elastic", "rigid" or "" (of curves). separate: whether a segment is predicted
             without those before it.
+        nudge: steps of derivatives, as a part of changes that are noticeable: small enough to be linear.
         curve: whether these are load steps or slow loads, each of which has an equilibrium.
+        prescribed: whether the motion is.
     """
 
     subject: Subject
@@ -90,7 +88,9 @@ class Predictor(Protocol):
     start: str
     panels: str
     separate: bool
+    nudge: float
     curve: bool
+    prescribed: bool
     threads: int | None
 
     def shoot(

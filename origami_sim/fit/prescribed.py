@@ -7,12 +7,10 @@ import numpy as np
 import warp as wp
 
 from origami_sim.articulation import Articulation
-from origami_sim.diagnose.diagnosis import Place
 from origami_sim.distort import distorted
 from origami_sim.errors import InputError
-from origami_sim.fit.curves import HOLD, PIECES, Curves, Static, onward, places
-from origami_sim.fit.hypothesis import Subject
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.curves import HOLD, PIECES, Balance, Curves, Static, onward
+from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.observe import _index
 from origami_sim.recording import Recording
@@ -36,6 +34,8 @@ class Prescribed(Curves):
         InputError: a recording without prescribed angles, or with other channels than moments, of another number of
             creases than the model has, or a model whose root panel is not held.
     """
+
+    prescribed = True
 
     def __init__(
         self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
@@ -114,19 +114,24 @@ class Prescribed(Curves):
         crease = _index(self.model, channel, "crease", len(self.model.creases))
         return int(np.flatnonzero(self.articulation.creases == crease)[0])
 
-    def locate(self, fit: Fit) -> list[Place]:
-        """The moment that is missing at each crease: modelled less recorded, positive towards valley."""
-        found, rows = [], []
+    def inputs(self):
+        yield from super().inputs()
+        yield from self._q
+
+    def balance(self, hypothesis: Hypothesis, theta: np.ndarray) -> list[Balance]:
+        """The moments that are missing at each crease: modelled less recorded, positive towards valley."""
+        found, names = [], self.articulation.names()
+        predicted = self.predict(hypothesis, theta[None])
         for r, recording in enumerate(self.recordings):
-            mine = [n for n, b in enumerate(fit.blocks) if self.blocks[b].recording == r]
-            missing = -np.concatenate([fit.residuals[n] for n in mine]).T
+            mine = [n for n, b in enumerate(self.blocks) if b.recording == r]
+            missing = np.concatenate([predicted[n][0] - self.blocks[n].values for n in mine]).T
             noise = np.array([c.noise for c in recording.channels.values()])
             rows = [self._row(c) for c in recording.channels.values()]
             error = np.broadcast_to(noise[:, None], missing.shape)
             clock = {} if recording.by_step else {"time": recording.times - recording.times[0]}
-            found.append((recording.times, self._q[r][rows], missing, error, clock))
-        names = self.articulation.names()
-        return places([names[k] for k in rows], found)
+            own = [names[k] for k in rows]
+            found.append(Balance(own, recording.times, self._q[r][rows], missing, error, clock))
+        return found
 
     def menu(self) -> list[tuple[str, Curves]]:
         out = super().menu()

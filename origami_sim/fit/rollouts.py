@@ -53,8 +53,8 @@ class Shots:
 
     Attributes:
         recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
-            [s]. local: [K, B, L] shifts of starts, or None. step: between frames [s]. frames: of each rollout. ends: the
-            frame at which the next blocks begin; 0: none is tied to them.
+            [s]. local: [K, B, L] shifts of starts, or None. step: between frames [s]. frames: of each rollout. ends:
+            the frame at which the next blocks begin; 0: none is tied to them.
     """
 
     recording: int
@@ -292,7 +292,7 @@ class Rollouts(Worlds, ABC):
                 batch = rested(last)
             if first > last:
                 batch.carry(path[last : first + 1, :, None], step)
-            last, out[first] = first, batch.state().memory
+            last, out[first] = first, batch.memory()
         return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:

@@ -1,13 +1,14 @@
 """Models of hypotheses: what is simulated for numbers of the model and of the effects that are suspected."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from origami_sim.articulation import Articulation
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.channels import component_names
 from origami_sim.fit.hypothesis import Hypothesis, Subject, apply, suspects
@@ -29,6 +30,8 @@ class Worlds(ABC):
         subject: how to build the model. recordings: of one object. threads: see `Batch`.
     """
 
+    nudge, prescribed = 0.01, False
+
     def __init__(self, subject: Subject, recordings: Sequence[Recording], threads: int | None = None):
         self.subject, self.recordings, self.threads = subject, list(recordings), threads
         self.values = {f.name: f.start for f in subject.nominals}
@@ -41,6 +44,7 @@ class Worlds(ABC):
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
         self.blocks: list[Block] = []
+        self._drives: list[Drive] = []
 
     def _program(self) -> tuple[str, ...]:
         """The effects of the program that all hypotheses share: compiling one for each took longer than running."""
@@ -78,12 +82,28 @@ class Worlds(ABC):
 
         return made() if self.cache is None else self.cache.recalled(self, each, theta, local, wanted, made)
 
+    def kind(self) -> tuple:
+        """What kind of prediction it is, for a digest."""
+        return (type(self).__name__, getattr(self, "start", ""), getattr(self, "calm", 0.0))
+
+    def inputs(self) -> Iterator[np.ndarray | bytes | None]:
+        """All of the recordings that a prediction depends on, for a digest."""
+        for recording, drive in zip(self.recordings, self._drives, strict=True):
+            yield recording.times
+            yield repr((recording.gravity, recording.start)).encode()
+            for c in recording.channels.values():
+                yield repr((c.name, c.kind, c.noise, c.values.shape, sorted(c.attachment.items()), c.camera)).encode()
+                yield c.values
+            for name, signal in drive.signals.items():
+                yield name.encode()
+                yield from (None if v is None else np.asarray(v, float) for v in vars(signal).values())
+
     @abstractmethod
     def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
         """What `shoot` predicts, if it is not remembered."""
 
     def worlds_of(self, each: Sequence[Hypothesis], theta, effects: Sequence[str], r: int):
-        """A world for each hypothesis, weighed as in a recording, and which of them stand for no model that can be built."""
+        """A world for each hypothesis, weighed as in a recording, and those of which no model can be built."""
         worlds, impossible, gravity = [], [], self.recordings[r].gravity
         for k, (h, t) in enumerate(zip(each, theta, strict=True)):
             try:

@@ -341,6 +341,12 @@ class Batch:
         m = self.model
         return self._download(self._x, len(m.position)), self._download(self._angles, len(m.creases) + len(m.bends))
 
+    def memory(self) -> np.ndarray:
+        """[M, W] what laws remember."""
+        m = self.model
+        rows = sum(d.size * m.count(get(e).family) for e in m.laws for d in get(e).memory)
+        return self._download(self._memory, rows)
+
     def status(self) -> np.ndarray:
         """[W] the step at which a world went unstable; -1: none."""
         return self._download(self._status, 2)[0]

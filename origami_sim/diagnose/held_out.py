@@ -1,0 +1,96 @@
+"""Held-out error: of each stretch of the data, with numbers that all others tell."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.linear import Weights
+from origami_sim.fit.predictor import Predictor
+from origami_sim.recording import Recording
+
+FOLDS = 5
+"""Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
+
+LEVEL = 0.02
+"""Relative difference up to which two drives are of one level."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """How well a fit predicts what it was not fitted to.
+
+    Attributes:
+        rms: (D,) root mean square of the residual [SI]. folds: [F] mean squares over the noise, by fold.
+    """
+
+    rms: np.ndarray
+    folds: np.ndarray
+
+
+def held_out(forward: Predictor, f: Fit, weights: Weights) -> HeldOut:
+    """Errors with numbers from all other folds, by one Gauss-Newton step from the full fit; starts are adapted."""
+    line = f.linear
+    assert line is not None
+    dims = len(weights.deviation)
+    width = line.tangent[0].shape[1]
+    cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
+    scale = np.array([n.scale for n in f.free])
+    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+    away = prior * ((np.array([n.start for n in f.free]) - f.theta) / scale)
+    low = (np.array([n.lower for n in f.free]) - f.theta) / scale
+    high = (np.array([n.upper for n in f.free]) - f.theta) / scale
+    squares, seen, folds_ = np.zeros(dims), np.zeros(dims), []
+    for part in folds(forward, f.blocks):
+        step = np.zeros(width)
+        if width:
+            rows = [cleared[n] for n in range(len(cleared)) if n not in part]
+            a = np.concatenate([*(r[:, :-1] for r in rows), np.diag(prior)])
+            y = np.concatenate([*(r[:, -1] for r in rows), away])
+            a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
+            y = np.concatenate([y, np.zeros(width)])
+            q, r = np.linalg.qr(a)
+            step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+        left = line.smoothed([r - t @ step for r, t in zip(line.residual, line.tangent, strict=True)])
+        own, count = np.zeros(dims), np.zeros(dims)
+        for n in part:
+            block = forward.blocks[f.blocks[n]]
+            r = left[n][line.data(n)].reshape(-1, dims) * weights.deviation / np.sqrt(weights.part)
+            own += np.sum(np.where(block.seen(), r, 0.0) ** 2, axis=0)
+            count += block.seen().sum(axis=0)
+        folds_.append(float(np.mean(own / np.maximum(count, 1) / forward.blocks[0].noise ** 2)))
+        squares, seen = squares + own, seen + count
+    return HeldOut(np.sqrt(squares / np.maximum(seen, 1)), np.array(folds_))
+
+
+def folds(forward: Predictor, blocks: Sequence[int]) -> list[list[int]]:
+    """Positions (within `blocks`) of each fold: whole recordings, or contiguous stretches of a single one.
+
+    Recordings of one drive level are left out together, if there are others: repeats tell what they are to predict.
+    """
+    recordings = [forward.blocks[b].recording for b in blocks]
+    distinct = sorted(set(recordings))
+    if len(distinct) == 1:
+        return [list(map(int, part)) for part in np.array_split(np.arange(len(blocks)), min(FOLDS, len(blocks)))]
+    levels: list[list[int]] = []
+    for d in distinct:
+        own = forward.recordings[d]
+        near = next((e for e in levels if same_level(forward.recordings[e[0]], own)), None)
+        if near is None:
+            levels.append([d])
+        else:
+            near.append(d)
+    apart = levels if len(levels) > 1 else [[d] for d in distinct]
+    return [[n for n, r in enumerate(recordings) if r in level] for level in apart]
+
+
+def same_level(a: Recording, b: Recording) -> bool:
+    """Whether two recordings have the same drives, each as strong (within `LEVEL`); without a drive, never."""
+
+    def size(r: Recording) -> dict[str, float]:
+        return {n: float(np.abs(c.values).max(initial=0.0)) for n, c in r.drive.items()}
+
+    one, other = size(a), size(b)
+    return bool(one) and one.keys() == other.keys() and all(np.isclose(one[n], other[n], LEVEL, 0.0) for n in one)

@@ -1,0 +1,80 @@
+"""Words for what a diagnosis found."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from origami_sim.effects import get
+from origami_sim.fit.least_squares import Fit
+from origami_sim.recording.units import quantity
+
+
+def kind(f: Fit) -> str:
+    """nominal, mechanism or measurement."""
+    kinds = {s.kind for s in f.hypothesis.suspects}
+    if not kinds:
+        return "nominal"
+    return "measurement" if kinds == {"measurement"} else "mechanism"
+
+
+def pooled(errors: np.ndarray) -> float:
+    """Root mean square of what components miss, in multiples of their noise (D,)."""
+    return float(np.sqrt(np.nanmean(np.square(errors))))
+
+
+def effects_of(f: Fit) -> tuple[str, ...]:
+    return tuple(sorted(s.effect for s in f.hypothesis.suspects))
+
+
+def labels_of(f: Fit) -> set[str]:
+    return {s.label for s in f.hypothesis.suspects}
+
+
+def distinct(fits: Sequence[Fit]) -> list[str]:
+    return list(dict.fromkeys(f.hypothesis.label for f in fits))
+
+
+def say(f: Fit, *, sites: bool = True) -> str:
+    """The effects of a fit with their sites, if asked, strengths and intervals."""
+    out = []
+    deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
+    value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    for s in f.hypothesis.suspects:
+        n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
+        t, d = value[id(n)], deviation[id(n)]
+        digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
+        low, high = (said(v, n.unit, digits) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
+        what = title(s.effect)
+        if s.more:
+            what = f"{'more' if t > 0 else 'less'} {what} than stated"
+        strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
+        where = f" at {s.site}" if sites else ""
+        out.append(f"{what}{where} ({strength}, 95 %: {low} to {high})")
+    return joined(out)
+
+
+def elsewhere(f: Fit) -> str:
+    """A single effect somewhere else, in words."""
+    s = f.hypothesis.suspects[0]
+    change = f.theta[len(f.free) - len(s.free)] - s.free[0].start
+    return f"{'more' if change > 0 else 'less'} at {s.site}" if s.more else f"the same at {s.site}"
+
+
+def said(value: float, unit: str, digits: int = 3) -> str:
+    """A number with its unit; a plain factor has none."""
+    return f"{value:.{digits}g}" if unit in ("-", "1", "") else quantity(value, unit, digits=digits)
+
+
+def title(effect: str) -> str:
+    """The first words of an effect's file: its name as a physicist would say it."""
+    import importlib
+
+    e = get(effect)
+    text = importlib.import_module(f"origami_sim.effects.{e.name}").__doc__ or e.name
+    text = text.strip().splitlines()[0].split(":")[0].rstrip(".")
+    first = text.split()[0]
+    return text if len(first) > 1 and first.isupper() else text[0].lower() + text[1:]
+
+
+def joined(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
