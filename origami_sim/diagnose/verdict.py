@@ -113,7 +113,7 @@ def _nothing_named(forward, given, base, p, shares, rest, discrepancy, chance, c
         return Judgement("UNTESTABLE", text, chance, [], base)
     off = [m for m, v in zip(base.free, base.theta, strict=True) if abs(v - m.start) > m.spread]
     if odds_of_numbers(given, base) <= 0.0 or not off:
-        text = f"The model is adequate: with numbers within what is known of them its error is {over:.2f} times the noise."
+        text = f"The model is adequate: within what is known of its numbers, its error is {over:.2f} times the noise."
         return Judgement("ADEQUATE", text, chance, [], base)
     far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
     f, t = far[0]
