@@ -67,7 +67,7 @@ def mistaken_axes(recording: Recording, predicted: Mapping[str, np.ndarray]) -> 
     camera share one; every angle, force and displacement has its own. Of several that explain the readings equally well
     (a motion along one axis) the one with the fewest changes counts.
 
-    A motion that is nearly its own mirror image and a model that is in opposite phase throughout cannot be told from it.
+    A motion that is nearly its own mirror image, and a model in opposite phase throughout, cannot be told from it.
 
     Args:
         predicted: what the model as given would have read, by channel name, each of the shape of the channel's values
