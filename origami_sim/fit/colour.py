@@ -1,7 +1,8 @@
 """Colours that the noise of a tracker can have: power spectra of what filters, averages and rounds do to white noise.
 
 Every family is a set of spectra over a grid of its parameters, in units of the sampling frequency and of unit variance.
-Together they are the prior of the noise's colour: families are equally likely, and so are the points of a grid.
+Together they are the prior of the noise's colour: half of it is white, and filters of all families are equally likely,
+as are the points of a grid.
 """
 
 from collections.abc import Callable
@@ -18,6 +19,10 @@ MEMORY = 40
 Half of it excludes a first-order filter with a time constant above 4 frames, double of it lets noise imitate what a
 slow motion of 40 frames leaves in a residual.
 """
+
+WHITE = 0.5
+"""Probability of white noise: encoders, and cameras whose markers are found picture by picture. It decides where the
+motion leaves few frequencies; with a tenth, as of every other family, these are coloured twice as often by mistake."""
 
 CELLS = 9
 """Points of a refined grid along each parameter; half leaves a level that is known to 1 % only to 1.5 %."""
@@ -162,7 +167,8 @@ def all_colours(count: int) -> Colours:
     """Every family on its whole grid, with spectra at `count` frequencies."""
     out = None
     for n, family in enumerate(FAMILIES):
-        new = made(n, list(product(*family.axes)), 1 / len(FAMILIES), count)
+        mass = (1 - WHITE) / (len(FAMILIES) - 1) if family.axes else WHITE
+        new = made(n, list(product(*family.axes)), mass, count)
         out = new if out is None else out.joined(new, np.ones(len(out.prior), bool))
     assert out is not None
     return out

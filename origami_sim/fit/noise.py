@@ -15,7 +15,7 @@ from scipy.interpolate import make_lsq_spline
 from scipy.linalg import cholesky_banded, lapack
 from scipy.signal.windows import dpss
 from scipy.special import gammaln, logsumexp
-from scipy.stats import chi2
+from scipy.stats import chi2, gamma
 
 from origami_sim.errors import InputError
 from origami_sim.fit.colour import Colours, all_colours, refined
@@ -28,19 +28,17 @@ STATED = float(np.log(1.5))
 Some hundred frames outweigh it; half or double of it matters for shorter recordings only.
 """
 
-TAPER = 5.0
-"""Time-bandwidth product of the taper: what a motion leaks to other frequencies is 1e-6 of its amplitude or less.
+TAPERS = {256: 5.0, 128: 5.0, 64: 4.0, 32: 3.0}
+"""Length of the segments whose spectra are averaged [frames]: time-bandwidth product of their taper.
 
-With 4 it is 1e-5, above the noise of a good encoder; 6 widens every line by a fifth.
+The longest that most of the recording can be cut into; half of 256 resolves motion and noise half as well, double of it
+gains nothing for noise that forgets within 40 frames. With 5 a motion leaks 1e-6 of its amplitude to other frequencies,
+with 4 it is 1e-5, above the noise of a good encoder; 6 widens every line by a fifth. In short ones motions are slow.
 """
 
 ORDER = 2
 """Order of the differences that are taken before, which lower slow motions further. With 4 the noise's own power at
 high frequencies leaks down to the low ones."""
-
-LENGTHS = (256, 128, 64, 32)
-"""Frames of the segments whose spectra are averaged: the longest that most of the recording can be cut into. Half of
-256 resolves motion and noise half as well, double of it gains nothing for noise that forgets within 40 frames."""
 
 HIGHEST = 0.3
 """Cycles per frame above which there is noise alone in any case. A motion that is recorded with fewer than 3.3 frames
@@ -57,9 +55,9 @@ Shorter events (an impact, a snap) are the object's. A median of three exceeds 4
 in one recording of 3000 out of three; with 4 frames impacts would be bursts.
 """
 
-LOUD = 2.5
-"""Segments with so many times the median's power at the highest frequencies are left out. One of 32 frames of noise
-alone has that once in a hundred, one of 256 never; with 5 an impact may count for half of the noise."""
+RARE = 1e-4
+"""Segments with a power, in any octave, that noise as in the median segment has more rarely than this are left out: an
+impact passed through. At 1e-2 noise itself is trimmed, at 1e-8 an impact of ten times the noise stays in."""
 
 RESOLVED = 1e-6
 """Power, relative to the largest of the noise, below which a colour is not followed: a thousandth of the amplitude,
@@ -259,7 +257,7 @@ def infer(
     if found is None:  # too few frames for a spectrum
         seen = np.isfinite(values)
         level = estimate_noise(times[seen], values[seen])
-        doubt = 1.0 / np.sqrt(2.0 * max(np.count_nonzero(seen) - ORDER, 1))
+        doubt = np.sqrt(4.6 / max(np.count_nonzero(seen) - 6, 1))  # of a median of correlated differences
         if stated is not None:
             level, doubt = _with_prior(level, doubt, stated) if level > least else (stated, STATED)
         found = _Found(level, doubt, np.ones(1), "white", HIGHEST if fastest is None else fastest * frame)
@@ -364,10 +362,10 @@ def _segments(number: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:
     whole = np.isfinite(values)
     cuts = np.flatnonzero((np.diff(number) > 1) | (np.diff(whole.astype(int)) != 0)) + 1
     runs = [r for r in np.split(np.arange(len(values)), cuts) if len(r) and whole[r[0]]]
-    for length in LENGTHS:
+    for length in TAPERS:
         size = length + ORDER
         usable = [r for r in runs if len(r) >= size]
-        if sum(map(len, usable)) >= 0.7 * np.count_nonzero(whole) or (length == LENGTHS[-1] and usable):
+        if sum(map(len, usable)) >= 0.7 * np.count_nonzero(whole) or (length == min(TAPERS) and usable):
             out = []
             for r in usable:
                 count = 1 + max(int(np.ceil((len(r) - size) / (length / 2))), 0)
@@ -380,7 +378,7 @@ def _segments(number: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:
 @lru_cache(maxsize=8)
 def _kernel(length: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Taper (L,), how power at G frequencies shows in the bins of a spectrum [L/2 + 1, G], width of a line in bins."""
-    taper = np.asarray(dpss(length, TAPER))
+    taper = np.asarray(dpss(length, TAPERS[length]))
     taper = taper / np.sqrt(np.sum(taper**2))
     fold = 2 * GRID // length
     seen = np.abs(np.fft.fft(taper, 2 * GRID)) ** 2 / (2 * GRID)
@@ -410,51 +408,74 @@ def _spectral(number: np.ndarray, values: np.ndarray, stated: float | None, slow
     taper, matrix, width = _kernel(length)
     rough = np.diff(segments, ORDER, axis=1) * taper
     spectra = np.abs(np.fft.rfft(rough, axis=1)) ** 2
-    top = spectra[:, int(HIGHEST * length) :].mean(axis=1)
-    spectra = spectra[top <= LOUD * np.median(top)]
-    power = spectra.mean(axis=0)[1:-1]
     flat = matrix[1:-1].sum(axis=1)  # what white noise would show
+    spectra = spectra[_usual(spectra[:, 1:-1] / flat, int(TAPERS[length]), width)]
+    power = spectra.mean(axis=0)[1:-1]
     high = slice(int(HIGHEST * length), None)
     power = power + RESOLVED * flat * np.max((power / flat)[high])
     if not np.all(power > 0):
         return None
-    # overlapping segments count as they are, neighbouring bins as far as the taper tells them apart
-    weight = len(spectra) / width
+    data = _Spectrum(power, matrix[1:-1], len(spectra), width, length)
     colours = all_colours(GRID + 1)
-    log, square, edges = _posterior(colours, power, matrix[1:-1], weight, stated, slowest, length)
+    log, square, edges = _posterior(colours, data, stated, slowest)
     for finer in range(REFINED):
-        best = logsumexp(log, axis=1)
-        colours = refined(colours, int(np.argmax(best)), GRID + 1, finer)
-        log, square, edges = _posterior(colours, power, matrix[1:-1], weight, stated, slowest, length)
-    return _summed(colours, log, square, edges, weight, length, stated)
+        colours = refined(colours, int(np.argmax(logsumexp(log, axis=1))), GRID + 1, finer)
+        log, square, edges = _posterior(colours, data, stated, slowest)
+    return _summed(colours, log, square, edges, data, stated)
+
+
+def _usual(spectra: np.ndarray, first: int, width: float) -> np.ndarray:
+    """Which of the segments [K, B] have no more power than chance gives them in any octave from bin `first` on."""
+    out = np.ones(len(spectra), bool)
+    while first < spectra.shape[1]:
+        octave = spectra[:, first : 2 * first].mean(axis=1)
+        dof = len(spectra[0, first : 2 * first]) / width
+        out &= octave <= np.median(octave) * gamma.isf(RARE, dof) / gamma.median(dof)
+        first *= 2
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """An averaged spectrum of differences.
+
+    Attributes:
+        power: [B] of the bins between frequency 0 and the highest. matrix: [B, G] how a spectrum shows in it.
+        count: segments that were averaged; those that overlap by half count as they are.
+        width: bins that the taper does not tell apart: all bins together are worth B / width.
+        length: frames of a segment.
+    """
+
+    power: np.ndarray
+    matrix: np.ndarray
+    count: int
+    width: float
+    length: int
 
 
 def _posterior(
-    colours: Colours,
-    power: np.ndarray,
-    matrix: np.ndarray,
-    weight: float,
-    stated: float | None,
-    slowest: float | None,
-    length: int,
+    colours: Colours, data: _Spectrum, stated: float | None, slowest: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Log probability [J, C] of each colour with noise alone from each of C bins on, its variance, and the bins."""
-    expected = colours.power @ matrix.T  # [J, bins]
+    power, count, length = data.power, data.count, data.length
+    expected = colours.power @ data.matrix.T  # [J, bins]
     bins = 1 + np.arange(len(power))
-    lowest = 1 if slowest is None else int(np.ceil(min(slowest, HIGHEST) * length))
-    edges = bins[(bins >= lowest) & (bins <= int(HIGHEST * length))]
+    # the taper mixes what lies nearer to frequency 0 with the slowest motion, which no segment resolves
+    lowest = max(int(TAPERS[length]) + 1, int(np.ceil((slowest or 0.0) * length)))
+    highest = int(HIGHEST * length)
+    edges = bins[(bins >= min(lowest, highest)) & (bins <= highest)]
 
     def above(a: np.ndarray) -> np.ndarray:
         """Sums over the bins from each edge on."""
         return np.cumsum(a[..., ::-1], axis=-1)[..., ::-1][..., edges - 1]
 
-    count = above(np.ones(len(power)))
-    square = above(power / expected) / count
-    total = weight * count
-    log = -weight * above(np.log(expected)) - total * np.log(square) - total
-    log = log + above((weight - 1) * np.log(power) + weight * np.log(weight) - gammaln(weight))
+    known = above(np.ones(len(power)))
+    square = above(power / expected) / known
+    log = -count * (above(np.log(expected)) + known * (np.log(square) + 1))
+    log = log + above((count - 1) * np.log(power) + count * np.log(count) - gammaln(count))
     free = -np.log(power) - FREE
-    log = log + np.sum(free) - above(free)
+    log = (log + np.sum(free) - above(free)) / data.width
+    total = count * known / data.width
     doubt = 0.5 / np.sqrt(total)  # of the logarithm of the deviation
     if stated is None:
         log = log + np.log(np.sqrt(2 * np.pi) * 2 * doubt) - FREE
@@ -469,27 +490,26 @@ def _summed(
     log: np.ndarray,
     square: np.ndarray,
     edges: np.ndarray,
-    weight: float,
-    length: int,
+    data: _Spectrum,
     stated: float | None,
 ) -> _Found:
     """Mean of level and correlation over the posterior."""
     p = np.exp(log - logsumexp(log))
-    doubt = 0.5 / np.sqrt(weight * (length // 2 - edges))
+    doubt = 0.5 / np.sqrt(data.count * (data.length // 2 - edges) / data.width)
     level = np.sqrt(square)
     if stated is not None:
         share = STATED**2 / (STATED**2 + doubt**2)
         level, doubt = np.exp(share * np.log(level) + (1 - share) * np.log(stated)), doubt * np.sqrt(share)
-    covariance = colours.correlation((p * level**2).sum(axis=1), GRID)
-    deviation = float(np.sqrt(covariance[0]))
+    deviation = float(np.exp((p * np.log(level)).sum()))
     spread = (p * (np.log(level / deviation) ** 2 + doubt**2)).sum()
-    colour = covariance / covariance[0]
+    colour = colours.correlation(p.sum(axis=1), GRID)
+    colour = colour / colour[0]
     last = int(np.flatnonzero(np.abs(colour) > NEGLIGIBLE)[-1])
     kinds = np.array([logsumexp(log[colours.family == n]) if np.any(colours.family == n) else -np.inf
                       for n in range(int(colours.family.max()) + 1)])  # fmt: skip
     mine = np.flatnonzero(colours.family == np.argmax(kinds))
     name = colours.name(int(mine[np.argmax(logsumexp(log[mine], axis=1))]))
-    edge = edges[int(np.argmax(p.sum(axis=0)))] / length
+    edge = edges[int(np.argmax(p.sum(axis=0)))] / data.length
     return _Found(deviation, float(np.sqrt(spread)), np.ascontiguousarray(colour[: last + 1]), name, float(edge))
 
 
