@@ -194,8 +194,8 @@ def refined(colours: Colours, j: int, count: int, finer: int = 0) -> Colours:
         else:
             spans.append(np.clip(at + part * np.array([low - at, high - at]), low, high))
     grids = [
-        np.geomspace(*s, CELLS) if a is SHARES else np.linspace(*s, CELLS)
-        for a, s in zip(family.axes[fixed:], spans, strict=True)
+        np.geomspace(low, high, CELLS) if axis is SHARES else np.linspace(low, high, CELLS)
+        for axis, (low, high) in zip(family.axes[fixed:], spans, strict=True)
     ]
     points = list(product(*[(c,) for c in centre[:fixed]], *(tuple(map(float, g)) for g in grids)))
     near = np.array([

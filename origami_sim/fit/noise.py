@@ -19,7 +19,7 @@ from scipy.stats import chi2, gamma
 
 from origami_sim.errors import InputError
 from origami_sim.fit.colour import Colours, all_colours, refined
-from origami_sim.recording import Recording, estimate_noise
+from origami_sim.recording import Channel, Recording, estimate_noise
 from origami_sim.recording.recording import quantisation, scaled_differences
 
 STATED = float(np.log(1.5))
@@ -119,10 +119,12 @@ class Noise:
         if seen.any():
             factor = _factor(self.colour.tobytes(), frames.tobytes())
             white[seen] = _solved(factor, columns[seen] / scale[:, None])
-            if self.systematic > 0:
+            if self.systematic > 0:  # (1 + U U')^(-1/2), by the eigenvectors of U' U
                 smooth = _solved(factor, self._smooth(times[seen]) / scale[:, None])
-                q, s, _ = np.linalg.svd(smooth, full_matrices=False)
-                white[seen] -= q @ ((1 - 1 / np.sqrt(1 + s**2))[:, None] * (q.T @ white[seen]))
+                power, axes = np.linalg.eigh(smooth.T @ smooth)
+                power = np.maximum(power, 1e-12)
+                shrink = (1 - 1 / np.sqrt(1 + power)) / power
+                white[seen] -= smooth @ (axes @ (shrink[:, None] * (axes.T @ (smooth.T @ white[seen]))))
         return white.reshape(np.shape(values))
 
     def draw(self, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -189,7 +191,7 @@ def noise_of(
     recording: Recording,
     residuals: Mapping[str, np.ndarray] | None = None,
     *,
-    stated: Mapping[str, float] | None = None,
+    stated: Mapping[str, float | None] | None = None,
     systematic: Mapping[str, float] | None = None,
     fastest: float | None = None,
 ) -> dict[str, tuple[Noise, ...]]:
@@ -197,7 +199,9 @@ def noise_of(
 
     Args:
         residuals: what a model leaves of channels, in the shape of their values [SI]; the readings of others are used.
-        stated: noise [SI] that is known by channel, as a prior. systematic: deviation [SI] of smooth errors, likewise.
+        stated: noise [SI] that is known by channel, as a prior; None: nothing is. By default it is what the recording
+            states, and where it states nothing, nothing.
+        systematic: deviation [SI] of smooth errors by channel.
         fastest: frequency [Hz] up to which the object can move; what lies below is not taken for noise.
     """
     out = {}
@@ -208,13 +212,20 @@ def noise_of(
                 recording.times,
                 column,
                 readings=read,
-                stated=(stated or {}).get(name),
+                stated=stated[name] if stated and name in stated else _stated(channel),
                 systematic=(systematic or {}).get(name, 0.0),
                 fastest=fastest,
             )
             for column, read in zip(_columns(values), _columns(channel.values), strict=True)
         )
     return out
+
+
+def _stated(channel: Channel) -> float | None:
+    """The noise that a channel states; None where it is what the reading estimated."""
+    report = channel.noise_report
+    given = channel.noise > 0 and (report is None or channel.noise != report.level)
+    return channel.noise if given else None
 
 
 def _columns(values: np.ndarray) -> np.ndarray:
@@ -239,7 +250,7 @@ def infer(
         fastest: frequency [Hz] up to which the object can move; None: inferred.
 
     Raises:
-        InputError: no two readings, a stated noise or a systematic one that is no such number.
+        InputError: no two readings, times that do not increase, a noise or a systematic error that is no such number.
     """
     values, times = np.asarray(values, float), np.asarray(times, float)
     if np.count_nonzero(np.isfinite(values)) < 2:
@@ -248,6 +259,8 @@ def infer(
         raise InputError("a noise is positive", field="stated", value=stated, allowed="> 0")
     if not (np.isfinite(systematic) and systematic >= 0):
         raise InputError("a systematic error is not negative", field="systematic", value=systematic, allowed=">= 0")
+    if times.shape != values.shape or not np.all(np.diff(times) > 0):
+        raise InputError("noise needs one reading at each of increasing times", field="times", value=times.shape)
     frame = float(np.median(np.diff(times)))
     quantum = quantisation(values if readings is None else np.asarray(readings, float))
     bursts, events = _bursts(times, values)
@@ -325,8 +338,8 @@ def _bursts(times: np.ndarray, values: np.ndarray) -> tuple[tuple[Burst, ...], n
         return (), events
     rough = np.full(n - width + 1, np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(values, width)
-    whole = np.isfinite(windows).all(axis=1)
-    for k in np.flatnonzero(np.diff(np.r_[False, whole].astype(int)) == 1):
+    whole = np.asarray(np.isfinite(windows).all(axis=1))
+    for k in np.flatnonzero(np.logical_and(whole, np.append(True, ~whole[:-1]))):
         end = k + int(np.argmin(np.r_[whole[k:], False]))
         part = scaled_differences(times[k : end + width - 1], values[k : end + width - 1])
         if len(part) == end - k:
@@ -342,12 +355,13 @@ def _bursts(times: np.ndarray, values: np.ndarray) -> tuple[tuple[Burst, ...], n
     usual = float(np.median(local(WINDOW)[known])) if known.any() else 0.0
     if not usual > 0:
         return (), events
-    near = np.convolve(local(WINDOW) > LIVELY**2 * usual, np.ones(WINDOW), "same") > 0.5
-    loud = near & (local(width) > LIVELY * usual)
+    near = np.convolve(local(WINDOW) > LIVELY**2 * usual, np.ones(WINDOW), "same")
+    loud = np.logical_and(near > 0.5, local(width) > LIVELY * usual)
     quiet = float(np.mean(power[known & ~loud]))
     found = []
     starts = np.flatnonzero(loud)
-    for group in np.split(starts, np.flatnonzero(np.diff(starts) > width) + 1) if len(starts) else ():
+    cuts = np.flatnonzero(np.diff(starts) > width) + 1
+    for group in np.split(starts, cuts) if len(starts) else ():
         first, last = int(group[0]), int(group[-1]) + width - 1
         events[first : last + 1] = True
         inner_first, inner_last = first + width // 2, last - width // 2
@@ -365,7 +379,7 @@ def _segments(number: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:
     for length in TAPERS:
         size = length + ORDER
         usable = [r for r in runs if len(r) >= size]
-        if sum(map(len, usable)) >= 0.7 * np.count_nonzero(whole) or (length == min(TAPERS) and usable):
+        if usable and (length == min(TAPERS) or sum(map(len, usable)) >= 0.7 * np.count_nonzero(whole)):
             out = []
             for r in usable:
                 count = 1 + max(int(np.ceil((len(r) - size) / (length / 2))), 0)
@@ -421,6 +435,9 @@ def _spectral(number: np.ndarray, values: np.ndarray, stated: float | None, slow
     for finer in range(REFINED):
         colours = refined(colours, int(np.argmax(logsumexp(log, axis=1))), GRID + 1, finer)
         log, square, edges = _posterior(colours, data, stated, slowest)
+    # the foot of a motion's line in the first bin above it would pass for a colour; in the next it is 15 dB lower
+    edge = int(edges[np.argmax(logsumexp(log, axis=0))]) + 1
+    log, square, edges = _posterior(colours, data, stated, edge / length, only=True)
     return _summed(colours, log, square, edges, data, stated)
 
 
@@ -454,16 +471,20 @@ class _Spectrum:
 
 
 def _posterior(
-    colours: Colours, data: _Spectrum, stated: float | None, slowest: float | None
+    colours: Colours, data: _Spectrum, stated: float | None, slowest: float | None, *, only: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Log probability [J, C] of each colour with noise alone from each of C bins on, its variance, and the bins."""
+    """Log probability [J, C] of each colour with noise alone from each of C bins on, its variance, and the bins.
+
+    Args:
+        slowest: frequency of the first of these bins [cycles per frame]. only: it is the only one.
+    """
     power, count, length = data.power, data.count, data.length
     expected = colours.power @ data.matrix.T  # [J, bins]
     bins = 1 + np.arange(len(power))
     # the taper mixes what lies nearer to frequency 0 with the slowest motion, which no segment resolves
     lowest = max(int(TAPERS[length]) + 1, int(np.ceil((slowest or 0.0) * length)))
     highest = int(HIGHEST * length)
-    edges = bins[(bins >= min(lowest, highest)) & (bins <= highest)]
+    edges = bins[(bins >= min(lowest, highest)) & (bins <= highest)][: 1 if only else None]
 
     def above(a: np.ndarray) -> np.ndarray:
         """Sums over the bins from each edge on."""
