@@ -364,7 +364,7 @@ def _calibrate(args) -> int:
 
 
 def _study(args) -> int:
-    module = import_module("origami_sim.study" if args.scene == "crawler" else "origami_sim.parameter_study")
+    module = import_module(f"origami_sim.studies.{'crawler_maps' if args.scene == 'crawler' else 'bifold_tables'}")
     report = module.run(args, functools.partial(print, file=sys.stderr if args.json else sys.stdout))
     if args.json:
         _print_json(report)
@@ -406,18 +406,18 @@ def _effects(args) -> int:
 
 
 def _stride(args) -> int:
-    from origami_sim import regression
+    from origami_sim.gait import strides
     from origami_sim.scene import scene_module, scene_settings
 
-    module = scene_module(args.scene)
+    stored, module = import_module("origami_sim.studies.strides"), scene_module(args.scene)
     if not hasattr(module, "walk"):
         raise InputError("this scene does not walk", field="scene", value=args.scene, allowed="crawler")
     settings = scene_settings(module)
     if args.cycles is not None and args.cycles < 1:
         raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
-    cycles = args.cycles or len(regression.reference(args.scene)["strides_mm"])
+    cycles = args.cycles or len(stored.reference(args.scene)["strides_mm"])
     motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
-    report = regression.check(args.scene, regression.strides(motion, settings.frequency), settings=settings)
+    report = stored.check(args.scene, strides(motion, settings.frequency), settings=settings)
     _print_json(report.to_json()) if args.json else print(report.text())
     return OK if report.passed else NO
 

@@ -329,6 +329,22 @@ def _carry(model: Model, x: np.ndarray) -> None:
         x[mine] = np.einsum("wab,nb->nwa", u @ vt, model.position[mine] - middle) + now
 
 
+def node_mass(model: Model, parameters: Parameters) -> np.ndarray:
+    """Mass that moves at every node [kg], [N, 1] or [N, worlds]: the stated one and what effects add to it.
+
+    Raises:
+        InputError: effects that take away all of a node's mass.
+    """
+    stated = parameters["inertia", "mass"]
+    out = stated
+    for effect in map(get, model.laws):
+        if effect.inertia is not None:
+            out = out + effect.inertia({"mass": stated, **parameters.of(effect.name)})
+    if np.any((out <= 0) & (stated > 0)):
+        raise InputError("effects take away all of a node's mass", field="mass", value=float(out.min()), allowed="> 0")
+    return out
+
+
 def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:
     """Magnet of each triangle [T] by the parameters of an effect, -1 for none in any world.
 

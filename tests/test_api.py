@@ -78,7 +78,7 @@ def test_every_folder_is_installed():
     folder = root / "origami_sim"
     found = (p.parent.relative_to(folder).parts for p in folder.glob("*/**/__init__.py"))
     inside = {".".join(("origami_sim", *parts)) for parts in found}
-    assert set(listed) == {"origami_sim", "origami_sim.scenes", "origami_sim.calibrations"} | inside
+    assert set(listed) == {"origami_sim", *(f"origami_sim.{n}" for n in ("scenes", "calibrations", "studies"))} | inside
 
 
 HEAVY = ("warp", "numpy", "scipy", "rerun", "matplotlib", "pyarrow", "trimesh")

@@ -25,6 +25,7 @@ FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
 
 FIXED_SLOTS = (
     ("inertia", "mass"),
+    ("inertia", "total"),
     ("plane", "tilt"),
     ("plane", "azimuth"),
     ("plane", "height"),
@@ -542,7 +543,7 @@ class _Composer(Sheets):
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
-        mass = self.value("inertia", "mass", "n")
+        mass = self.value("inertia", "total", "n")
         return {
             "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass),
             "rigid": templates.RIGID.format(**given, body=self.body("rigid")),

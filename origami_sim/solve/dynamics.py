@@ -10,7 +10,7 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
@@ -82,7 +82,7 @@ class Trajectory:
 
     def centre_of_mass(self) -> np.ndarray:
         """[F, W, 3] [m]."""
-        m = self.parameters["inertia", "mass"][None, :, :, None]
+        m = node_mass(self.model, self.parameters)[None, :, :, None]
         return (m * self.x).sum(1) / m.sum(1)
 
     def energy_balance(self) -> np.ndarray:

@@ -20,7 +20,7 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.settling import Settling, levels, settling
@@ -356,7 +356,7 @@ def _left_out(run: QuasiStatic, march: March, states: list[State]) -> list[str]:
     largest, worst = 0.0, {}
     dt = np.diff(run.times)
     rates = np.diff(run.x, axis=0) / dt[:, None, None, None]
-    mass = np.broadcast_to(run.parameters["inertia", "mass"], (run.x.shape[1], worlds))
+    mass = np.broadcast_to(node_mass(run.model, run.parameters), (run.x.shape[1], worlds))
     for f in range(1, len(run.times)):
         if f in jumped:
             continue

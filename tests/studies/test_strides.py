@@ -4,9 +4,21 @@ import numpy as np
 import pytest
 
 from origami_sim.errors import InputError
-from origami_sim.regression import check, reference, store, summary
+from origami_sim.gait import summary
 from origami_sim.scene import read_calibration
-from origami_sim.study import AXES, Result, Store, StrideMap, Trial, apply, candidates, judge, sampled, stack
+from origami_sim.studies.crawler_maps import (
+    AXES,
+    Result,
+    Store,
+    StrideMap,
+    Trial,
+    apply,
+    candidates,
+    judge,
+    sampled,
+    stack,
+)
+from origami_sim.studies.strides import check, reference, store
 
 STRIDES = [0.028, 0.024, 0.025, 0.0252, 0.025]
 

@@ -1,6 +1,6 @@
 """Parameter study of the bi-fold (Tables 5 and 6 of the seed paper): mass, energy and fold angle of all combinations.
 
-    python -m origami_sim.study bifold --out runs/study_bifold
+    origami-sim study bifold --out runs/study_bifold
 
 Every combination is a world of a batch; worlds of equal strip widths share one geometry and are stacked. Two readings
 stand side by side. "printed": E_UL of 250-1000 MPa, densities of 1 and 2 kg/m^3, strips of 6.5 and 4 mm on a sheet
@@ -31,7 +31,8 @@ from origami_sim.materials import EPS0, MU0
 from origami_sim.results import format_table
 from origami_sim.scene import Settings, scene_module, scene_settings
 from origami_sim.solve.statics import equilibrium
-from origami_sim.study import stack
+
+from .crawler_maps import stack
 
 READINGS = ("printed", "physical")
 SIDES = ("electric", "magnetic")

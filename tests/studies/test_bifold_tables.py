@@ -7,11 +7,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from origami_sim import cli
-from origami_sim import parameter_study as ps
 from origami_sim.drive import Drive
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import bifold
 from origami_sim.solve.statics import equilibrium
+from origami_sim.studies import bifold_tables as ps
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Stride per cycle: how a walker advances, cycle by cycle, and whether it still does what it did."""
+"""Whether a walker still does what it did: strides by cycle against a stored reference and the paper."""
 
 import hashlib
 import json
@@ -9,52 +9,13 @@ from importlib import metadata, resources
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
+from origami_sim.gait import summary
 from origami_sim.scene import Settings
-from origami_sim.solve.dynamics import Trajectory
 
 PAPER = 25.0
 """Stride that the seed paper reports for its crawler [mm per cycle]."""
-
-SKIP = 2
-"""Cycles before the gait counts as steady."""
-
-
-def strides(motion: Trajectory, frequency: float, *, world: int = 0) -> np.ndarray:
-    """Advance of the centre of mass along x in each whole cycle [m].
-
-    Raises:
-        InputError: fewer than one cycle, or frames that do not fall on whole cycles.
-    """
-    per_cycle = 1.0 / (frequency * (motion.times[1] - motion.times[0]))
-    n = round(per_cycle)
-    if n < 1 or abs(per_cycle - n) > 1e-6 * n:
-        raise InputError("frames do not fall on whole cycles", field="rate", value=per_cycle,
-                         allowed="a whole number of frames")  # fmt: skip
-    x = motion.centre_of_mass()[::n, world, 0]
-    if len(x) < 2:
-        raise InputError("the run is shorter than one cycle", field="duration", value=float(motion.times[-1]))
-    return np.diff(x)
-
-
-def summary(values: ArrayLike, *, skip: int = SKIP) -> dict[str, float]:
-    """Mean, spread (standard deviation) and trend of the cycles after the first `skip`, in the unit of `values`."""
-    each = np.asarray(values, float)
-    steady = each[skip:] if len(each) > skip + 1 else each
-    trend = float(np.polyfit(np.arange(len(steady)), steady, 1)[0]) if len(steady) > 1 else 0.0
-    return {"mean": float(steady.mean()), "spread": float(steady.std()), "trend": trend, "cycles": len(steady)}
-
-
-def stride_table(motion: Trajectory, frequency: float, *, skip: int = SKIP) -> tuple[dict, dict[str, float]]:
-    """Table by cycle, and mean, spread (standard deviation) and trend of the cycles after the first `skip` [mm]."""
-    each = strides(motion, frequency) * 1e3
-    s = summary(each, skip=skip)
-    numbers = {"stride_mm": s["mean"], "spread_mm": s["spread"], "trend_mm_per_cycle": s["trend"],
-               "cycles": float(s["cycles"])}  # fmt: skip
-    return {"cycle": np.arange(1, len(each) + 1), "stride_mm": each}, numbers
-
 
 def settings_hash(settings: Settings) -> str:
     """Digest of all values of a calibration."""
@@ -124,7 +85,7 @@ def reference(name: str, *, folder: Path | None = None) -> dict:
             raise ValueError
     except OSError:
         raise InputError(
-            "has no stored strides", file=path, allowed="store them with origami-sim regress --store"
+            "has no stored strides", file=path, allowed="store them with origami_sim.studies.strides.store"
         ) from None
     except (ValueError, KeyError, TypeError):
         raise InputError("is not a stored reference", file=path, allowed="strides_mm and tolerance_mm > 0") from None

@@ -1,7 +1,7 @@
 """Batch study of a walker over its unknowns: maps of stride, and a set that is steady, converged and robust.
 
-    python -m origami_sim.study crawler --out runs/study_crawler
-    python -m origami_sim.study crawler --out runs/study_crawler --fine --cycles 10 --device cuda:0
+    origami-sim study crawler --out runs/study_crawler
+    origami-sim study crawler --out runs/study_crawler --fine --cycles 10 --device cuda:0
 
 Four stages, each resumed where it was interrupted: maps over pairs of unknowns around the calibration; samples over
 all of them at once; a screening of the points that give the target with a steady gait, by 5 % of the most delicate
@@ -26,8 +26,8 @@ from scipy.stats import qmc
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
+from origami_sim.gait import strides
 from origami_sim.model import Model, Parameters
-from origami_sim.regression import strides
 from origami_sim.scene import Settings, scene_module, scene_settings
 from origami_sim.solve.batch import default_threads
 from origami_sim.solve.dynamics import simulate
@@ -167,7 +167,7 @@ class Store:
 @functools.cache
 def _version() -> str:
     """Version of the package and a digest of its laws and scenes: results of other laws must not be mixed in."""
-    package = Path(__file__).parent
+    package = Path(str(resources.files("origami_sim")))
     scenes = Path(str(resources.files("origami_sim.scenes")))
     digest = hashlib.sha256()
     files = [*package.glob("effects/*.py"), *package.glob("solve/*.py"), package / "build.py", *scenes.glob("*.py")]
@@ -533,9 +533,3 @@ def run(args: argparse.Namespace, say: Callable[[str], None] = print) -> dict:
     base = scene_settings(scene_module(args.scene), args.calibration).override(args.set, "--set")
     options = {n: getattr(args, n) for n in (*least, "fine", "device")}
     return study(args.scene, base, args.out, **options, say=say)
-
-
-if __name__ == "__main__":
-    from origami_sim.cli import main
-
-    main(["study", *sys.argv[1:]])
