@@ -11,6 +11,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_inside_the_ground
 from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
@@ -143,7 +144,8 @@ def simulate(
 
     Raises:
         InputError: duration or rate not positive, no such method, a step above the limit, a drive that ends early,
-            worlds that differ, no such accuracy; implicit: another device, spectral radius or tolerance out of bounds.
+            worlds that differ, no such accuracy, a start inside the ground; implicit: another device, spectral radius
+            or tolerance out of bounds.
     """
     options = {
         "duration": duration,
@@ -210,6 +212,7 @@ def _simulated(
             value=duration,
             allowed=f">= {frame_time:g} s at this rate",
         )
+    rests = state is None
     if state is None:
         worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
@@ -240,6 +243,8 @@ def _simulated(
     for i in range(frames + 1):
         batch.advance(substeps if i else 0, step, speed_limit)  # no steps: only the first force evaluation
         record.append((batch.state(), batch.evaluate(batch.step * step)))
+        if i == 0 and rests and "ground" in model.laws:
+            refuse_start_inside_the_ground(model, parameters, record[0][0].x, record[0][1].energies["ground"])
         if progress:
             progress(i / frames)
     wall = clock.perf_counter() - began
@@ -273,7 +278,11 @@ def _simulated(
         step=chosen,
         state=last,
         wall=wall,
-        notes=batch.notes() if isinstance(batch, Implicit) else [],
+        notes=[
+            *idle_drives(model, parameters, drive),
+            *below_the_ground(model, parameters, last.x),
+            *(batch.notes() if isinstance(batch, Implicit) else []),
+        ],
     )
     out.energy_error = energy_error(out)
     return out
