@@ -164,9 +164,9 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
             given = {n: _as(s[n].value, d, n, path) for n, d in defaults.items()}
             return _parts(build(**{**given, **options}))
 
-    def built(s: Settings, **options):
+    def whole(s: Settings, **options):
         try:
-            return _built(raw(s, **options), path)
+            return built(tuple(raw(s, **options)), path)
         except InputError as e:
             raise e if e.file is not None else InputError(str(e), file=path) from None
         except Exception as e:
@@ -189,7 +189,7 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
         lasts = {"duration": duration, "rate": rate}
         return motion_of(s, model, parameters, drive.replace(**stated), **lasts, progress=progress), s
 
-    out.raw, out.build = raw, extended(built)
+    out.raw, out.build = raw, extended(whole)
     out.run = own.get("run", run)
     out.replicate = own.get("replicate", replicate)
     for optional in ("draw", "walk", "SERIES"):
@@ -283,8 +283,13 @@ def _parts(given: Any) -> list:
     return parts
 
 
-def _built(parts: list, path: Path) -> tuple:
-    """Model, parameters, drive and whatever follows, of what a `build` returned."""
+def built(given: Any, path: str | Path) -> tuple:
+    """Model, parameters, drive and whatever follows, of what a `build` returned.
+
+    Raises:
+        InputError: naming the file, it returned something else.
+    """
+    parts = _parts(given)
     if parts and isinstance(parts[0], Sheet):
         parts[:1] = parts[0].build()
     right = len(parts) > 1 and isinstance(parts[0], Model) and isinstance(parts[1], Parameters)

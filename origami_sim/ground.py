@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
 from origami_sim.masses import Masses, positive
+from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
 from origami_sim.statements import statement
-from origami_sim.weight import G
 
 SINK = 1e-4
 """Depth to which a sheet's weight presses the whole of it into the ground, over the sheet's longest side.

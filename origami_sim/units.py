@@ -7,7 +7,7 @@ from origami_sim.errors import InputError
 UNITS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "rev": 2.0 * np.pi},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3},
     "moment": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
     "flux density": {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "G": 1e-4},

@@ -7,10 +7,10 @@ from origami_sim.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.ground import LANDING, SINK, gaps, heights
+from origami_sim.materials import G
 from origami_sim.model import State
 from origami_sim.pattern import grid, strip
 from origami_sim.solve.dynamics import simulate
-from origami_sim.weight import G
 
 MASS = 1010 * 1e-3 * 0.06 * 0.04
 
@@ -56,7 +56,7 @@ def test_a_landing_rebounds_as_stated(ratio):
     exact = np.exp(-ratio / omega * (np.pi - np.arctan2(2 * ratio * omega, omega**2 - ratio**2)))
     sheet = Sheet(grid(1, 1, 0.02, 0.02), thickness=1e-3, panels="rigid").ground(damping_ratio=ratio, sink="1 um")
     model, parameters = sheet.build()
-    start = State.at_rest(model, position=model.position + (0, 0, 2e-3))
+    start = State.at_rest(model, position=model.position + np.array([0, 0, 2e-3]))
     motion = simulate(model, parameters, duration=0.024, rate=10000, state=start)
     speed = motion.v[:, 0, 0, 2]
     assert speed.max() / -speed.min() == pytest.approx(exact, abs=0.02)
