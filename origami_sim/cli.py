@@ -7,7 +7,6 @@ went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier res
 import argparse
 import functools
 import json
-import math
 import os
 import sys
 import time
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from origami_sim import __version__
 from origami_sim.errors import InputError
+from origami_sim.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.recording import Recording
@@ -104,6 +104,16 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument("--out", metavar="PNG", help="the picture (default runs/show/DEVICE.png)")
     p.add_argument("--save", metavar="TOML", help="write the whole design as a file that run and show read")
+
+    example = "origami-sim sweep my_flap.py --vary gap=1mm,2mm"
+    sweeping = command("sweep", _sweep, "Vary settings of a device and tabulate what it does", example)
+    sweeping.add_argument("device", help="a scene, my_flap.py, package.module:build or my_flap.toml")
+    what = "gap=1mm,2mm,4mm or gap=1mm:4mm:7 (seven values from 1 to 4 mm); again for further settings"
+    sweeping.add_argument("--vary", action="append", default=[], required=True, metavar="NAME=VALUES", help=what)
+    sweeping.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    sweeping.add_argument("--equilibrium", action="store_true", help="where it comes to rest, instead of its motion")
+    sweeping.add_argument("--pareto", metavar="A,B", help="draw the front of two columns: mass_g,-largest_turn_deg")
+    sweeping.add_argument("--out", metavar="FOLDER", help="table, and what resumes it (default runs/sweep_DEVICE)")
 
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
     p.add_argument("run", help="run folder or .rrd file")
@@ -300,6 +310,12 @@ def _run(args) -> int:
     return _soundness(outcome.trajectory)
 
 
+def _sweep(args) -> int:
+    from origami_sim.explore import command
+
+    return command.run(args)
+
+
 def _replay(args) -> int:
     from origami_sim.replay import open_replay, screenshot
 
@@ -468,19 +484,6 @@ def _demo(args) -> int:
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
-
-
-def _print_json(value) -> None:
-    """One object on one line; what JSON lacks (infinity, nan) becomes null."""
-    print(json.dumps(_finite(value), allow_nan=False))
-
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:

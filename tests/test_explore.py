@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from origami_sim import cli
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
@@ -241,3 +242,61 @@ def test_sweep_on_a_cluster():
 def test_bad_sweeps(grid, measures, said):
     with pytest.raises(InputError, match=said):
         sweep(flap, grid, measures)
+
+
+# the command line ----------------------------------------------------------------------------------------------------
+
+DEVICE = """
+from origami_sim import Drive, Sheet, ramp, strip
+
+DURATION = "0.1 s"
+
+def build(gap="2 mm", field="50 mT", held=True):
+    sheet = Sheet(strip([0.01, gap + 0.018], 0.02), thickness="1 mm", triangulation="center")
+    sheet.patch(1, thickness="3 mm", size=("18 mm", "20 mm"), poling=(1, 0, 0)).name("crease", ["hinge"])
+    sheet.crease(stiffness="2 mN m/rad", loss_time="3 ms").gravity().fix(panels=[0])
+    return sheet, Drive(field=(0, 0, ramp(field, "20 ms")))
+"""
+
+
+@pytest.fixture
+def call(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_flap.py").write_text(DEVICE)
+
+    def run(*arguments) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as e:
+            cli.main([str(a) for a in arguments])
+        return e.value.code, *capfd.readouterr()
+
+    return run
+
+
+def test_sweep_from_the_command_line(call, tmp_path):
+    line = ("sweep", "my_flap.py", "--vary", "gap=1mm:3mm:3", "--vary", "field=20mT,50mT", "--json")
+    code, out, err = call(*line, "--pareto", "mass_g,-hinge_deg")
+    assert (code, err) == (0, "")
+    first = json.loads(out)
+    assert first["computed"] == 6 and first["columns"]["gap"] == pytest.approx([1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
+    assert max(first["columns"]["hinge_deg"]) > 30
+    assert (tmp_path / first["pareto"]).is_file() and (tmp_path / first["table"]).is_file()
+    again = json.loads(call(*line)[1])
+    assert again["computed"] == 0 and again["columns"] == first["columns"]
+    code, out, _ = call("sweep", "my_flap.py", "--vary", "gap=2mm", "--equilibrium", "--out", "rest")
+    assert code == 0 and "hinge_deg" in out
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("gpa=1mm", "'gap' is near"),
+        ("gap", "cannot vary"),
+        ("gap=1mT", "wrong unit"),
+        ("gap=", "not a number"),
+    ],
+)
+def test_a_bad_sweep_is_one_sentence(call, tmp_path, given, said):
+    code, _, err = call("sweep", "my_flap.py", "--vary", given)
+    assert code == 2 and said in err and err.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
