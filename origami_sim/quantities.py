@@ -26,6 +26,9 @@ class Quantity(float):
         out.unit = unit
         return out
 
+    def __getnewargs__(self) -> tuple[float, str]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return float(self), self.unit
+
 
 def si(text: str | float) -> Quantity:
     """The number in SI that a quantity stands for: si("2.54 mm") is 0.00254, and `.unit` is "m".

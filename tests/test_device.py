@@ -1,5 +1,6 @@
 """Devices as files: run, shown, compared and saved by the name of a file; only what is named is executed."""
 
+import copy
 import json
 import re
 import textwrap
@@ -66,6 +67,7 @@ def test_quantities_are_si():
     assert si("2.54 mm") == pytest.approx(2.54e-3) and si("2.54mm").unit == "m"
     assert si("-1e-3 T") == -1e-3 and si("20 %") == pytest.approx(0.2)
     assert parsed("5 1/s", "1/s") == 5.0
+    assert copy.deepcopy(si("2 mm")).unit == "m"
     for text, said in (("mm", "not a number"), ("2 mn", "unknown unit"), ("", "not a number")):
         with pytest.raises(InputError, match=said):
             si(text)

@@ -1,6 +1,7 @@
 """Where a device comes to rest, or how it moves, at many points of its design at once."""
 
 import hashlib
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -12,6 +13,7 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
+from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory, simulate
 from origami_sim.solve.statics import Equilibrium, equilibrium
 from origami_sim.solve.timestep import stable_step
@@ -53,7 +55,7 @@ class Found:
         model, parameters, drive: of one world.
         x: [N, 3] positions [m]. angles: [C + Q] continuous hinge angles [rad], creases first: at rest, or at the end.
         motion: its frames, or None. equilibrium: or where the search for it stopped, or None.
-        failure: why it was not found; "" if it was.
+        failure: why it was not found; "" if it was. time: of the drive [s]; None: at its end.
     """
 
     model: Model = field(repr=False)
@@ -64,6 +66,7 @@ class Found:
     motion: Trajectory | None = field(default=None, repr=False)
     equilibrium: Equilibrium | None = field(default=None, repr=False)
     failure: str = ""
+    time: float | None = None
 
     def angle(self, crease: int | str) -> float:
         """Fold angle of a crease [rad] by its number or name; the mean of those that share a name.
@@ -85,6 +88,20 @@ class Found:
     def mass(self) -> float:
         """Of everything [kg]."""
         return float(self.parameters["body", "mass"].sum() or self.parameters["inertia", "mass"].sum())
+
+    def reactions(self) -> np.ndarray:
+        """[N, 3] forces that supports exert on held axes [N], of what is at rest: minus all other forces there.
+
+        Raises:
+            InputError: rigid panels, which share them.
+        """
+        if self.model.panels == "rigid":
+            raise InputError("rigid panels share their supports", field="panels", value="rigid", allowed="elastic")
+        start = State.at_rest(self.model, position=self.x)
+        start.angles = self.angles[:, None].copy()
+        batch = Batch(self.model, self.parameters, self.drive, start, threads=1)
+        force = batch.total_force(lasting(self.drive) if self.time is None else self.time)[:, 0]
+        return np.where(self.model.free > 0, 0.0, -force)
 
     def moved(self, axis: str = "x") -> float:
         """How far the centre of mass came along an axis, "x", "y" or "z" [m]."""
@@ -124,12 +141,10 @@ def at(build: Build, point: Point) -> Device:
         InputError: an argument that `build` has not, a `build` that returns something else.
     """
     try:
-        given = build(**point)
+        inspect.signature(build).bind(**point)
     except TypeError as e:
-        if "argument" not in str(e):
-            raise
         raise InputError(f"build() does not take this point ({e})", field="unknowns", value=dict(point)) from None
-    model, parameters, drive, *_ = built(given, getattr(build, "__module__", None) or "build")
+    model, parameters, drive, *_ = built(build(**point), getattr(build, "__module__", None) or "build")
     return Device(model, parameters, drive)
 
 
@@ -168,7 +183,7 @@ def _at_rest(d: Device, way: Way) -> Found:
         state = rest.state
     assert rest is not None
     failure = "" if rest.converged else rest.message
-    return Found(d.model, d.parameters, d.drive, rest.x, rest.angles, equilibrium=rest, failure=failure)
+    return Found(d.model, d.parameters, d.drive, rest.x, rest.angles, equilibrium=rest, failure=failure, time=end)
 
 
 def _alike(d: Device) -> str:
@@ -247,4 +262,13 @@ def _one(motion: Trajectory, d: Device, w: int) -> Found:
         **by_world,
     )
     failure = str(own.failures[0]) if own.failures else ""
-    return Found(d.model, d.parameters, d.drive, own.x[-1, :, 0], own.angles[-1, :, 0], motion=own, failure=failure)
+    return Found(
+        d.model,
+        d.parameters,
+        d.drive,
+        own.x[-1, :, 0],
+        own.angles[-1, :, 0],
+        motion=own,
+        failure=failure,
+        time=float(own.times[-1]),
+    )

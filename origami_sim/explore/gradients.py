@@ -122,8 +122,7 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
             start = State.at_rest(d.model, position=held)
             start.angles, start.memory = state.angles.copy(), state.memory.copy()
             batch = Batch(d.model, d.parameters, distorted(d.model, d.parameters, d.drive, time), start, threads=1)
-            end = lasting(d.drive) if way.time is None else way.time
-            pushed.append(batch.total_force(end)[:, 0].ravel()[free])
+            pushed.append(batch.total_force(time)[:, 0].ravel()[free])
         towards = solve.solve(WEIGHTS @ np.array(pushed) / h)
         for s, d in zip(STENCIL, near, strict=True):
             move = np.zeros(rest.x.size)
@@ -131,5 +130,5 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
             x = rest.x + move.reshape(-1, 3) + (1 - first.model.free) * (d.model.position - first.model.position)
             there = State.at_rest(d.model, position=x)
             turned = there.angles[:, 0] + 2 * np.pi * np.round((rest.angles - there.angles[:, 0]) / (2 * np.pi))
-            out.append(Found(d.model, d.parameters, d.drive, x, turned))
+            out.append(Found(d.model, d.parameters, d.drive, x, turned, time=time))
     return out
