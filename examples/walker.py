@@ -8,8 +8,6 @@ Two magnets of opposite poling arch a strip in a vertical field; feet that slip 
 that into steps.
 """
 
-import numpy as np
-
 from origami_sim import Drive, Sheet, sine, strip
 from origami_sim.explore import Way, sweep
 
@@ -34,25 +32,24 @@ def build(field="30 mT", frequency="1 Hz", friction=0.2, backward=0.6, height="1
 
 
 def stride(found):
-    """Way of the centre of mass in the last cycle [m]."""
+    """Way of the centre of mass in the last cycle [mm]."""
     frames = round(RATE / float(found.drive["field_z"].frequency))
     x = found.motion.centre_of_mass()[:, 0, 0]
-    return float(x[-1] - x[-1 - frames])
+    return 1e3 * float(x[-1] - x[-1 - frames])
 
 
 def strength(found):
-    """Amplitude of the field [T]."""
-    return float(found.drive["field_z"].amplitude)
+    """Amplitude of the field [mT]."""
+    return 1e3 * float(found.drive["field_z"].amplitude)
 
 
 RATE = 20.0
 
 if __name__ == "__main__":
-    grid = {"field": np.array([0.015, 0.02, 0.025, 0.03, 0.04]), "backward": [0.25, 0.4, 0.6, 0.9]}
-    found = sweep(build, grid, {"stride": stride, "field": strength}, way=Way(duration=3.0, rate=RATE),
-                  folder="runs/walker_sweep")  # fmt: skip
-    for row in found.pareto("field", "-stride"):
-        point = found.point(row)
-        stepped = 1e3 * found.columns["stride"][row]
+    grid = {"field": ["15 mT", "20 mT", "25 mT", "30 mT", "40 mT"], "backward": [0.25, 0.4, 0.6, 0.9]}
+    measures = {"stride_mm": stride, "field_mT": strength}
+    found = sweep(build, grid, measures, way=Way(duration=3.0, rate=RATE), folder="runs/walker_sweep")
+    for row in found.pareto("field_mT", "-stride_mm"):
+        point, stepped = found.point(row), found.columns["stride_mm"][row]
         print(f"{1e3 * point['field']:.0f} mT, backward {point['backward']:.2f}: {stepped:.1f} mm")
-    print(found.draw("runs/walker_sweep/pareto.png", "field", "-stride"))
+    print(found.draw("runs/walker_sweep/pareto.png", "field_mT", "-stride_mm"))

@@ -141,7 +141,8 @@ def draw(
         ax.annotate(label, middle, (0, 0.9 * size), textcoords="offset points", ha="center", va="center",
                     fontsize=1.3 * size, weight="bold", color="#223344", zorder=6)  # fmt: skip
         if p in poles:
-            along = poles[p] @ axes[:2].T * 0.35 * np.sqrt(np.ptp(flat[own].reshape(-1, 2), axis=0).prod())
+            along = poles[p] @ axes[:2].T
+            along = along * 0.4 * np.ptp(flat[own].reshape(-1, 2) @ along) / max(float(along @ along), 0.01)
             ax.annotate("", middle + along, middle - along, zorder=5,
                         arrowprops={"arrowstyle": "-|>", "color": MAGNET, "lw": 1.6, "alpha": 0.7})  # fmt: skip
             shown["magnet, S to N"] = Line2D([], [], color=MAGNET, lw=1.6, marker=">")
