@@ -3,8 +3,8 @@
     origami-sim run examples/flap.py --set gap=3mm
     python examples/flap.py
 
-A wider gap makes a softer bridge. The field leans back by 15 degrees, as a vertical one pulls no patch as far as upright
-against its weight.
+A wider gap makes a softer bridge. The field leans back by 15 degrees, as a vertical one pulls no patch upright against
+its weight.
 """
 
 from math import cos, radians, sin

@@ -13,7 +13,7 @@ from origami_sim import Drive, Sheet, miura, si
 from origami_sim.explore import optimise
 from origami_sim.pattern.assemble import assemble
 
-CELLS, SIDE, FORCE = 4, 0.02, 1e-4
+CELLS, SIDE, FORCE = 4, 0.02, 1e-2
 
 
 def pattern(gamma, fold):

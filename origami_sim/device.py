@@ -220,7 +220,7 @@ def _settings(build: Callable, path: Path, own: Mapping[str, Any]) -> tuple[Sett
             raise InputError(
                 "this word has a meaning in calibrations", file=path, field=name, allowed="another name of the argument"
             )
-        value, unit = _valued(p.default)
+        value, unit = valued(p.default)
         if value is not None:
             defaults[name] = p.default
             settings.append(Setting(name, value, unit, path.name, meaning.get(name, "an argument of build()")))
@@ -232,7 +232,7 @@ def _settings(build: Callable, path: Path, own: Mapping[str, Any]) -> tuple[Sett
     return Settings(settings, path), defaults
 
 
-def _valued(default: Any) -> tuple[float | str | bool | None, str]:
+def valued(default: Any) -> tuple[float | str | bool | None, str]:
     """Value and SI unit of an argument's default; None for what no setting can be."""
     if isinstance(default, bool):
         return default, ""

@@ -70,6 +70,13 @@ def test_measures_say_what_there_is():
         find(flap, [{"gpa": 1e-3}])
 
 
+def test_defaults_that_are_quantities_are_numbers():
+    def build(gap="2 mm", field="50 mT"):
+        return flap(gap=gap * 1.0, field=field * 1.0)
+
+    assert find(build, [{"field": 0.05}])[0].angle(0) == find(flap, [{}])[0].angle(0)
+
+
 # gradients -----------------------------------------------------------------------------------------------------------
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.device import built, lasting
+from origami_sim.device import built, lasting, valued
 from origami_sim.drive import Drive, Signal
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
+from origami_sim.quantities import Quantity
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory, simulate
 from origami_sim.solve.statics import Equilibrium, equilibrium
@@ -135,16 +136,19 @@ class Device:
 
 
 def at(build: Build, point: Point) -> Device:
-    """The device at a point.
+    """The device at a point; other arguments of `build` have their defaults, quantities as numbers.
 
     Raises:
         InputError: an argument that `build` has not, a `build` that returns something else.
     """
+    signature = inspect.signature(build)
     try:
-        inspect.signature(build).bind(**point)
+        signature.bind(**point)
     except TypeError as e:
         raise InputError(f"build() does not take this point ({e})", field="unknowns", value=dict(point)) from None
-    model, parameters, drive, *_ = built(build(**point), getattr(build, "__module__", None) or "build")
+    others = {n: valued(p.default) for n, p in signature.parameters.items() if isinstance(p.default, str)}
+    given = {**{n: Quantity(v, unit) for n, (v, unit) in others.items() if isinstance(v, float)}, **point}
+    model, parameters, drive, *_ = built(build(**given), getattr(build, "__module__", None) or "build")
     return Device(model, parameters, drive)
 
 

@@ -28,6 +28,12 @@ Of fourth order: truncation is STEP^4 and rounding eps / STEP, both near 1e-12. 
 with impacts and stick the error says how good they are.
 """
 
+REFINED = 2
+"""Refinements of a solution with the shifted tangent, of which the shift spoils soft modes.
+
+Without any the gradient of a paper tube's stiffness is 2e-7 off, with one 3e-9; double changes nothing more.
+"""
+
 
 @dataclass
 class Gradient:
@@ -123,7 +129,10 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
             start.angles, start.memory = state.angles.copy(), state.memory.copy()
             batch = Batch(d.model, d.parameters, distorted(d.model, d.parameters, d.drive, time), start, threads=1)
             pushed.append(batch.total_force(time)[:, 0].ravel()[free])
-        towards = solve.solve(WEIGHTS @ np.array(pushed) / h)
+        push = WEIGHTS @ np.array(pushed) / h
+        towards = solve.solve(push)
+        for _ in range(REFINED):
+            towards += solve.solve(push - k @ towards)
         for s, d in zip(STENCIL, near, strict=True):
             move = np.zeros(rest.x.size)
             move[free] = s * h * towards
