@@ -30,11 +30,13 @@ from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, series, sine
 from origami_sim.errors import InputError, nearest
+from origami_sim.model import Model, Parameters
+from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.quantities import converted
 
-_KEYS = ("about", "pattern", "sheet", "statements", "drive", "run")
+_KEYS = ("about", "pattern", "sheet", "statements", "model", "names", "parameters", "drive", "run")
 _BUILDERS: dict[str, Callable[..., Pattern]] = {
     n: getattr(patterns, n) for n in ("strip", "cross", "grid", "miura", "waterbomb", "kresling")
 }
@@ -49,17 +51,25 @@ _WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
 
 @dataclass
 class Design:
-    """A sheet as it was stated, and what drives it.
+    """A sheet as it was stated, or a model, and what drives it.
 
     Attributes:
+        source: the sheet, or model and parameters.
         duration, rate: of its motion [s], [1/s]; duration 0: as long as the drive takes. about: free text.
     """
 
-    sheet: Sheet
+    source: Sheet | tuple[Model, Parameters]
     drive: Drive
     duration: float = 0.0
     rate: float = 60.0
     about: str = ""
+
+    @property
+    def sheet(self) -> Sheet:
+        """The sheet; InputError where the design is a model."""
+        if not isinstance(self.source, Sheet):
+            raise InputError("the design is a model, no sheet", field="sheet")
+        return self.source
 
 
 def is_design(path: Path) -> bool:
@@ -68,7 +78,9 @@ def is_design(path: Path) -> bool:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return "pattern" in data and "thickness" in (data["sheet"] if isinstance(data.get("sheet"), dict) else {})
+    sheet = data["sheet"] if isinstance(data.get("sheet"), dict) else {}
+    model = data["model"] if isinstance(data.get("model"), dict) else {}
+    return ("pattern" in data and "thickness" in sheet) or "position" in model
 
 
 def read_design(path: str | Path) -> Design:
@@ -87,20 +99,13 @@ def read_design(path: str | Path) -> Design:
     for key in data:
         if key not in _KEYS:
             raise InputError(f"unknown key{nearest(key, _KEYS)}", file=path, field=key, allowed=", ".join(_KEYS))
-    for key in ("pattern", "sheet"):
-        if not isinstance(data.get(key), dict):
-            raise InputError(f"a design needs a {key}", file=path, field=key, allowed=f"{key} = {{ ... }}")
     try:
-        sheet = _called(Sheet, {"pattern": _pattern(data["pattern"], path), **data["sheet"]}, "sheet", path)
-        for number, entry in enumerate(_list(data.get("statements", []), path), 1):
-            name, arguments = next(iter(entry.items()))
-            _check(name, _STATEMENTS, f"statements[{number}]", path)
-            _called(getattr(sheet, name), arguments, f"statements[{number}].{name}", path)
+        source = read_model(data, path) if "model" in data else _sheet(data, path)
         run = _table(data.get("run", {}), "run", path)
         for key in run:
             _check(key, ("duration", "rate"), "run", path)
         return Design(
-            sheet,
+            source,
             _drive(_table(data.get("drive", {}), "drive", path), path),
             float(converted(run.get("duration", 0.0), "s", "run.duration")),
             float(converted(run.get("rate", 60.0), "Hz", "run.rate")),
@@ -113,30 +118,42 @@ def read_design(path: str | Path) -> Design:
 
 
 def write_design(
-    path: str | Path, sheet: Sheet, drive: Drive | None = None, *, duration: float = 0.0, rate: float = 60.0, about=""
+    path: str | Path,
+    source: Sheet | tuple[Model, Parameters],
+    drive: Drive | None = None,
+    *,
+    duration: float = 0.0,
+    rate: float = 60.0,
+    about: str = "",
 ) -> Path:
-    """Writes a sheet as it was stated, and its drive, as a file that `read_design` and the command line read.
+    """Writes a sheet as it was stated, or a model, and its drive, as a file that `read_design` and commands read.
 
-    Quantities stay as they were stated. What was changed in a sheet by other means than its methods is not in the file.
+    Quantities stay as they were stated. What was changed in a sheet by other means than its methods is not in the file;
+    a model with its parameters is whole.
 
     Returns:
         The file.
 
     Raises:
-        InputError: a drive whose worlds differ.
+        InputError: a drive or parameters whose worlds differ.
     """
     lines = [f"about = {_toml(about)}"] if about else []
-    given = {n: v for n, v in sheet.made.items() if v is not None}
-    lines += [f"sheet = {_toml(given)}", "statements = ["]
-    lines += [f"  {_toml({name: arguments})}," for name, arguments in sheet.statements]
-    lines += ["]", "", "[run]", f"duration = {_toml(duration)}", f"rate = {_toml(rate)}", "", "[drive]"]
+    if isinstance(source, Sheet):
+        given = {n: v for n, v in source.made.items() if v is not None}
+        lines += [f"sheet = {_toml(given)}", "statements = ["]
+        lines += [f"  {_toml({name: arguments})}," for name, arguments in source.statements]
+        lines += ["]"]
+    lines += ["", "[run]", f"duration = {_toml(duration)}", f"rate = {_toml(rate)}", "", "[drive]"]
     signals = (drive or Drive()).signals
     for name, s in signals.items():
         if s.worlds > 1:
             raise InputError("a design has one drive", field=name, value=f"{s.worlds} worlds", allowed="one world")
         if not s.is_zero or (name.startswith("voltage_") and len(signals) > 15):
             lines.append(f"{name} = {_toml(_signal(s))}")
-    lines += ["", "[pattern]", *_pattern_lines(sheet.pattern), ""]
+    tables = {"pattern": _pattern_table(source.pattern)} if isinstance(source, Sheet) else model_tables(*source)
+    for name, table in tables.items():
+        lines += ["", f"[{name}]", *(line for n, v in table.items() for line in _rows(n, v))]
+    lines.append("")
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")
@@ -152,6 +169,18 @@ def _table(value: Any, key: str, path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError("is a table", file=path, field=key, value=value, allowed="{ name = value, ... }")
     return value
+
+
+def _sheet(data: Mapping[str, Any], path: Path) -> Sheet:
+    for key in ("pattern", "sheet"):
+        if not isinstance(data.get(key), dict):
+            raise InputError(f"a design needs a {key}", file=path, field=key, allowed=f"{key} = {{ ... }}")
+    sheet = _called(Sheet, {"pattern": _pattern(data["pattern"], path), **data["sheet"]}, "sheet", path)
+    for number, entry in enumerate(_list(data.get("statements", []), path), 1):
+        name, arguments = next(iter(entry.items()))
+        _check(name, _STATEMENTS, f"statements[{number}]", path)
+        _called(getattr(sheet, name), arguments, f"statements[{number}].{name}", path)
+    return sheet
 
 
 def _list(value: Any, path: Path) -> list[dict[str, Any]]:
@@ -279,18 +308,16 @@ def _signal(s: Signal) -> Any:
     return {n: getattr(s, n) for n in names}
 
 
-def _pattern_lines(p: Pattern) -> list[str]:
-    def rows(name: str, values) -> list[str]:
-        return [f"{name} = [", *(f"  {_toml(v)}," for v in values), "]"]
+def _pattern_table(p: Pattern) -> dict[str, Any]:
+    out = {"vertices": p.vertices, "faces": p.faces, "edges": p.edges, "assignments": list(p.assignments)}
+    out |= {n: getattr(p, n) for n in (*_EDGES, "thickness") if not np.all(np.isnan(getattr(p, n)))}
+    return {**out, "materials": [m or "" for m in p.materials]} if any(p.materials) else out
 
-    lines = rows("vertices", p.vertices) + rows("faces", p.faces) + rows("edges", p.edges)
-    lines.append(f"assignments = {_toml(list(p.assignments))}")
-    lines += [f"{n} = {_toml(getattr(p, n))}" for n in _EDGES if not np.all(np.isnan(getattr(p, n)))]
-    if not np.all(np.isnan(p.thickness)):
-        lines.append(f"thickness = {_toml(p.thickness)}")
-    if any(p.materials):
-        lines.append(f"materials = {_toml([m or '' for m in p.materials])}")
-    return lines
+
+def _rows(name: str, value: Any) -> list[str]:
+    """Lines of a key; of an array with two axes a row a line."""
+    nested = isinstance(value, (list, np.ndarray)) and len(value) and isinstance(value[0], (list, tuple, np.ndarray))
+    return [f"{name} = [", *(f"  {_toml(v)}," for v in value), "]"] if nested else [f"{name} = {_toml(value)}"]
 
 
 def _toml(value: Any) -> str:

@@ -269,7 +269,8 @@ def _meanings(build: Callable) -> dict[str, str]:
 
 def _designed(design: Design) -> Callable:
     def build(duration: float = design.duration, rate: float = design.rate):
-        return design.sheet, design.drive
+        source = design.source
+        return (source, design.drive) if isinstance(source, Sheet) else (*source, design.drive)
 
     build.__doc__ = design.about or None
     return build
@@ -279,7 +280,8 @@ def _parts(given: Any) -> list:
     """What a `build` returned, one by one."""
     parts = list(given) if isinstance(given, tuple) else [given]
     if parts and isinstance(parts[0], Design):
-        parts[:1] = [parts[0].sheet, parts[0].drive]
+        source = parts[0].source
+        parts[:1] = [*((source,) if isinstance(source, Sheet) else source), parts[0].drive]
     return parts
 
 
@@ -307,21 +309,13 @@ def built(given: Any, path: str | Path) -> tuple:
     return tuple(parts)
 
 
-def sheet_of(module: ModuleType, settings: Settings) -> tuple[Sheet, Drive | None]:
-    """The sheet, as it was stated, and the drive of a device.
-
-    Raises:
-        InputError: its `build` returns a model; only a sheet knows how it was stated.
-    """
-    parts = module.raw(settings) if hasattr(module, "raw") else ()
-    if not parts or not isinstance(parts[0], Sheet):
-        raise InputError(
-            "only a device whose build() returns a Sheet can be saved as a design",
-            file=module.__file__,
-            field="build",
-            allowed="Sheet; Sheet, Drive",
-        )
-    return parts[0], next((p for p in parts[1:] if isinstance(p, Drive)), None)
+def source_of(module: ModuleType, settings: Settings) -> Sheet | tuple[Model, Parameters]:
+    """What a design file of a device holds: its sheet, as it was stated, or its model and parameters."""
+    first = module.raw(settings)[0] if hasattr(module, "raw") else None
+    if isinstance(first, Sheet) and not settings.effects and settings.panels is None:
+        return first
+    model, parameters, *_ = module.build(settings)
+    return model, parameters
 
 
 def lasting(drive: Drive) -> float:

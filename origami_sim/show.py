@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from origami_sim.design import write_design
-from origami_sim.device import device_module, sheet_of
+from origami_sim.device import device_module, source_of
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -35,12 +35,11 @@ def run(args: Namespace) -> dict[str, Any]:
     model, parameters, drive, *_ = module.build(settings)
     found: dict[str, Any] = tables(model, parameters)
     if args.save:
-        sheet, stated = sheet_of(module, settings)
         if Path(args.save).suffix != ".toml":
             raise InputError("a design is a TOML file", field="--save", value=args.save, allowed="my_flap.toml")
         numbers = {n: float(settings[n].value) for n in ("duration", "rate") if n in settings}
         about = " ".join((module.__doc__ or "").split("\n\n")[0].split())
-        found["design"] = str(write_design(args.save, sheet, stated, **numbers, about=about))
+        found["design"] = str(write_design(args.save, source_of(module, settings), drive, **numbers, about=about))
     picture = draw(model, parameters, Path(args.out or f"runs/show/{name}.png"), drive=drive, title=name)
     return {**found, "picture": str(picture)}
 

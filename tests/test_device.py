@@ -310,7 +310,7 @@ def test_show_draws_numbers_and_saves_the_design(flap, call, tmp_path):
     assert read_design(tmp_path / "flap.toml").sheet.pattern.face_count == 3
     code, out, _ = call("show", "box", "--json", "--out", "box.png")
     assert json.loads(out)["creases"]["name"] == ["hinge +x", "hinge +y", "hinge -x", "hinge -y"]
-    assert "only a device whose build() returns a Sheet" in call("show", "box", "--save", "box.toml")[2]
+    assert call("show", "box", "--save", "box.txt")[0] == 2
 
 
 @pytest.mark.parametrize("scene", ["crawler", "de_fold", "cube_toss"])
@@ -319,3 +319,43 @@ def test_show_draws_scenes(scene, call, tmp_path):
     assert (code, err) == (0, "") and (tmp_path / "x.png").stat().st_size > 10000
     if scene == "de_fold":
         assert json.loads(out)["creases"]["marks"][0] == "flat, electrodes of group 0"
+
+
+@pytest.mark.parametrize("scene", ["box", "crawler", "de_fold", "cube_toss", "bifold", "multi_field_sheet"])
+def test_scenes_are_saved_whole(scene, tmp_path):
+    module = device_module(scene)
+    settings = scene_settings(module)
+    model, parameters, drive, *_ = module.build(settings)
+    path = write_design(tmp_path / f"{scene}.toml", (model, parameters), drive)
+    again, numbers, waves = device_module(str(path)).build(scene_settings(device_module(str(path))))
+    assert again.hash == model.hash and numbers.hash == parameters.hash
+    assert all(waves[n](0.37) == s(0.37) for n, s in drive.signals.items())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[model]\n", "[model]\nfoo = 1\n", "unknown key.*model.foo"),
+        ("bars = [\n  [0, 1]", "bars = [\n  [0, 99]", "points nowhere.*99"),
+        ("bars = [\n  [0, 1]", "bars = [\n  [0, 1.5]", "whole numbers"),
+        ("bars = [\n  [0, 1]", "bars = [\n  [0, 1, 2]", "rows of one length"),
+        ('effects = ["', 'effects = ["no_such", "', "no such effect"),
+        ('panels = "elastic"', 'panels = "soft"', "no such panels"),
+        ("triangle_panel = [", "triangle_panel = [0, ", "another number of rows"),
+        ("[parameters.crease]\n", "[parameters.crease]\nfoo = 1.0\n", "no such parameter"),
+        (
+            "[parameters.crease]\n",
+            "[parameters.crease]\nstiffness = -1.0\n",
+            "Cannot overwrite|out of bounds|not valid",
+        ),
+    ],
+)
+def test_a_bad_model_is_one_sentence(old, new, said, tmp_path):
+    module = device_module("mae_crease")
+    path = write_design(tmp_path / "m.toml", module.build(scene_settings(module))[:2])
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=said) as e:
+        read_design(path)
+    assert str(e.value).startswith(str(path))
