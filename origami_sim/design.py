@@ -115,6 +115,8 @@ def read_design(path: str | Path) -> Design:
         if e.file is not None:
             raise
         raise InputError(str(e), file=path) from None
+    except (TypeError, ValueError, IndexError, OverflowError) as e:  # a list where a number belongs, and the like
+        raise InputError(f"is no design ({e})", file=path) from None
 
 
 def write_design(

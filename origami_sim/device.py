@@ -148,7 +148,7 @@ def _of(found: ModuleType, path: Path, name: str, function: str) -> ModuleType:
 
 def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> ModuleType:
     """A module as those of scenes, of what a device's file states."""
-    out: Any = ModuleType(name, own.get("__doc__") or build.__doc__)
+    out: Any = ModuleType(name.replace(".", "_"), own.get("__doc__") or build.__doc__)
     out.__file__, out.given = str(path), build
     if "CALIBRATION" in own:
         beside = path.parent / str(own["CALIBRATION"])
