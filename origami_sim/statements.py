@@ -41,7 +41,7 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
             del given["self"]
             given = {n: list(v) if isinstance(v, Iterator) else v for n, v in given.items()}
             given |= given.pop(free, {}) if free else {}
-            remembered = copy.deepcopy(given)
+            remembered = {} if self._within else copy.deepcopy(given)
             in_si = {n: converted(v, units[n], n) if n in units else v for n, v in given.items()}
             positional = in_si.pop(listed, ()) if listed else ()
             outermost, self._within = not self._within, True

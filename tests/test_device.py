@@ -84,6 +84,16 @@ def test_a_sheet_in_quantities_is_the_sheet_in_si():
     assert words.build()[1].hash == numbers.build()[1].hash
 
 
+def test_motions_take_quantities():
+    built = Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm").crease(stiffness="1 mN m/rad").fix(panels=[0]).build()
+    assert (
+        simulate(*built, duration="50 ms", rate="100 Hz").times.tolist()
+        == simulate(*built, duration=0.05, rate=100.0).times.tolist()
+    )
+    with pytest.raises(InputError, match="wrong unit"):
+        simulate(*built, duration="50 mm")
+
+
 # files ---------------------------------------------------------------------------------------------------------------
 
 

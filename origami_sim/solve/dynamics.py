@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_inside_the_ground
+from origami_sim.quantities import converted
 from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
@@ -103,9 +105,9 @@ def simulate(
     parameters: Parameters,
     drive: Drive | None = None,
     *,
-    duration: float,
-    rate: float = 60.0,
-    dt: float | None = None,
+    duration: float | str,
+    rate: float | str = 60.0,
+    dt: float | str | None = None,
     state: State | None = None,
     method: str = "explicit",
     spectral_radius: float = 1.0,
@@ -128,7 +130,7 @@ def simulate(
     numerical damping (see `solve.implicit`), world after world, on the CPU.
 
     Args:
-        duration: simulated time [s], rounded to whole frames. rate: frames per second.
+        duration: simulated time [s], rounded to whole frames, or a quantity ("200 ms"). rate: frames per second.
         dt: step [s]; default SAFETY times the stability limit of the stiffest element. Implicit: any length, halved
             only where Newton finds no solution; by default adapted within each frame.
         state: where to start (default: the reference state at rest); its worlds must match.
@@ -147,9 +149,10 @@ def simulate(
             worlds that differ, no such accuracy, a start inside the ground; implicit: another device, spectral radius
             or tolerance out of bounds.
     """
-    options = {
-        "duration": duration,
-        "rate": rate,
+    dt = converted(dt, "s", "dt")
+    options: dict[str, Any] = {
+        "duration": converted(duration, "s", "duration"),
+        "rate": converted(rate, "Hz", "rate"),
         "dt": dt,
         "state": state,
         "method": method,
