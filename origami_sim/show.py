@@ -132,11 +132,13 @@ def draw(
         ax.plot(*flat[[j, k]].T, color=colour, lw=1.8, zorder=3)
         shown.setdefault(marks[c].partition(",")[0] or "crease", Line2D([], [], color=colour, lw=1.8))
     size = _letters(flat[corners], model, width)
+    points = 0.8 * 72 * width / max(span[0], 1e-9)  # of the picture, per millimetre
     for p in range(model.panel_count):
         own = model.triangles[model.triangle_panel == p]
         middle = flat[own].mean(axis=(0, 1))
         name = model.name("panel", p)
-        label = f"{p}" if name == f"panel {p}" else f"{p} {name}"
+        room = points * np.ptp(flat[own][..., 0])
+        label = f"{p} {name}" if name != f"panel {p}" and _fits(f"{p} {name}", 1.3 * size, room) else f"{p}"
         ax.annotate(label, middle, (0, 0.9 * size), textcoords="offset points", ha="center", va="center",
                     fontsize=1.3 * size, weight="bold", color="#223344", zorder=6)  # fmt: skip
         if p in poles:
@@ -148,8 +150,11 @@ def draw(
     for c, (_, j, k, _) in enumerate(model.creases.tolist()):
         name = model.name("crease", c)
         group = f" ({marks[c].rpartition(' ')[2]})" if "electrodes" in marks[c] else ""
-        label = f"c{c}{group}" if name == f"crease {c}" else f"c{c} {name}{group}"
         along = flat[k] - flat[j]
+        full = f"c{c} {name}{group}"
+        room = points * float(np.linalg.norm(along))
+        label = full if name != f"crease {c}" and _fits(full, size, room) else f"c{c}{group}"
+        label = label if _fits(label, size, 2 * room) else f"c{c}"
         turn = (np.degrees(np.arctan2(along[1], along[0])) + 89.9) % 180 - 89.9
         ax.annotate(label, tuple(flat[j] + 0.32 * along), ha="center", va="center", fontsize=size, color="#8b3a00",
                     rotation=turn, rotation_mode="anchor", zorder=7,
@@ -165,13 +170,19 @@ def draw(
             if np.any(which):
                 ax.plot(*flat[held[which]].T, marker, color=HELD, ms=5, mfc="none", zorder=4)
                 shown[label] = Line2D([], [], color=HELD, marker=marker, ls="", mfc="none")
+    feet: dict[tuple[float, float], list[str]] = {}
     for k in range(len(model.contacts)):
-        at = (model.contact_weights[k, :, None] * flat[model.contacts[k]]).sum(axis=0)
         if _own(model, k):
-            ax.plot(*at, "^", color=FOOT, ms=9, alpha=0.8, zorder=4)
-            ax.annotate(model.name("contact", k), at, (0, -12), textcoords="offset points", ha="center",
-                        fontsize=0.9 * size, color=FOOT, zorder=7)  # fmt: skip
-            shown["foot"] = Line2D([], [], color=FOOT, marker="^", ls="")
+            at = (model.contact_weights[k, :, None] * flat[model.contacts[k]]).sum(axis=0)
+            name = model.name("contact", k)
+            feet.setdefault((round(float(at[0]), 3), round(float(at[1]), 3)), []).append(
+                str(k) if name == f"contact {k}" else name
+            )
+    for at, names in feet.items():
+        ax.plot(*at, "^", color=FOOT, ms=9, alpha=0.8, zorder=4)
+        ax.annotate(", ".join(names), at, (0, -12), textcoords="offset points", ha="center",
+                    fontsize=0.9 * size, color=FOOT, zorder=7)  # fmt: skip
+        shown["foot, contact"] = Line2D([], [], color=FOOT, marker="^", ls="")
     ax.set_aspect("equal")
     margin = 0.08 * span.max()
     low, high = flat[corners].min(axis=0) - margin, flat[corners].max(axis=0) + margin
@@ -207,6 +218,11 @@ def _shading(x: np.ndarray, model: Model, eye: np.ndarray) -> np.ndarray:
 def _toned(colour: str, brightness: float) -> tuple[float, float, float]:
     red, green, blue = (brightness * int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return red, green, blue
+
+
+def _fits(text: str, size: float, room: float) -> bool:
+    """Whether letters of a size have room [pt]; elsewhere the tables have the names."""
+    return 0.62 * size * len(text) <= room
 
 
 def _letters(flat: np.ndarray, model: Model, width: float) -> float:
