@@ -106,6 +106,10 @@ def below_the_ground(model: Model, parameters: Parameters, x: np.ndarray) -> lis
         return []
     nodes = np.unique(model.triangles)
     size, notes = _size(model), []
+    lost = ~np.all(np.isfinite(x), axis=(0, 2))
+    if np.all(lost):
+        return []
+    x = np.where(lost[:, None], x[:, [int(np.argmin(lost))]], x)  # worlds that went unstable are like a sound one
     touching, height = gaps(model, parameters, x), heights(parameters, x[nodes])
     w = int(touching.min(axis=0).argmin())
     foot = int(touching[:, w].argmin())
