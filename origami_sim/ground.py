@@ -326,7 +326,7 @@ def gaps(model: Model, parameters: Parameters, x: np.ndarray) -> np.ndarray:
     """Heights [..., K, W] of the contact points above the ground [m], at node positions x [..., N, W, 3]."""
     corners = np.moveaxis(x[..., model.contacts, :, :], -3, 0)
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
     weights = model.contact_weights.T[:, :, None, None]
     at = sum(w * c for w, c in zip(weights, corners, strict=True)) + model.contact_offsets[:, None, None] * normal
     return heights(parameters, at)
