@@ -63,3 +63,13 @@ def test_the_walker_starts_on_its_feet_and_nothing_is_noted():
     motion = simulate(*sheet.build(), drive, duration=0.1, rate=20)
     assert motion.gaps[0].min() == pytest.approx(0.0, abs=1e-12) and motion.notes == []
     assert motion.gaps.min() > -1.5e-4
+
+
+def test_the_device_of_the_docs_runs(tmp_path):
+    text = (FOLDER.parent / "docs" / "own-device.md").read_text(encoding="utf-8")
+    (tmp_path / "my_walker.py").write_text(text.split("```python\n")[1].split("```")[0])
+    module = device_module(str(tmp_path / "my_walker.py"))
+    settings = scene_settings(module).replace(duration=0.1, rate=20.0)
+    outcome = module.run(settings)
+    assert not outcome.trajectory.failures and outcome.trajectory.notes == []
+    assert settings.backward == 0.6 and scene_settings(module).duration == 3.0
