@@ -7,7 +7,6 @@ went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier res
 import argparse
 import functools
 import json
-import math
 import os
 import sys
 import time
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from origami_sim import __version__
 from origami_sim.errors import InputError
+from origami_sim.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.recording import Recording
@@ -84,7 +84,8 @@ def _parser() -> argparse.ArgumentParser:
         return p
 
     p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
-    p.add_argument("scene", help=", ".join(import_module("origami_sim.scenes").NAMES))
+    names = ", ".join(import_module("origami_sim.scenes").NAMES)
+    p.add_argument("scene", help=f"{names}; or a device of yours: my_flap.py, package.module:build, my_flap.toml")
     p.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
     )
@@ -98,6 +99,22 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
 
+    p = command("show", _show, "Draw a device with its numbers, for sidecars", "origami-sim show my_flap.py")
+    p.add_argument("device", help="a scene, my_flap.py, package.module:build or my_flap.toml")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument("--out", metavar="PNG", help="the picture (default runs/show/DEVICE.png)")
+    p.add_argument("--save", metavar="TOML", help="write the whole design as a file that run and show read")
+
+    example = "origami-sim sweep my_flap.py --vary gap=1mm,2mm"
+    sweeping = command("sweep", _sweep, "Vary settings of a device and tabulate what it does", example)
+    sweeping.add_argument("device", help="a scene, my_flap.py, package.module:build or my_flap.toml")
+    what = "gap=1mm,2mm,4mm or gap=1mm:4mm:7 (seven values from 1 to 4 mm); again for further settings"
+    sweeping.add_argument("--vary", action="append", default=[], required=True, metavar="NAME=VALUES", help=what)
+    sweeping.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    sweeping.add_argument("--equilibrium", action="store_true", help="where it comes to rest, instead of its motion")
+    sweeping.add_argument("--pareto", metavar="A,B", help="draw the front of two columns: mass_g,-largest_turn_deg")
+    sweeping.add_argument("--out", metavar="FOLDER", help="table, and what resumes it (default runs/sweep_DEVICE)")
+
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
     p.add_argument("run", help="run folder or .rrd file")
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
@@ -106,11 +123,12 @@ def _parser() -> argparse.ArgumentParser:
     p = command(
         "compare",
         _compare,
-        "Compare a recording with the scene pendulum_chain (no other can replicate one; diagnose takes any)",
+        "Compare a recording with the scene pendulum_chain or a device of yours (diagnose takes any)",
         "origami-sim compare double.csv --scene pendulum_chain --duration 5",
     )
     p.add_argument("recording", help="CSV or Parquet file")
-    p.add_argument("--scene", required=True, help="scene that models what was recorded: pendulum_chain")
+    what = "scene or device that models what was recorded: pendulum_chain, my_flap.py"
+    p.add_argument("--scene", "--model", required=True, metavar="SCENE", help=what)
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
@@ -130,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.epilog = f"{p.epilog}\n\n{_DIAGNOSE_HELP}"
     p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
-    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, or a calibration of one (TOML)")
+    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, its calibration (TOML), or my_flap.py")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
@@ -267,10 +285,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(args) -> int:
+    from origami_sim.device import device_module
     from origami_sim.results import check_writable
-    from origami_sim.scene import scene_module, scene_settings
+    from origami_sim.scene import scene_settings
 
-    module = scene_module(args.scene)
+    module = device_module(args.scene)
+    name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
@@ -285,14 +305,20 @@ def _run(args) -> int:
                 value = f"{s.value:g}" if isinstance(s.value, float) else s.value
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
-    folder = Path(args.out or f"runs/{args.scene}")
+    folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
-    outcome = module.run(settings, progress=_Bar(args.scene))
-    _save(folder, args.scene, outcome, settings.as_dict(), args.set)
+    outcome = module.run(settings, progress=_Bar(name))
+    _save(folder, name, outcome, settings.as_dict(), args.set)
     if hasattr(module, "draw"):
         module.draw(settings, outcome, folder)
     _tell(args, outcome, folder)
     return _soundness(outcome.trajectory)
+
+
+def _sweep(args) -> int:
+    from origami_sim.explore import command
+
+    return command.run(args)
 
 
 def _replay(args) -> int:
@@ -316,27 +342,28 @@ def _replay(args) -> int:
 
 def _compare(args) -> int:
     from origami_sim.compare import plot_overlay
+    from origami_sim.device import device_module
     from origami_sim.recording import read_recording
     from origami_sim.results import check_writable
-    from origami_sim.scene import check_recorded_scene, scene_module, scene_settings
+    from origami_sim.scene import check_recorded_scene, scene_settings
 
-    module = scene_module(args.scene)
+    module = device_module(args.scene)
+    scene = module.__name__.rpartition(".")[2]
     if not hasattr(module, "replicate"):
-        raise InputError(
-            "this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain"
-        )
+        allowed = "pendulum_chain, or a device of yours"
+        raise InputError("this scene cannot replicate a recording", field="--scene", value=args.scene, allowed=allowed)
     for name in ("duration", "threshold"):
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
     settings = scene_settings(module).override(args.set, "--set")
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
-    check_recorded_scene(recording, args.scene, "origami-sim diagnose --model")
+    check_recorded_scene(recording, scene, "origami-sim diagnose --model")
     duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")
     check_writable(folder)
     comparison, motion, used, part = _replicate(module, settings, recording, args.start, duration, args.threshold)
-    _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
+    _save_comparison(folder, scene, comparison, motion, used, part, args.set)
     plot_overlay(comparison, folder / "overlay.png")
     if args.json:
         print(comparison.to_json())
@@ -378,30 +405,17 @@ def _prove(args) -> int:
 
 
 def _effects(args) -> int:
-    from origami_sim.effects import CATALOGUE, get
+    from origami_sim import catalogue
 
-    chosen = [get(args.name)] if args.name else list(CATALOGUE.values())
-    if args.json:
-        keys = ("name", "family", "formula", "source", "matters", "confused_with", "separated_by")
-        of_parameter = ("name", "symbol", "unit", "default", "bounds", "meaning")
-        _print_json(
-            [
-                {k: getattr(e, k) for k in keys}
-                | {"parameters": [{k: getattr(p, k) for k in of_parameter} for p in e.parameters]}
-                for e in chosen
-            ]
-        )
-        return OK
-    for e in chosen:
-        print(f"{e.name}  ({e.family})\n    {e.formula}")
-        print(f"    matters: {e.matters}")
-        if e.confused_with:
-            print(f"    confused with: {e.confused_with}\n    separated by: {e.separated_by}")
-        print(f"    source: {e.source}")
-        for p in e.parameters:
-            limits = f"default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}"
-            print(f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  {limits}: {p.meaning}")
-        print()
+    _print_json(catalogue.entries(args.name)) if args.json else print(catalogue.text(args.name))
+    return OK
+
+
+def _show(args) -> int:
+    from origami_sim import show
+
+    found = show.run(args)
+    _print_json(found) if args.json else print(show.text(found))
     return OK
 
 
@@ -475,19 +489,6 @@ def _demo(args) -> int:
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
-
-
-def _print_json(value) -> None:
-    """One object on one line; what JSON lacks (infinity, nan) becomes null."""
-    print(json.dumps(_finite(value), allow_nan=False))
-
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:

@@ -1,5 +1,13 @@
 """Errors that a user can act on: one sentence naming the file, field, value and what is allowed."""
 
+import difflib
+from collections.abc import Iterable
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The end of a sentence that refuses a name: what it nearly is, or nothing."""
+    return "".join(f"; '{n}' is near" for n in difflib.get_close_matches(str(name), [*known], n=1))
+
 
 class InputError(ValueError):
     """Bad input from a user. The command line prints the sentence and exits with code 2.

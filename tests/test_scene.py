@@ -76,7 +76,7 @@ def test_overrides_with_units(text, name, value):
         ("gap=1e999", r"not a finite number.*gap"),
         ("gap=2.54V", r"wrong unit.*gap.*'V'.*m, cm, mm, um"),
         ("gap=2 furlongs", r"wrong unit.*furlongs"),
-        ("density=1 g/cm^3", r"wrong unit.*density.*kg/m\^3"),
+        ("density=1 g/m^2", r"wrong unit.*density.*kg/m\^3"),
         ("gap=1km", r"wrong unit.*km"),
         ("gap=1m", r"out of its range.*gap.*1\.0.*0\.001 to 0\.006 m"),
         ("mode=slam", r"not one of the choices.*mode.*slam.*ramp, oscillate"),

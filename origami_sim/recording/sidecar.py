@@ -53,7 +53,7 @@
     times = [0.0, 1.0]                  # or samples stated here [s], with values = [0.0, 5.0]
 
     [scene]
-    name = "pendulum_chain"             # the scene that simulates this object
+    name = "pendulum_chain"             # the scene that simulates this object, or the device: "my_flap.py"
     overrides = { mass_1 = 0.09 }       # settings of this object that differ; not over a calibration of its own
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
@@ -74,9 +74,10 @@
     sd = "0.01 rad"                     # how well they, or the equilibrium, are known
     rate_sd = "0.01 rad/s"              # and how well that it rests
 
-Any other key is an error. Units: see `origami_sim.recording.units`.
+Any other key is an error. Units: see `origami_sim.units`.
 """
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -185,7 +186,9 @@ class Sidecar:
             channels={name: _channel_spec(path, name, table, cameras) for name, table in channels.items()},
             cameras=cameras,
             drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
-            scene={"name": scene.text("name", None), "overrides": scene.table("overrides")} if scene.values else {},
+            scene={"name": _device(scene.text("name", None)), "overrides": scene.table("overrides")}
+            if scene.values
+            else {},
             priors={name: prior_spec(top, name) for name in top.table("priors")},
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
@@ -228,6 +231,11 @@ class Sidecar:
                 field="time.rate_hz",
                 value=rate,
             )
+
+
+def _device(stated: str | None) -> str | None:
+    """The name of a scene or device; of a device's file, which nothing here opens, its stem."""
+    return stated and re.sub(r"(.*/)?(\w+)\.(py|toml)(:\w+)?", r"\2", stated)
 
 
 def _source_spec(path: Path, given: object) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.oversights import below_the_ground, idle_drives
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.settling import Settling, levels, settling
@@ -343,6 +344,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
         steps=march.steps,
     )
     out.notes = [f"Quasi-static: {len(times)} frames, {march.steps} equilibria.", *(f"{j}." for j in march.jumps)]
+    out.notes += [*idle_drives(model, parameters, drive), *below_the_ground(model, parameters, out.x[-1])]
     out.notes += _left_out(out, march, states)
     return out
 

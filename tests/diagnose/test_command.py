@@ -15,10 +15,10 @@ from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay
 from origami_sim.diagnose.observed import assumed
 from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.report import read_report
-from origami_sim.fit.subject import spreads
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
+from origami_sim.fit.subject import spreads
 from origami_sim.recording import read_recording
 from origami_sim.replay import read_series
 from origami_sim.results import load_run

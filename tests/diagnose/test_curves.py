@@ -7,12 +7,12 @@ import pytest
 from scipy.optimize import brentq
 
 from origami_sim.diagnose import Options, Subject, diagnose
-from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.diagnose.prepare import nominal_fits
-from origami_sim.fit.prescribed import Prescribed, curves
 from origami_sim.diagnose.screen import screen
-from origami_sim.fit.curves import Static, clocked, sign_changes
 from origami_sim.errors import InputError
+from origami_sim.fit.curves import Static, clocked, sign_changes
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.prescribed import Prescribed, curves
 from origami_sim.materials import MU0
 from origami_sim.observe import follow, observe_equilibria
 from origami_sim.recording import Channel, Recording

@@ -24,14 +24,14 @@ from origami_sim.diagnose.compare import (
     together,
 )
 from origami_sim.diagnose.forward import CALM, FINER, NEAR, UNSEEN, Forward, local_line, refined, shifted
-from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting, steady
-from origami_sim.fit.least_squares import UTMOST, Linearisation, Weights, fit, linearise
 from origami_sim.diagnose.screen import Screening, Signature, rated, screen, widening
 from origami_sim.diagnose.search import alike, look_elsewhere, lookalikes, others, settled
 from origami_sim.diagnose.trust import trust
 from origami_sim.diagnose.verdict import STRUCTURED, floor_of, lacking, noise_of, structure, white_of
 from origami_sim.drive import Drive, ramp, series, sine
+from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect, suspects, told_apart
+from origami_sim.fit.least_squares import UTMOST, Linearisation, Weights, fit, linearise
 from origami_sim.model import Parameters
 from origami_sim.recording import noise_report
 from origami_sim.recording.recording import Channel, DriveChannel, Recording

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from origami_sim.articulation import Articulation
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
-from origami_sim.articulation import Articulation
 from origami_sim.diagnose.baselines import _samples, baselines
 from origami_sim.diagnose.compare import score
 from origami_sim.diagnose.forward import drive_of
-from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.locate import locate, motion, motions_of, touching
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
-from origami_sim.fit.track import placed, track
 from origami_sim.drive import Drive
+from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
+from origami_sim.fit.track import placed, track
 from origami_sim.materials import MU0
 from origami_sim.pattern import strip
 from origami_sim.pattern.assemble import assemble

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, Subject
 from origami_sim.articulation import Articulation
+from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.onset import Onset, Stretch, bend, crossing, innovations, onset, scatter, threshold
 from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared
 from origami_sim.drive import Drive

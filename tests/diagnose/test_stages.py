@@ -7,22 +7,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from origami_sim.articulation import Articulation
 from origami_sim.diagnose import Options, diagnose, experiment, prepare, search, several, verdict
 from origami_sim.diagnose.acting import _actions, acting
-from origami_sim.articulation import Articulation
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.compare import FOLDS, memory, probabilities, score
 from origami_sim.diagnose.diagnosis import REVERSAL
 from origami_sim.diagnose.forward import calmed
-from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, suspects
 from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
 from origami_sim.diagnose.prepare import among, arranged, nominal_fits, prepared
 from origami_sim.diagnose.screen import _affordable, _least, again, screen
 from origami_sim.diagnose.search import chosen, look_elsewhere, refit, unbent
-from origami_sim.fit.subject import alignments
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, suspects
+from origami_sim.fit.subject import alignments
 from origami_sim.model import State, dihedral_angles
 from origami_sim.recording import Channel, NoiseReport, Recording
 from origami_sim.scene import read_calibration

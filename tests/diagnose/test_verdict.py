@@ -8,8 +8,8 @@ import pytest
 from origami_sim.diagnose import compare, verdict
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.diagnose.verdict import _named, _tied
+from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.recording import DriveChannel, Recording
 
 
