@@ -103,6 +103,10 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
     p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
+    from origami_sim.view import command as view
+
+    view.register(command("export", view.export, view.SUMMARY, view.EXAMPLE))
+
     p = command(
         "compare",
         _compare,

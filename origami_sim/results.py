@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -33,6 +33,9 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMAT = 1
 """Version of the folder's layout; a reader refuses a newer one."""
@@ -63,7 +66,7 @@ _REQUIRED = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """A run on disk, read back.
 
@@ -79,6 +82,17 @@ class Run:
     trajectory: Trajectory
     tables: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        tables = f", tables {', '.join(self.tables)}" if self.tables else ""
+        return f"<Run of {self.manifest['scene']} in {self.path}: {self.trajectory!r}{tables}>"
+
+    def _repr_html_(self) -> str:
+        return self.trajectory._repr_html_()
+
+    def plot(self, *, world: int = 0) -> "Figure":
+        """Fold angles, displacement and drive over time, as a Matplotlib figure."""
+        return self.trajectory.plot(world=world)
 
     @property
     def replay(self) -> Path:

@@ -18,6 +18,14 @@ WALK = 3.0
 """Extent of all frames, in sizes of the device, beyond which the camera follows it."""
 
 
+FOLDED = np.radians(20.0)
+"""Fold angle from which a crease has its full colour; half as much flickers with small waves, twice as much hides
+folds of devices that move little."""
+
+BAND = 0.5
+"""Share of the panel beside a crease that is drawn as electrode."""
+
+
 class HasTrajectory(Protocol):
     """What a run read from disk offers."""
 
@@ -31,11 +39,11 @@ class Film:
     def __init__(
         self,
         trajectory: Trajectory,
-        world: int,
-        magnets: Iterable[int] | None,
-        arms: Iterable[int],
-        tip: int | None,
-        title: str,
+        world: int = 0,
+        magnets: Iterable[int] | None = None,
+        arms: Iterable[int] = (),
+        tip: int | None = None,
+        title: str = "origami_sim",
     ):
         worlds = trajectory.x.shape[2]
         if not 0 <= world < worlds:
@@ -88,6 +96,12 @@ class Film:
         radius = 0.5 * float(np.linalg.norm(self.high - self.low)) + 0.2 * self.size
         target = (self.low + self.high) / 2
         return right, target + 1.9 * radius * towards, target, radius
+
+    def field_origin(self) -> np.ndarray:
+        """Where the arrow of the field begins (3,) [m]: beside all frames."""
+        right, _, _, _ = self.camera()
+        centre = (self.low + self.high) / 2
+        return centre - right * (0.5 * abs((self.high - self.low) @ right) + 0.35 * self.size)
 
     # panels -----------------------------------------------------------------------------------------------------------
 
@@ -168,11 +182,69 @@ class Film:
             labels,
         )
 
+    def folds(self) -> np.ndarray:
+        """[F, C, 3] colours of the creases: mountains, valleys, and flat ones between them."""
+        angle = self.trajectory.creases[:, :, self.world]
+        share = np.clip(np.abs(np.nan_to_num(angle)) / FOLDED, 0.0, 1.0)[..., None]
+        sides = np.where(angle[..., None] < 0, COLOURS["mountain"], COLOURS["valley"])
+        return np.array(COLOURS["crease"]) + share * (sides - np.array(COLOURS["crease"], float))
+
+    def electrode_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes [2E, 4] of the sides of panels along the E creases with a dielectric stack, and their creases [2E].
+
+        The first two are the crease's, the others the corners of the panel after and before them.
+        """
+        m, stacked = self.model, np.zeros(len(self.model.creases), bool)
+        for name in m.effects:
+            if get(name).family == "crease" and {"layers", "width"} <= {p.name for p in get(name).parameters}:
+                stacked |= (self.value(name, "layers") * self.value(name, "width")) > 0
+        found, nodes = np.flatnonzero(stacked), []
+        neighbours = _around(m) if len(found) else {}
+        for reverse in (False, True):
+            for c in found:
+                j, k = m.creases[c, 1:3][:: -1 if reverse else 1].tolist()
+                before, after = neighbours.get((j, k), (m.creases[c, 0 if reverse else 3],) * 2)
+                nodes.append((j, k, after, before))
+        return np.array(nodes, int).reshape(-1, 4), np.tile(found, 2)
+
+    def electrodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners [F, 2E, 4, 3] of bands on both sides of the creases with a dielectric stack; their creases [2E]."""
+        nodes, creases = self.electrode_nodes()
+        j, k, after, before = (self.x[:, nodes[:, c]] for c in range(4))
+        return np.stack([j, k, k + BAND * (after - k), j + BAND * (before - j)], axis=2), creases
+
+    def voltages(self) -> np.ndarray:
+        """[F, C] voltage on the electrodes of each crease [V]."""
+        groups = self.model.electrodes[: len(self.model.creases)]
+        found = {g: self.channel(f"voltage_{g}") for g in set(groups.tolist()) if f"voltage_{g}" in self.channels()}
+        nothing = np.zeros(len(self.times))
+        return np.stack([found.get(g, nothing) for g in groups.tolist()] or [nothing], axis=1)[:, : len(groups)]
+
+    def strains(self) -> np.ndarray:
+        """[F, T] the principal strain (Green-Lagrange) of each triangle that is larger in size [-]."""
+        t = self.model.triangles
+        first, second = self.model.position[t[:, 1]], self.model.position[t[:, 2]]
+        first, second = first - self.model.position[t[:, 0]], second - self.model.position[t[:, 0]]
+        along = unit(first)
+        across = unit(np.cross(np.cross(first, second), first))
+        flat = np.stack(
+            [np.stack([(e * a).sum(-1) for e in (first, second)], axis=-1) for a in (along, across)], axis=1
+        )
+        edges = np.stack([self.x[:, t[:, c]] - self.x[:, t[:, 0]] for c in (1, 2)], axis=-1)  # [F, T, 3, 2]
+        gradient = edges @ np.linalg.inv(flat)
+        green = 0.5 * (np.swapaxes(gradient, -1, -2) @ gradient - np.eye(2))
+        principal = np.linalg.eigvalsh(green)
+        return np.where(np.abs(principal[..., 0]) > np.abs(principal[..., 1]), principal[..., 0], principal[..., 1])
+
     def _tip(self) -> int:
         """The node that moves furthest from where it began."""
         return int(np.linalg.norm(self.x - self.x[0], axis=-1).max(axis=0).argmax())
 
     # drive and contacts ---------------------------------------------------------------------------------------------
+
+    def channels(self) -> list[str]:
+        """Names of the drive's channels."""
+        return list(self.trajectory.drive.signals)
 
     def channel(self, name: str) -> np.ndarray:
         """[F] a drive channel in this world."""
@@ -226,6 +298,18 @@ def outlines(model: Model) -> np.ndarray:
     creases = {(min(j, k), max(j, k)) for _, j, k, _ in model.creases.tolist()}
     edges = [e for e, sides in count.items() if 1 in sides.values() and e not in creases]
     return np.array(edges, int).reshape(-1, 2)
+
+
+def _around(model: Model) -> dict[tuple[int, int], tuple[int, int]]:
+    """For the directed sides (a, b) of every panel: the corner before a and the corner after b."""
+    out = {}
+    for p in range(model.panel_count):
+        loops = model.triangles[model.triangle_panel == p].tolist()
+        sides = {(t[i], t[(i + 1) % 3]) for t in loops for i in range(3)}
+        border = [(a, b) for a, b in sides if (b, a) not in sides]
+        following, leading = dict(border), {b: a for a, b in border}
+        out |= {(a, b): (leading[a], following[b]) for a, b in border if a in leading and b in following}
+    return out
 
 
 def unit(v: np.ndarray) -> np.ndarray:

@@ -10,7 +10,12 @@ COLOURS = {
     "grid": (200, 200, 194),
     "outline": (60, 66, 74),
     "crease": (60, 66, 74),
+    "mountain": (214, 48, 49),  # as in drawings of folds: mountains red, valleys blue
+    "valley": (20, 98, 222),
+    "electrode": (222, 170, 76),
+    "live": (255, 214, 60),  # electrodes under voltage
     "poling": (206, 44, 44),
+    "background": (250, 250, 248),
     "field": (24, 98, 214),
     "contact": (16, 140, 84),
     "marker": (236, 84, 164),

@@ -300,7 +300,7 @@ def _write_surroundings(scene: Film, out: Writer):
     size = np.linalg.norm(field, axis=1)
     if size.max() > 0:
         unit, factor = scaled("T", float(size.max()), "m")
-        origin = _field_origin(scene)
+        origin = scene.field_origin()
         vectors = (0.6 * scene.size / size.max() * field)[:, None, :]
         out.moving(
             "field",
@@ -323,12 +323,6 @@ def _write_surroundings(scene: Film, out: Writer):
             labels=np.array([[f"B = {factor * b:.0f} {unit}"] for b in size]),
         )
         out.notes.append(f"Blue arrow: flux density, longest for {factor * size.max():.3g} {unit}.")
-
-
-def _field_origin(scene: Film) -> np.ndarray:
-    right, _, _, _ = scene.camera()
-    centre = (scene.low + scene.high) / 2
-    return centre - right * (0.5 * abs((scene.high - scene.low) @ right) + 0.35 * scene.size)
 
 
 def _write_ground(scene: Film, out: Writer):
