@@ -422,55 +422,9 @@ def _stride(args) -> int:
 
 
 def _demo(args) -> int:
-    from origami_sim.recording import read_recording, stand_in_double_pendulum
-    from origami_sim.report import Section, write_report
-    from origami_sim.results import check_writable
-    from origami_sim.scene import recordings_folder, scene_module, scene_settings
+    from origami_sim import demo
 
-    began = time.perf_counter()
-    out = Path(args.out)
-    scenes = ("box", "crawler", "fold_file")
-    for name in (*scenes, "pendulum_chain"):
-        check_writable(out / name)
-    say = (lambda *_, **__: None) if args.json else print
-    sections, numbers, worst = [], {}, OK
-    for name in scenes:
-        module = scene_module(name)
-        settings = scene_settings(module)
-        say(f"== {name}", flush=True)
-        outcome = module.run(settings, progress=_Bar(name))
-        _save(out / name, name, outcome, settings.as_dict(), [])
-        if not args.json:
-            _tell(args, outcome, out / name)
-        sections.append(Section.of(name, module, outcome, out / name))
-        numbers[name] = outcome.numbers
-        worst = max(worst, _soundness(outcome.trajectory))
-
-    say("== pendulum_chain", flush=True)
-    module = scene_module("pendulum_chain")
-    folder = recordings_folder()
-    real = folder / "pendulum_chain" / "double.csv" if folder else None
-    if real is not None and real.is_file():
-        source, note = real, "real recording"
-    else:
-        note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
-        source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
-    say(f"{note}: {source.name}")
-    recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
-    _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
-    worst = max(worst, _soundness(motion))
-    say(comparison.table())
-    say(comparison.sentence())
-    sections.append(Section.of_comparison("pendulum_chain", module, comparison, note, out / "pendulum_chain"))
-
-    page = write_report(out / "index.html", sections)
-    say(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
-    say(f"done in {time.perf_counter() - began:.0f} s")
-    if args.json:
-        numbers["pendulum_chain"] = {"recording": note, **json.loads(comparison.to_json())}
-        _print_json({"report": str(page), "numbers": numbers, "wall": time.perf_counter() - began})
-    return worst
+    return demo.run(args)
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
