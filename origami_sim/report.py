@@ -175,8 +175,9 @@ def _plot(table: dict, units: dict[str, str]) -> bytes:
     for axes, (unit, lines) in zip(panels, by_unit.items(), strict=False):
         for i, (name, values) in enumerate(lines):
             reference = name.startswith(("reference", "target"))
+            mark = "x" if reference else "o" if x_name == "crease" else "o-"
             axes.plot(
-                x, values, "x" if reference else "o" if x_name == "crease" else "o-", markersize=8 if reference else 4, markeredgewidth=2,
+                x, values, mark, markersize=8 if reference else 4, markeredgewidth=2,
                 color="#222222" if reference else hexadecimal(SERIES[i % len(SERIES)]), label=name.replace("_", " "),
                 zorder=3 if reference else 2, linewidth=1.3,
             )  # fmt: skip

@@ -11,7 +11,8 @@ What a replay holds, on the timeline `sim_time` [s]; geometry is in metres, z up
     ground, scale          the ground plane (if there are contacts) and a scale bar
     markers/...            markers of a recording
     before/..., after/..., channels/...   of a diagnosis: simulations over the recorded outlines; components
-    angles/..., energy/..., work/..., tip/..., centre/..., drive/..., measured/...   scalar series, unit in the name
+    angles/..., energy/..., work/..., tip/..., centre/..., drive/..., measured/..., simulated/...
+                           scalar series, unit in the name
 """
 
 import os
@@ -29,7 +30,7 @@ from origami_sim.errors import InputError
 from origami_sim.recording import Recording
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.view.film import WALK, Film, HasTrajectory
-from origami_sim.view.palette import COLOURS, PLOTTED, SERIES, length_text, scaled
+from origami_sim.view.palette import COLOURS, PLOTTED, SERIES, length_text, nice, scaled
 from origami_sim.view.viewer import TIMELINE
 
 BACKGROUND = (250, 250, 248)
@@ -109,6 +110,7 @@ class Writer:
     stream: rr.RecordingStream
     plots: list[Plot] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    extents: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def moving(self, path: str, times: np.ndarray, archetype, static: dict | None = None, **values: np.ndarray):
         """Sends an entity of which `values` [F, n, ...] change with time and `static` do not."""
@@ -149,6 +151,8 @@ class Writer:
             else rr.SeriesLines(names=name, colors=[colour], widths=[1.5])
         )
         self.stream.log(path, style, static=True)
+        if len(values):
+            self.extents[path] = float(values.min()), float(values.max())
         rr.send_columns(
             path, [rr.TimeColumn(TIMELINE, duration=times)], rr.Scalars.columns(scalars=values), recording=self.stream
         )
@@ -434,7 +438,9 @@ _MEASURED = {"angle": ("deg", 180.0 / np.pi), "length": ("mm", 1e3), "force": ("
 
 
 def _write_recording(recording: Recording, scene: Film, out: Writer):
-    """Markers as points in space, all other channels as measured series."""
+    """Markers as points in space, all other channels as measured series with the simulated ones."""
+    others = any(c.kind != "marker" for c in recording.channels.values())
+    simulated = _simulated(recording, scene, out) if others else {}
     for channel in recording.channels.values():
         values = np.asarray(channel.values, float).reshape(len(recording.times), -1)
         if channel.kind == "marker":
@@ -456,24 +462,35 @@ def _write_recording(recording: Recording, scene: Film, out: Writer):
             continue
         kind = "angle" if channel.is_angle else "force" if channel.kind == "force" else "length"
         unit, factor = _MEASURED[kind]
-        plot = next((p for p in out.plots if channel.kind == "crease_angle" and p.name.startswith("Crease")), None)
-        plot = plot or next((p for p in out.plots if p.name == f"Measured {kind}s ({unit})"), None)
+        name = f"Measured (pale) and simulated {kind}s ({unit})"
+        plot = next((p for p in out.plots if p.name == name), None)
         if plot is None:
-            plot = Plot(f"Measured {kind}s ({unit})")
-            out.plots.append(plot)
+            plot = Plot(name)
+            out.plots.insert(0, plot)
+        predicted = simulated.get(channel.name)
         for i, column in enumerate(values.T):
             suffix = "" if values.shape[1] == 1 else f" {'xyz'[i]}"
-            path = f"/measured/{slug(channel.name + suffix)}"
-            seen = np.isfinite(column)
-            out.series(
-                path,
-                f"measured {channel.name}{suffix} ({unit})",
-                recording.times[seen],
-                factor * column[seen],
-                COLOURS["marker"] if values.shape[1] == 1 else SERIES[i],
-                points=True,
-            )
-            plot.paths.append(path)
+            label, path = f"{channel.name}{suffix} ({unit})", slug(channel.name + suffix)
+            colour, seen = SERIES[len(plot.paths) // 2 % len(SERIES)], np.isfinite(column)
+            pale = tuple((c + 2 * 255) // 3 for c in colour)
+            out.series(f"/measured/{path}", f"measured {label}", recording.times[seen], factor * column[seen], pale,
+                       points=True)  # fmt: skip
+            plot.paths.append(f"/measured/{path}")
+            if predicted is not None:
+                read = factor * predicted.reshape(len(recording.times), -1)[:, i]
+                out.series(f"/simulated/{path}", f"simulated {label}", recording.times, read, colour)
+                plot.paths.append(f"/simulated/{path}")
+
+
+def _simulated(recording: Recording, scene: Film, out: Writer) -> dict[str, np.ndarray]:
+    """What the recording's channels read in the simulation; nothing, with a note, where that cannot be told."""
+    from origami_sim.observe import observe  # it needs the solvers, which a replay without a recording does not
+
+    try:
+        return observe(scene.trajectory, recording, world=scene.world)
+    except InputError as e:
+        out.notes.append(f"No simulated channels: {e}")
+        return {}
 
 
 def _write_notes(scene: Film, out: Writer):
@@ -497,6 +514,20 @@ def _write_notes(scene: Film, out: Writer):
         f"Effects: {', '.join(t.model.effects)}.",
     ]
     out.stream.log("notes", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+ROWS = 3
+"""Plots above each other; further ones are tabs of the last. With four, an axis of a small window shows one number."""
+
+
+def _axis(plot: Plot, out: Writer) -> rrb.ScalarAxis:
+    """The vertical axis of a plot: from and to round numbers, so that more than one of them is shown."""
+    found = [out.extents[p] for p in plot.paths if p in out.extents]
+    low, high = min((a for a, _ in found), default=0.0), max((b for _, b in found), default=0.0)
+    if not (np.isfinite(low) and np.isfinite(high)) or high - low <= 1e-9 * max(abs(low), abs(high)):
+        return rrb.ScalarAxis()
+    step = nice(0.35 * (high - low))
+    return rrb.ScalarAxis(range=(step * np.floor(low / step), step * np.ceil(high / step)))
 
 
 def _blueprint(scene: Film, out: Writer) -> rrb.Blueprint:
@@ -535,6 +566,7 @@ def _blueprint(scene: Film, out: Writer) -> rrb.Blueprint:
             name=p.name,
             contents=[f"+ {path}" for path in p.paths],
             axis_x=axis,
+            axis_y=_axis(p, out),
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
         )
         for p in out.plots
@@ -548,5 +580,6 @@ def _blueprint(scene: Film, out: Writer) -> rrb.Blueprint:
         loop_mode="All",
         playback_speed=min(1.0, duration / 4.0) if duration > 0 else 1.0,
     )
-    root = rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[11, 9]) if plots else left
+    rows = plots if len(plots) <= ROWS else [*plots[: ROWS - 1], rrb.Tabs(*plots[ROWS - 1 :])]
+    root = rrb.Horizontal(left, rrb.Vertical(*rows), column_shares=[11, 9]) if plots else left
     return rrb.Blueprint(root, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time)

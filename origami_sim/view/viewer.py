@@ -21,6 +21,9 @@ from origami_sim.errors import InputError
 TIMELINE = "sim_time"
 """Timeline of replays [s]."""
 
+BAR = 37
+"""Height of the viewer's menu, which is cut off pictures [points]."""
+
 
 def open_replay(path: str | Path) -> subprocess.Popen:
     """Opens a replay in the viewer, in a process of its own that outlives this one.
@@ -77,14 +80,16 @@ def screenshot(
         raise InputError("is outside of the recording", file=source, field="time", value=time, allowed=allowed)
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"
-        why = _photograph(source, picture, time, width, height, timeout)
+        why = _photograph(source, picture, time, width, height + BAR, timeout)
         if why:
             sentence = f"no screenshot: {why}"
             note(sentence) if note else print(sentence, file=sys.stderr)
             return False
         try:
             with Image.open(picture) as image:  # the viewer draws two pixels per point
-                image.convert("RGB").resize((width, height), Image.Resampling.BOX).save(target, format="PNG")
+                bar = round(BAR * image.width / width)  # it warns there of whatever draws
+                shown = image.convert("RGB").crop((0, bar, image.width, image.height))
+                shown.resize((width, height), Image.Resampling.BOX).save(target, format="PNG")
         except OSError as e:
             raise InputError(f"cannot be written ({e.strerror or e})", file=target) from None
     return True
