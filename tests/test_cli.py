@@ -21,7 +21,9 @@ from origami_sim.scene import read_calibration, scene_module
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 
-COMMANDS = ("run", "replay", "compare", "diagnose", "study", "calibrate", "prove", "effects", "stride", "demo", "export")
+COMMANDS = (
+    "run", "replay", "export", "compare", "diagnose", "study", "calibrate", "prove", "effects", "stride", "demo",
+)  # fmt: skip
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
 
