@@ -1,4 +1,4 @@
-"""Writes the moving pictures of the documentation: `python docs/films.py [SCENE ...]`, a few minutes for all of them."""
+"""Writes the moving pictures of the documentation: `python docs/films.py [SCENE ...]` (minutes)."""
 
 import sys
 from pathlib import Path

@@ -287,11 +287,11 @@ def _run(args) -> int:
     folder = Path(args.out or f"runs/{args.scene}")
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(args.scene))
-    _save(folder, args.scene, outcome, settings.as_dict(), args.set)
-    if hasattr(module, "draw"):
+    kept = _save(folder, args.scene, outcome, settings.as_dict(), args.set)
+    if hasattr(module, "draw") and kept == folder:
         module.draw(settings, outcome, folder)
-    _tell(args, outcome, folder)
-    return _soundness(outcome.trajectory)
+    _tell(args, outcome, kept)
+    return _soundness(outcome.trajectory) or (OK if kept == folder else BAD_INPUT)
 
 
 def _replay(args) -> int:
@@ -443,12 +443,14 @@ def _finite(value):
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
-    from origami_sim.results import save_run
+def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> Path | None:
+    """Saves a run and returns where: elsewhere, or nowhere, if the disk is full."""
+    from origami_sim.rescue import save_somewhere
 
-    save_run(
+    return save_somewhere(
         folder,
         outcome.trajectory,
+        note=lambda sentence: print(f"origami-sim: {sentence}", file=sys.stderr),
         scene=scene,
         tables=outcome.tables,
         units=outcome.units or _units(outcome.tables),
@@ -463,7 +465,7 @@ def _units(tables: dict) -> dict[str, str]:
     return {n: n.rsplit("_", 1)[1] for n in names if "_" in n and n.rsplit("_", 1)[1] in known}
 
 
-def _tell(args, outcome: "Outcome", folder: Path) -> None:
+def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
     from origami_sim.results import format_table
     from origami_sim.solve import accuracy
 
@@ -472,7 +474,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
         _print_json(
             {
                 "numbers": outcome.numbers,
-                "folder": str(folder),
+                "folder": None if folder is None else str(folder),
                 "dt": motion.dt,
                 "energy_error": accuracy.worst(motion.energy_error),
                 "notes": motion.notes,
@@ -485,7 +487,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
     said = [str(motion.step), accuracy.sentence(motion.energy_error), f"{motion.wall:.1f} s of computing"]
-    print(f"{'; '.join(filter(None, said))}; run folder: {folder}")
+    print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 
 
 def _soundness(motion: "Trajectory") -> int:

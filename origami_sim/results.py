@@ -28,7 +28,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from origami_sim.drive import Drive, Signal
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, unwritable
 from origami_sim.model import Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory
@@ -370,7 +370,7 @@ def _writing(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as e:
-        raise InputError(f"cannot be written ({e.strerror or e})", file=target, allowed="a writable folder") from None
+        raise unwritable(e, file=target, allowed="a writable folder") from None
 
 
 def _check_target(target: Path):
@@ -448,7 +448,7 @@ def _read_manifest(file: Path) -> dict[str, Any]:
         manifest = json.loads(file.read_text(encoding="utf-8"))
     except OSError as e:
         raise InputError(f"cannot be read ({e.strerror})", file=file) from None
-    except ValueError as e:  # JSON and UTF-8
+    except (ValueError, RecursionError) as e:  # JSON and UTF-8, and what is nested deeply
         raise InputError(f"is not valid JSON ({_first_line(e)})", file=file) from None
     if not isinstance(manifest, dict):
         raise InputError("a manifest is a JSON object", file=file, value=type(manifest).__name__)

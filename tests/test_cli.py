@@ -329,7 +329,7 @@ def refused(call, tmp_path, arguments, words):
         (["run", "castle"], r"no such scene.*castle.*bifold, box, crawler"),
         (["run", "box", "--set", "gapp=1mm"], r"--set: cannot apply this setting; 'gap' is near.*gapp.*gap"),
         (["run", "box", "--set", "gp=2mm"], r"--set: cannot apply this setting; 'gap' is near"),
-        (["run", "box", "--calibration", "."], r"origami-sim: \.: cannot be read \(Is a directory\)"),
+        (["run", "box", "--calibration", "."], r"origami-sim: \.: cannot be read: it is a folder"),
         (["run", "box", "--set", "gap=1m"], r"--set: out of its range.*'gap'.*0\.001 to 0\.006 m"),
         (["run", "box", "--set", "gap=1V"], r"wrong unit.*'gap'.*'V'.*m, cm, mm"),
         (["run", "box", "--set", "thickness=-1mm"], r"out of its range.*thickness"),

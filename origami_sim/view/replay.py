@@ -26,7 +26,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from origami_sim.effects import get
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, unwritable
 from origami_sim.recording import Recording
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.view.film import WALK, Film, HasTrajectory
@@ -79,15 +79,14 @@ def writing(path: str | Path, application: str, identity: str) -> Iterator[rr.Re
     work = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        work.touch()  # rerun reports a file that cannot be made only as a log line
+        # rerun's own writer waits for ever where the disk becomes full
         with rr.RecordingStream(application, recording_id=identity, send_properties=False) as stream:
-            stream.save(work)
+            held = stream.memory_recording()
             yield stream
-            stream.flush()
-            stream.disconnect()
+            work.write_bytes(held.drain_as_bytes())
         os.replace(work, file)
     except OSError as e:
-        raise InputError(f"cannot be written ({e.strerror or e})", file=file, allowed="a writable folder") from None
+        raise unwritable(e, file=file, allowed="a writable folder") from None
     finally:
         work.unlink(missing_ok=True) if work.parent.is_dir() else None
 
