@@ -49,7 +49,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """The content of a TOML file.
 
     Raises:
-        InputError: whatever `read_bytes` refuses, what is no TOML, tables nested beyond `DEEPEST`.
+        InputError: whatever `read_bytes` refuses, what is no TOML, tables nested beyond `DEEPEST`, integers
+            beyond the 64 bits that TOML has.
     """
     file = Path(path)
     data = read_bytes(file, LARGEST_TOML)
@@ -58,11 +59,19 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     if any(line.count(b".") > DEEPEST for line in _keys(data)):
         raise deep
     try:
-        return tomllib.loads(data.decode("utf-8"))
+        tree = tomllib.loads(data.decode("utf-8"))
     except RecursionError:
         raise deep from None
     except ValueError as error:  # malformed, not UTF-8, a number of ten thousand digits
         raise InputError(f"is no valid TOML ({error})", file=file) from None
+    todo: list[Any] = [tree]
+    while todo:
+        value = todo.pop()
+        if isinstance(value, dict | list):
+            todo += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, int) and abs(value) >= 2**63:  # Python has larger ones, which are no float
+            raise InputError("holds an integer beyond 64 bits", file=file, value=str(value))
+    return tree
 
 
 def _keys(data: bytes):

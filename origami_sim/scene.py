@@ -295,7 +295,7 @@ def _setting(name: str, table: object, path: Path) -> Setting:
     if not isinstance(value, (int, float, str, bool)):
         raise InputError("a setting is a number, a word or a switch", file=path, field=name, value=value)
     if isinstance(value, int) and not isinstance(value, bool):
-        value = float(value) if abs(value) < 1e300 else np.inf  # Python's integers have no end
+        value = float(value)
     limits, choices = table.get("range"), table.get("choices", [])
     if limits is not None:
         numbers = isinstance(limits, list) and all(isinstance(v, (int, float)) for v in limits)

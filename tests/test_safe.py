@@ -51,6 +51,7 @@ def test_devices_and_pipes_are_not_read(tmp_path):
         (".".join("a" * 100_000) + " = 1", "nested too deeply"),
         ("[" + ".".join("a" * 100_000) + "]", "nested too deeply"),
         ("a = " + "9" * 10_000, "no valid TOML"),
+        ("a = [1, {b = " + "9" * 400 + "}]", "beyond 64 bits"),
         ("a = = 1", "no valid TOML"),
         ("#" * (LARGEST_TOML + 1), "too large"),
     ],
