@@ -16,7 +16,7 @@ from origami_sim.view.palette import COLOURS, scaled
 FRAMES, BYTES = 240, 1_500_000
 """Frames at most, and bytes of positions at most: a page of six devices stays below 10 MB."""
 
-CODE = Path(__file__).with_name("viewer.js")
+CODE = Path(__file__).with_name("interactive.js")
 
 
 def scripts() -> str:
