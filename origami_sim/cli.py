@@ -120,6 +120,10 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
     p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
+    from origami_sim.view import command as view
+
+    view.register(command("export", view.export, view.SUMMARY, view.EXAMPLE))
+
     p = command(
         "compare",
         _compare,
@@ -308,11 +312,11 @@ def _run(args) -> int:
     folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(name))
-    _save(folder, name, outcome, settings.as_dict(), args.set)
-    if hasattr(module, "draw"):
+    kept = _save(folder, name, outcome, settings.as_dict(), args.set)
+    if hasattr(module, "draw") and kept == folder:
         module.draw(settings, outcome, folder)
-    _tell(args, outcome, folder)
-    return _soundness(outcome.trajectory)
+    _tell(args, outcome, kept)
+    return _soundness(outcome.trajectory) or (OK if kept == folder else BAD_INPUT)
 
 
 def _sweep(args) -> int:
@@ -437,66 +441,22 @@ def _stride(args) -> int:
 
 
 def _demo(args) -> int:
-    from origami_sim.recording import read_recording, stand_in_double_pendulum
-    from origami_sim.report import Section, write_report
-    from origami_sim.results import check_writable
-    from origami_sim.scene import recordings_folder, scene_module, scene_settings
+    from origami_sim import demo
 
-    began = time.perf_counter()
-    out = Path(args.out)
-    scenes = ("box", "crawler", "fold_file")
-    for name in (*scenes, "pendulum_chain"):
-        check_writable(out / name)
-    say = (lambda *_, **__: None) if args.json else print
-    sections, numbers, worst = [], {}, OK
-    for name in scenes:
-        module = scene_module(name)
-        settings = scene_settings(module)
-        say(f"== {name}", flush=True)
-        outcome = module.run(settings, progress=_Bar(name))
-        _save(out / name, name, outcome, settings.as_dict(), [])
-        if not args.json:
-            _tell(args, outcome, out / name)
-        sections.append(Section.of(name, module, outcome, out / name))
-        numbers[name] = outcome.numbers
-        worst = max(worst, _soundness(outcome.trajectory))
-
-    say("== pendulum_chain", flush=True)
-    module = scene_module("pendulum_chain")
-    folder = recordings_folder()
-    real = folder / "pendulum_chain" / "double.csv" if folder else None
-    if real is not None and real.is_file():
-        source, note = real, "real recording"
-    else:
-        note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
-        source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
-    say(f"{note}: {source.name}")
-    recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
-    _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
-    worst = max(worst, _soundness(motion))
-    say(comparison.table())
-    say(comparison.sentence())
-    sections.append(Section.of_comparison("pendulum_chain", module, comparison, note, out / "pendulum_chain"))
-
-    page = write_report(out / "index.html", sections)
-    say(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
-    say(f"done in {time.perf_counter() - began:.0f} s")
-    if args.json:
-        numbers["pendulum_chain"] = {"recording": note, **json.loads(comparison.to_json())}
-        _print_json({"report": str(page), "numbers": numbers, "wall": time.perf_counter() - began})
-    return worst
+    return demo.run(args)
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
 
 
-def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
-    from origami_sim.results import save_run
+def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> Path | None:
+    """Saves a run and returns where: elsewhere, or nowhere, if the disk is full."""
+    from origami_sim.rescue import save_somewhere
 
-    save_run(
+    return save_somewhere(
         folder,
         outcome.trajectory,
+        note=lambda sentence: print(f"origami-sim: {sentence}", file=sys.stderr),
         scene=scene,
         tables=outcome.tables,
         units=outcome.units or _units(outcome.tables),
@@ -511,7 +471,7 @@ def _units(tables: dict) -> dict[str, str]:
     return {n: n.rsplit("_", 1)[1] for n in names if "_" in n and n.rsplit("_", 1)[1] in known}
 
 
-def _tell(args, outcome: "Outcome", folder: Path) -> None:
+def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
     from origami_sim.results import format_table
     from origami_sim.solve import accuracy
 
@@ -520,7 +480,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
         _print_json(
             {
                 "numbers": outcome.numbers,
-                "folder": str(folder),
+                "folder": None if folder is None else str(folder),
                 "dt": motion.dt,
                 "energy_error": accuracy.worst(motion.energy_error),
                 "notes": motion.notes,
@@ -533,7 +493,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
     said = [str(motion.step), accuracy.sentence(motion.energy_error), f"{motion.wall:.1f} s of computing"]
-    print(f"{'; '.join(filter(None, said))}; run folder: {folder}")
+    print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 
 
 def _soundness(motion: "Trajectory") -> int:

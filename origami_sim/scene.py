@@ -4,7 +4,6 @@ import functools
 import importlib
 import os
 import re
-import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -17,6 +16,7 @@ import numpy as np
 from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError, nearest
+from origami_sim.files import read_toml
 from origami_sim.model import Model, Parameters, State
 from origami_sim.quantities import parsed
 from origami_sim.solve.accuracy import check_accuracy
@@ -194,14 +194,7 @@ def read_calibration(source: str | Path) -> Settings:
     path = Path(source)
     if re.fullmatch(r"\w+", str(source)):
         path = Path(str(resources.files("origami_sim.calibrations") / f"{source}.toml"))
-    try:
-        data = tomllib.loads(path.read_text())
-    except OSError as e:
-        raise InputError(
-            f"cannot be read ({e.strerror})", file=path, allowed="a TOML file or a shipped calibration"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
-        raise InputError(f"is not valid TOML ({e})", file=path) from None
+    data = read_toml(path)
     additions: Sequence[Addition] = ()
     if "effects" in data:
         from origami_sim.diagnose.patch import read_additions
@@ -241,6 +234,8 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
                 value=given[name].value,
                 allowed="a word" if isinstance(own[name].value, str) else "a number",
             )
+        if isinstance(given[name].value, bool) and not isinstance(own[name].value, bool):
+            raise InputError("a switch is no number", file=given.file, field=name, value=given[name].value)
     for name in given:
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))

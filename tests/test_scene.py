@@ -106,7 +106,7 @@ GOOD = '[gap]\nvalue = 1\nunit = "m"\nsource = "s"\nmeaning = "m"\n'
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[gap\n", "not valid TOML"),
+        ("[gap\n", "no valid TOML"),
         ('gap = 1\n', r"needs value, unit, source and meaning.*gap"),
         (GOOD.replace('source = "s"\n', ""), r"needs value, unit, source and meaning.*gap"),
         (GOOD + "colour = 3\n", r"unknown key.*gap\.colour.*choices"),
@@ -135,7 +135,7 @@ def test_calibrations_that_cannot_be_read(tmp_path):
         read_calibration("nothing_that_ships")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not valid TOML"):
+    with pytest.raises(InputError, match="no valid TOML"):
         read_calibration(binary)
 
 

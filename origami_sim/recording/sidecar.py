@@ -78,7 +78,6 @@ Any other key is an error. Units: see `origami_sim.units`.
 """
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,11 +86,12 @@ from typing import Any
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_toml
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
 from origami_sim.recording.stated import Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
-from origami_sim.recording.table import Table, first_line, read_bytes
+from origami_sim.recording.table import Table
 from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
 
@@ -156,10 +156,7 @@ class Sidecar:
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
         """Read and check a sidecar; InputError names the first key that is wrong."""
-        try:
-            tree = tomllib.loads(read_bytes(path).decode("utf-8"))
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError(f"is no valid TOML: {first_line(error)}", file=path) from error
+        tree = read_toml(path)
         top = Section(path, "", tree, _TOP_KEYS)
         channels = top.table("channels")
         if not channels:

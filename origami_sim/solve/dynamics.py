@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from origami_sim.solve.implicit import TOLERANCE, Implicit
 from origami_sim.solve.rigid import TOLERANCE as RIGID
 from origami_sim.solve.rigid import batch_of
 from origami_sim.solve.timestep import TimeStep, stable_step
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PER_STEP = 0.01
 """Error of a step of rigid panels over the accuracy asked for, to begin with: runs of tens of steps add up to it.
@@ -41,7 +44,7 @@ class Failure:
         return f"world {self.world} went unstable at t = {self.time:.6g} s at node {self.node}: {self.cause}"
 
 
-@dataclass
+@dataclass(repr=False)
 class Trajectory:
     """Frames of a run.
 
@@ -77,6 +80,22 @@ class Trajectory:
     wall: float = 0.0
     notes: list[str] = field(default_factory=list)
     energy_error: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        from origami_sim.view.summary import trajectory_line  # only who looks pays for it
+
+        return trajectory_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.summary import trajectory_html
+
+        return trajectory_html(self)
+
+    def plot(self, *, world: int = 0) -> "Figure":
+        """Fold angles, displacement and drive over time, as a Matplotlib figure (`view.plot.plot_trajectory`)."""
+        from origami_sim.view.plot import plot_trajectory
+
+        return plot_trajectory(self, world=world)
 
     @property
     def creases(self) -> np.ndarray:

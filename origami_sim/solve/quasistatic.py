@@ -74,7 +74,7 @@ class Jump:
         )
 
 
-@dataclass
+@dataclass(repr=False)
 class QuasiStatic(Trajectory):
     """Frames of a quasi-static motion: a `Trajectory` at rest, of which work is summed from frame to frame.
 

@@ -85,7 +85,7 @@ def test_equal_patches_and_isotropic_feet_do_not_walk(field):
 
 
 def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
-    # -55.7 mm per cycle: the acceptance band of 1 to 50 mm is missed by 5.7 mm (docs/crawler.md)
+    # -55.7 mm per cycle: the acceptance band of 1 to 50 mm is missed by 5.7 mm (docs/paper/crawler.md)
     stride, _ = walk(8, "crawler_printed")
     assert stride[4:].std() < 0.02 * abs(stride[4:].mean())
     stiffer, _ = walk(8, "crawler_printed", ground_stiffness=2000.0)
