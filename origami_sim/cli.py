@@ -6,7 +6,6 @@ went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier res
 
 import argparse
 import functools
-import json
 import os
 import sys
 import time
