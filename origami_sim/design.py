@@ -28,7 +28,7 @@ import numpy as np
 
 from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
-from origami_sim.drive import Drive, Signal, ramp, series, sine
+from origami_sim.drive import CHANNELS, Drive, Signal, ramp, series, sine
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters
 from origami_sim.model_file import model_tables, read_model
@@ -150,7 +150,7 @@ def write_design(
     for name, s in signals.items():
         if s.worlds > 1:
             raise InputError("a design has one drive", field=name, value=f"{s.worlds} worlds", allowed="one world")
-        if not s.is_zero or (name.startswith("voltage_") and len(signals) > 15):
+        if not s.is_zero or (name.startswith("voltage_") and len(signals) > len(CHANNELS) + 1):
             lines.append(f"{name} = {_toml(_signal(s))}")
     tables = {"pattern": _pattern_table(source.pattern)} if isinstance(source, Sheet) else model_tables(*source)
     for name, table in tables.items():

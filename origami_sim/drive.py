@@ -16,8 +16,12 @@ CHANNELS = (
     *(f"gradient_{i}{j}" for i in "xyz" for j in "xyz"),
     "temperature",
     "load",
+    "origin",
 )
-"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow."""
+"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow.
+
+The origin is the age [s] of the device at the start: laws of time count from it.
+"""
 
 SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 """How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
@@ -157,7 +161,7 @@ class Drive:
         field: flux density at the origin, three numbers or signals [T]; numbers may be quantities, "50 mT".
         gradient: 3 x 3 nested numbers or signals, dB_i/dx_j [T/m].
         voltage: a number or signal [V], or one for each electrode group.
-        temperature: rise above the rest state [K]. load: load factor [-].
+        temperature: rise above the rest state [K]. load: load factor [-]. origin: age of the device at the start [s].
 
     Raises:
         InputError: wrong number of components, times that do not increase, values that are not finite.
@@ -171,6 +175,7 @@ class Drive:
         voltage: Value | Sequence[Value] = 0.0,
         temperature: Value = 0.0,
         load: Value = 0.0,
+        origin: Value = 0.0,
     ):
         if len(field) != 3:
             raise InputError("a field has three components", field="field", value=len(field), allowed="3")
@@ -178,8 +183,8 @@ class Drive:
         if len(gradient) != 3 or any(len(row) != 3 for row in gradient):
             raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
-        values: list = [*field, *(g for row in gradient for g in row), temperature, load, *voltages]
-        units = [*["T"] * 3, *["T/m"] * 9, "K", "1", *["V"] * len(voltages)]
+        values: list = [*field, *(g for row in gradient for g in row), temperature, load, origin, *voltages]
+        units = [*["T"] * 3, *["T/m"] * 9, "K", "1", "s", *["V"] * len(voltages)]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
         self.signals = {n: as_signal(v, u) for n, v, u in zip(names, values, units, strict=True)}
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from origami_sim.drive import Drive
+from origami_sim.drive import CHANNELS, Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
@@ -89,7 +89,7 @@ class Batch:
         def constant(a, dtype):
             return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
-        groups = len(drive.signals) - 14
+        groups = len(drive.signals) - len(CHANNELS)
         if len(model.electrodes) and model.electrodes.max(initial=0) >= groups:
             raise InputError(
                 "the drive has too few electrode groups",
