@@ -1,7 +1,7 @@
 """`origami-sim`: run scenes, replay runs, compare and diagnose recordings, list effects, check strides.
 
-Exit codes: 0 done; 1 done, but the answer is no (a regression changed); 2 bad input, nothing written over; 3 a world
-went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier results untouched.
+Exit codes: 0 done; 1 done, but the answer is no (a regression changed, a pattern missed its target angles); 2 bad
+input, nothing written over; 3 a world went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted.
 """
 
 import argparse
@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
+PATTERNS = (".svg", ".fold", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -83,17 +84,14 @@ def _parser() -> argparse.ArgumentParser:
         p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
         return p
 
-    p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
-    p.add_argument("scene", help=", ".join(import_module("origami_sim.scenes").NAMES))
-    p.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
-    )
+    summary = "Simulate a device, or fold a crease pattern, and leave its run folder"
+    p = command("run", _run, summary, "origami-sim run box --set gap=2.54mm; origami-sim run crane.svg --set size=15cm")
+    p.add_argument("scene", help="a pattern (.svg, .fold) or " + ", ".join(import_module("origami_sim.scenes").NAMES))
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (with unit)")
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
     p.add_argument("--panels", choices=("elastic", "rigid"), help="bars and bending lines, or rigid bodies on hinges")
-    p.add_argument(
-        "--quasistatic", action="store_true", help="equilibria along time, without inertia: creep, slow drives"
-    )
+    p.add_argument("--quasistatic", action="store_true", help="equilibria along time, no inertia: creep, slow drives")
     p.add_argument("--until", type=float, metavar="SECONDS", help="of a quasi-static motion: hold it on until then")
     p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
@@ -149,11 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
     )
-    p.add_argument(
-        "--start-at",
-        choices=("rest", "fit"),
-        help="simulate from rest, or fit every start (default: as recorded)",
-    )
+    p.add_argument("--start-at", choices=("rest", "fit"), help="simulate from rest, or fit every start")
     p.add_argument("--seed", type=int, default=0, help="of the draws under the null hypothesis (default 0)")
     p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
 
@@ -265,7 +259,10 @@ def _run(args) -> int:
     from origami_sim.results import check_writable
     from origami_sim.scene import scene_module, scene_settings
 
-    module = scene_module(args.scene)
+    pattern = Path(args.scene).suffix.lower() in PATTERNS
+    module = import_module("origami_sim.folding.command") if pattern else scene_module(args.scene)
+    if pattern:
+        module.check(args)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
@@ -280,6 +277,8 @@ def _run(args) -> int:
                 value = f"{s.value:g}" if isinstance(s.value, float) else s.value
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
+    if pattern:
+        return module.run(args, settings, _Bar(Path(args.scene).stem))
     folder = Path(args.out or f"runs/{args.scene}")
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(args.scene))
