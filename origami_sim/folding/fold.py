@@ -20,8 +20,8 @@ from .elastic import Elastic, Shape
 from .placement import Placement
 
 SOFTNESS = (1e-3, 1e-2, 1e-1)
-"""Stiffnesses of creases over that of the sheet in its plane, tried in turn, from a sheet to a rubber skin that is drawn
-to its targets whatever it takes. The stiffest that reaches them is chosen."""
+"""Stiffnesses of creases over that of the sheet in its plane, tried in turn, from a sheet to a rubber skin that is
+drawn to its targets whatever it takes. The stiffest that reaches them is chosen."""
 STEPS = 20
 """Steps of the targets. Half of them lose 1 of 46 public patterns, double gain none."""
 ITERATIONS, LAST = 15, 60

@@ -11,9 +11,10 @@ SLACK = 1e-9
 def crossing_pairs(x, triangles, depth: float) -> np.ndarray:
     """Return the pairs [P, 2] of triangles that cross each other by more than a depth.
 
-    Two triangles cross where an edge of one goes through the inside of the other (Moller 1997 without his shortcuts);
-    how deep is the least distance by which one of them would have to be moved along a normal to be clear of the other's
-    plane. Triangles that only touch, share an edge or lie in one plane do not cross.
+    Each of two triangles that cross meets the other's plane in a piece of the line common to both planes, and these
+    pieces overlap (Moller 1997, doi:10.1080/10867651.1997.10487472). How deep is the least distance by which one of
+    them would have to be moved along a normal to be clear of the other's plane. Triangles that only touch, share an
+    edge or lie in one plane do not cross.
 
     Args:
         x: [N, 3] positions [m]. triangles: [T, 3] node triples. depth: [m], the sheet's thickness.
@@ -43,10 +44,14 @@ def _near_pairs(x, triangles):
 def _crossing(x, triangles, pairs, depth) -> np.ndarray:
     a, b = x[triangles[pairs[:, 0]]], x[triangles[pairs[:, 1]]]
     slack = SLACK * float(np.ptp(x, axis=0).max())
-    of_b, of_a = _heights(a, b), _heights(b, a)
+    of_a, of_b = _heights(b, a), _heights(a, b)  # of its corners above the other's plane
     deep = np.minimum(_least(of_b), _least(of_a)) > max(depth, slack)
     a, b, of_a, of_b, pairs = a[deep], b[deep], of_a[deep], of_b[deep], pairs[deep]
-    return pairs[_pierced(a, b, of_b, slack) | _pierced(b, a, of_a, slack)]
+    line = np.cross(_normals(a), _normals(b))
+    line /= np.maximum(np.linalg.norm(line, axis=1), 1e-300)[:, None]
+    origin = a[:, 0]
+    (low_a, high_a), (low_b, high_b) = _piece(a, of_a, line, origin), _piece(b, of_b, line, origin)
+    return pairs[np.minimum(high_a, high_b) - np.maximum(low_a, low_b) > slack]
 
 
 def _normals(t) -> np.ndarray:
@@ -64,19 +69,14 @@ def _least(heights) -> np.ndarray:
     return np.maximum(np.minimum(heights.max(axis=1), -heights.min(axis=1)), 0.0)
 
 
-def _pierced(t, other, heights, slack) -> np.ndarray:
-    """Tell which triangles `t` are pierced by an edge of `other`, whose corners have `heights` above them."""
-    out = np.zeros(len(t), dtype=bool)
-    normal = _normals(t)
+def _piece(t, heights, line, origin) -> tuple[np.ndarray, np.ndarray]:
+    """Return where along a line [P, 3] triangles `t` begin and end to meet a plane, from their `heights` above it."""
+    low, high = np.full(len(t), np.inf), np.full(len(t), -np.inf)
     for m, n in ((0, 1), (1, 2), (2, 0)):
         h, k = heights[:, m], heights[:, n]
-        through = ((h > slack) & (k < -slack)) | ((h < -slack) & (k > slack))
+        through = (h * k <= 0.0) & (h != k)
         share = np.where(through, h / np.where(through, h - k, 1.0), 0.0)
-        point = other[:, m] + share[:, None] * (other[:, n] - other[:, m])
-        inside = through
-        for p, q in ((0, 1), (1, 2), (2, 0)):
-            side = t[:, q] - t[:, p]
-            away = np.einsum("pa,pa->p", np.cross(side, point - t[:, p]), normal) / np.linalg.norm(side, axis=1)
-            inside = inside & (away > slack)
-        out |= inside
-    return out
+        point = t[:, m] + share[:, None] * (t[:, n] - t[:, m]) - origin
+        at = np.einsum("pa,pa->p", point, line)
+        low, high = np.where(through, np.minimum(low, at), low), np.where(through, np.maximum(high, at), high)
+    return low, high
