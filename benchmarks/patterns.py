@@ -1,10 +1,11 @@
 """Fold every pattern of a folder and write the scoreboard of docs/patterns.md.
 
-python benchmarks/patterns.py FOLDER [--out docs/patterns_table.md] [--pictures FOLDER] [--only WORD ...] [--jobs 1]
+python benchmarks/patterns.py FOLDER [--out docs/patterns.md] [--pictures FOLDER] [--only WORD ...] [--jobs 1]
 
-A pattern counts as meant to fold unless its own targets forbid it: they contradict each other at a vertex, or fold
-curves flat (`origami_sim.folding.consistency`). Results are kept beside --out as .json, so that an interrupted run goes
-on; --again forgets them.
+Without --out the scoreboard goes to runs/patterns.md; a page that has the two marks is filled between them. A pattern
+counts as meant to fold unless its own targets forbid it: they contradict each other at a vertex, or fold curves flat
+(`origami_sim.folding.consistency`). Results are kept in --results, so that an interrupted run goes on; --again forgets
+them.
 """
 
 import argparse
@@ -15,9 +16,10 @@ from pathlib import Path
 
 from origami_sim.errors import InputError
 from origami_sim.folding import fold, read, summarise
+from origami_sim.folding.fold import THICKNESS
 
 SUFFIXES = (".svg", ".fold")
-THICKNESS = 2e-4
+BEGIN, END = "<!-- scoreboard -->", "<!-- end of the scoreboard -->"
 HEAD = "| pattern | creases | furthest | rms | strain | panels bend | cross | s | end |"
 
 
@@ -54,11 +56,12 @@ def row(name: str, r: dict) -> str:
     """Return one line of the table."""
     if not r.get("target"):
         return f"| {name} | | | | | | | | {'not read' if not r['read'] else 'no target'}: {r['reason']} |"
+    share = f"{r['missed']:.0f} missed: " if r["missed"] else ""
     end = "**folds**" if r["reached"] and not r["crossing_pairs"] else "folds, through itself" if r["reached"] else ""
     return (
         f"| {name} | {r['creases']:.0f} | {r['largest_error_deg']:.1f} | {r['rms_error_deg']:.1f} | "
         f"{r['largest_strain']:.1%} | {r['largest_bend_deg']:.0f} | {r['crossing_pairs']:.0f} | {r['seconds']:.0f} | "
-        f"{end or r['reason']} |"
+        f"{end or share + r['reason']} |"
     )
 
 
@@ -90,10 +93,19 @@ def scoreboard(results: dict[str, dict]) -> str:
     )
 
 
+def write(page: Path, text: str) -> None:
+    """Write the scoreboard as a page of its own, or between the marks of one that is there."""
+    before, mark, after = (page.read_text() if page.is_file() else "").partition(BEGIN)
+    if mark:
+        text = f"{before}{BEGIN}\n{text}\n{END}{after.partition(END)[2]}"
+    page.write_text(text)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/patterns.md"))
+    parser.add_argument("--results", type=Path, default=Path("runs/patterns.json"))
     parser.add_argument("--pictures", type=Path, help="folder for a picture of each")
     parser.add_argument("--only", nargs="*", default=[], help="words, one of which the path must contain")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -101,8 +113,9 @@ def main():
     args = parser.parse_args()
     files = sorted(p for p in args.folder.rglob("*") if p.suffix.lower() in SUFFIXES)
     names = {p.relative_to(args.folder).as_posix(): p for p in files}
-    kept, results = args.out.with_suffix(".json"), {}
-    args.out.parent.mkdir(parents=True, exist_ok=True)
+    kept, results = args.results, {}
+    for file in (kept, args.out):
+        file.parent.mkdir(parents=True, exist_ok=True)
     if kept.is_file() and not args.again:
         results = json.loads(kept.read_text())
     todo = {n: p for n, p in names.items() if n not in results and (not args.only or any(w in n for w in args.only))}
@@ -117,8 +130,7 @@ def main():
             results[name] = job.result()
             print(row(name, results[name]), flush=True)
             kept.write_text(json.dumps(results, indent=1))
-            args.out.write_text(scoreboard(results))
-    args.out.write_text(scoreboard(results))
+    write(args.out, scoreboard(results))
     print(f"{args.out}: {len(results)} patterns")
 
 

@@ -48,7 +48,13 @@ def run(args, settings: Settings, progress) -> int:
     check_writable(folder)
     pattern = read(path, size=settings.size or None, scale=settings.scale or None, merge=settings.merge or None)
     try:
-        folding = fold(pattern, steps=round(settings.steps), tolerance=settings.tolerance, progress=progress)
+        folding = fold(
+            pattern,
+            steps=round(settings.steps),
+            tolerance=settings.tolerance,
+            thickness=settings.thickness,
+            progress=progress,
+        )
     except InputError as e:
         if e.file is None:
             raise InputError(f"{path}: {e}".removesuffix(".")) from None

@@ -57,7 +57,7 @@ class Elastic:
     """Bars and hinges of a triangulated pattern.
 
     Args:
-        pattern: with fold angles for the creases that are to be driven.
+        pattern: with fold angles for the creases that are to be driven; mountains and valleys without one fold flat.
         softness: stiffness of a crease per length over E t and over the median length of the mesh edges.
 
     Attributes:
@@ -75,8 +75,7 @@ class Elastic:
         self.bars, self.hinges = mesh.bars, np.vstack([mesh.creases, mesh.bends])
         self.lengths = _lengths(self.reference, self.bars)
         self.axes = _lengths(self.reference, self.hinges[:, 1:3])
-        bends = np.full(len(mesh.bends), np.nan)
-        given = np.concatenate([pattern.fold_angles[mesh.crease_edge], bends])
+        given = np.concatenate([_targets(pattern)[mesh.crease_edge], np.full(len(mesh.bends), np.nan)])
         self.driven, self.target = ~np.isnan(given), np.nan_to_num(given)
         self.start = hinge_angles(self.reference, self.hinges)
         flat = self.driven & (np.abs(self.start) > np.pi - CLOSED)  # folded flat, to the side of the target
@@ -182,6 +181,13 @@ class Elastic:
             if gained < GAIN * energy:
                 break
         return Shape(x, angles, 0.5 * max(energy, 0.0))
+
+
+def _targets(pattern: Pattern) -> np.ndarray:
+    """Return the fold angles [E] [rad], half a turn for mountains and valleys that give none."""
+    flat = {"M": -np.pi, "V": np.pi}
+    default = np.array([flat.get(letter, np.nan) for letter in pattern.assignments])
+    return np.where(np.isnan(pattern.fold_angles), default, pattern.fold_angles)
 
 
 def near(angles, previous) -> np.ndarray:

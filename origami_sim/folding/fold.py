@@ -17,6 +17,7 @@ from origami_sim.pattern import Pattern
 
 from .consistency import Vertex, vertices
 from .elastic import Elastic, Shape
+from .intersections import crossing_pairs
 from .placement import Placement
 
 SOFTNESS = (1e-3, 1e-2, 1e-1)
@@ -30,6 +31,8 @@ LOWER = 0.9
 """Share of the energy below which another shape is taken as a snap rather than as the same."""
 STRETCH = 0.05
 """Strain beyond which a sheet counts as torn, besides the drawing's inaccuracy: paper breaks at 2 to 5 per cent."""
+THICKNESS = 2e-4
+"""Thickness of a sheet that states none [m]: heavy paper."""
 TOLERANCE = np.radians(5.0)
 """Distance from its target within which a crease has arrived [rad]."""
 
@@ -107,14 +110,16 @@ def fold(
     *,
     steps: int = STEPS,
     tolerance: float = TOLERANCE,
+    thickness: float = THICKNESS,
     progress: Callable[[float], None] | None = None,
 ) -> Folding:
     """Fold a pattern to its target angles, as far as they can be reached together.
 
     Args:
-        pattern: with fold angles of mountains and valleys.
+        pattern: with mountains and valleys, which fold flat where they have no angle.
         steps: in which the targets grow.
         tolerance: distance from the target within which a crease has arrived [rad].
+        thickness: of the sheet [m]: panels that cross by more pass through each other.
         progress: called with the fraction done.
 
     Returns:
@@ -137,6 +142,8 @@ def fold(
         sheet.softness = softness
         path = _follow(sheet, placement, steps, part)
         used = _stiffen(sheet, path, tolerance)
+        if sheet.errors(path.shapes[-1].angles).max() <= tolerance:
+            used = _untangle(sheet, path, thickness / sheet.size)
         found = _folding(sheet, path, used, tolerance)
         found.vertices = around
         if found.reached:
@@ -191,6 +198,29 @@ def _stiffen(sheet: Elastic, path: _Path, tolerance: float) -> float:
         if sheet.errors(firmer.angles).max() > tolerance:
             break
         path.shapes[-1], used = firmer, softness
+    sheet.softness = used
+    return used
+
+
+def _untangle(sheet: Elastic, path: _Path, depth: float) -> float:
+    """Relax the last state of a path in softer sheets while fewer panels cross by `depth`; return the softness.
+
+    Where a drawing is inexact, either angles or lengths have to give way, and layers that are a degree off cross.
+    """
+    used = sheet.softness
+
+    def crossings(shape: Shape) -> int:
+        return len(crossing_pairs(shape.x, sheet.mesh.triangles, depth))
+
+    count = crossings(path.shapes[-1])
+    for softness in [s for s in SOFTNESS if s > used]:
+        if not count:
+            break
+        sheet.softness = softness
+        softer = sheet.relax(path.shapes[-1], sheet.target, LAST)
+        fewer = crossings(softer)
+        if fewer < count and np.max(sheet.misfits(softer.x), initial=0.0) <= STRETCH:
+            path.shapes[-1], used, count = softer, softness, fewer
     sheet.softness = used
     return used
 

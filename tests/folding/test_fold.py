@@ -25,9 +25,9 @@ def square_twist(path):
     ways = [np.array(w) for w in ((1, 0), (0, 1), (-1, 0), (0, -1))]
     for n, p in enumerate(inner):
         ahead = ways[n]
-        lines.append(("M", *p, *(p + (2 - p @ ahead) * ahead)))
+        lines.append(("V", *p, *(p + (2 - p @ ahead) * ahead)))
         side = ways[(n + 1) % 4]
-        lines.append(("V", *p, *(p + (2 - p @ side) * side)))
+        lines.append(("M", *p, *(p + (2 - p @ side) * side)))
     return drawn(path, lines)
 
 
@@ -121,7 +121,7 @@ def test_a_shape_that_is_folded_already_stays_as_it_is():
 
 def test_nothing_to_fold_is_refused():
     with pytest.raises(InputError, match="no target angle"):
-        fold(miura(1, 1, 0.02, 0.02, np.radians(60)))
+        fold(grid(2, 1, 0.02, 0.02))
     with pytest.raises(InputError, match="no crease"):
         fold(grid(1, 1, 0.1, 0.1))
 
