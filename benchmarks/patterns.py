@@ -71,7 +71,7 @@ def scoreboard(results: dict[str, dict]) -> str:
     targets = [r for r in known if r.get("target")]
     meant = [r for r in targets if r["meant"]]
     good = [r for r in meant if r["reached"] and not r["crossing_pairs"]]
-    through = sum(r["reached"] and r["crossing_pairs"] > 0 for r in meant)
+    through = sum(bool(r["reached"] and r["crossing_pairs"]) for r in meant)
 
     def share(n, of):
         return f"{n} of {of} ({n / max(of, 1):.0%})"
@@ -84,6 +84,7 @@ def scoreboard(results: dict[str, dict]) -> str:
             f"| of these, with target angles that do not forbid each other | {share(len(meant), len(targets))} |",
             f"| of those, all creases within 5 degrees and no panel through another | {share(len(good), len(meant))} |",
             f"| of those, all creases within 5 degrees, but through itself | {share(through, len(meant))} |",
+            f"| of all that are read, all creases within 5 degrees | {share(len(good), len(targets))} |",
             "",
             HEAD,
             "|" + "---|" * HEAD.count(" | ") + "---|",
