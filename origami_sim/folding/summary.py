@@ -88,10 +88,12 @@ def _verdict(folding: Folding, missed: int, order, creases) -> str:
         whole = "" if not folding.torn else ", but only by tearing the sheet"
         return f"All {count} creases fold to within {max(worst, 0.01):.2f} deg of their targets{whole}."
     first = {name: column[order[0]] for name, column in creases.items()}
+    wrong = int(np.sum((creases["angle_deg"] * creases["target_deg"] < 0) & (np.abs(creases["angle_deg"]) > 1.0)))
+    popped = f" {wrong} of them have popped to the other side." if wrong else ""
     return (
         f"MISSED: {missed} of {count} creases end more than {limit} from their targets; the furthest, edge "
         f"{first['edge']} at ({first['x_mm']:.1f}, {first['y_mm']:.1f}) mm, by {first['error_deg']:.1f} deg "
-        f"({first['angle_deg']:.1f} instead of {first['target_deg']:.1f})."
+        f"({first['angle_deg']:.1f} instead of {first['target_deg']:.1f}).{popped}"
     )
 
 
