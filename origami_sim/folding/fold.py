@@ -42,15 +42,15 @@ class Folding:
     """How a pattern folded.
 
     Attributes:
-        sheet: what was folded, with its targets.
+        sheet: what was folded, with its targets. vertices: what these say at each vertex inside the sheet.
         shares: [F] share of the target angles at each frame. x: [F, N, 3] positions [m].
         angles: [F, H] continuous hinge angles, creases first [rad].
         snaps: frames before which the sheet jumped to another shape.
         softness: of the sheet, see `SOFTNESS`. tolerance: [rad]. wall: seconds that it took.
-        vertices: what the targets say at each vertex inside the sheet.
     """
 
     sheet: Elastic
+    vertices: list[Vertex]
     shares: np.ndarray
     x: np.ndarray
     angles: np.ndarray
@@ -58,7 +58,6 @@ class Folding:
     softness: float
     tolerance: float
     wall: float = 0.0
-    vertices: list[Vertex] = field(default_factory=list)
 
     @property
     def errors(self) -> np.ndarray:
@@ -69,6 +68,12 @@ class Folding:
     def stretch(self) -> float:
         """Largest strain at the end."""
         return float(np.abs(self.sheet.strains(self.x[-1] / self.sheet.size)).max(initial=0.0))
+
+    @property
+    def stretch_on_the_way(self) -> float:
+        """Largest strain of any frame."""
+        strains = [np.abs(self.sheet.strains(x / self.sheet.size)).max(initial=0.0) for x in self.x]
+        return float(max(strains))
 
     @property
     def torn(self) -> bool:
@@ -144,8 +149,7 @@ def fold(
         used = _stiffen(sheet, path, tolerance)
         if sheet.errors(path.shapes[-1].angles).max() <= tolerance:
             used = _untangle(sheet, path, thickness / sheet.size)
-        found = _folding(sheet, path, used, tolerance)
-        found.vertices = around
+        found = _folding(sheet, around, path, used, tolerance)
         if found.reached:
             best = found
             break
@@ -153,8 +157,7 @@ def fold(
         firm = sheet.relax(path.shapes[-1], sheet.target, LAST)
         if best is None or firm.energy < LOWER * lowest:
             path.shapes[-1], lowest = firm, firm.energy
-            best = _folding(sheet, path, SOFTNESS[0], tolerance)
-            best.vertices = around
+            best = _folding(sheet, around, path, SOFTNESS[0], tolerance)
         if best.contradictions or best.curved:
             break  # no softer sheet gets there either
     assert best is not None
@@ -225,9 +228,10 @@ def _untangle(sheet: Elastic, path: _Path, depth: float) -> float:
     return used
 
 
-def _folding(sheet: Elastic, path: _Path, softness: float, tolerance: float) -> Folding:
+def _folding(sheet: Elastic, around: list[Vertex], path: _Path, softness: float, tolerance: float) -> Folding:
     return Folding(
         sheet=sheet,
+        vertices=around,
         shares=np.array(path.shares),
         x=_steady([s.x for s in path.shapes]) * sheet.size,
         angles=np.array([s.angles for s in path.shapes]),

@@ -60,8 +60,9 @@ def _draw(axes, folding: Folding, x) -> None:
     colours = np.concatenate([faces, inks])[order]
     shapes = np.concatenate([screen[mesh.triangles], screen[mesh.creases[:, [1, 2, 2]]]])
     widths = np.repeat([0.3, 0.9], [len(faces), len(inks)])
-    drawn = {"facecolors": colours, "edgecolors": colours, "linewidths": widths[order]}
-    axes.add_collection(PolyCollection(list(shapes[order]), **drawn))
+    pieces = PolyCollection(list(shapes[order]))
+    pieces.set(facecolors=colours, edgecolors=colours, linewidths=widths[order])
+    axes.add_collection(pieces)
     middle, reach = 0.5 * (screen.max(axis=0) + screen.min(axis=0)), 0.55 * float(np.ptp(screen, axis=0).max())
     axes.set(xlim=middle[0] + reach * np.array([-1, 1]), ylim=middle[1] + reach * np.array([-1, 1]), aspect="equal")
     axes.set_axis_off()

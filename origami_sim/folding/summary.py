@@ -43,6 +43,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         "largest_error_deg": float(np.degrees(errors.max())),
         "rms_error_deg": float(np.degrees(np.sqrt(np.mean(errors**2)))),
         "largest_strain": folding.stretch,
+        "largest_strain_on_the_way": folding.stretch_on_the_way,
         "largest_bend_deg": float(np.degrees(bends.max(initial=0.0))),
         "crossing_pairs": float(crossing),
         "snaps": float(len(folding.snaps)),
@@ -126,6 +127,16 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
             f"The targets strain the sheet by more than {STRETCH:.0%}: it would tear.",
             "Try: smaller angles; facets (yellow) across the strained panels; or vertices put where they belong.",
         ]
+    apart = sorted((v for v in folding.vertices if v.gap > folding.tolerance), key=lambda v: -v.gap)
+    if apart:
+        x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
+        return f"targets do not fit together at {len(apart)} vertices", [
+            f"At {len(apart)} vertices the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, where "
+            f"they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is shown is the "
+            "compromise of least energy.",
+            "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
+            "that may take what it needs; facets (yellow) across the panels.",
+        ]
     return "no way there was found", [
         "No vertex forbids these angles, but following the sheet there ends in a cul-de-sac: panels that may not bend "
         "so far, or folds that have to be made one after the other.",
@@ -135,6 +146,8 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
 
 def _strain(folding: Folding, numbers) -> str:
     text = f"Largest strain {numbers['largest_strain']:.2%}"
+    if numbers["largest_strain_on_the_way"] > max(2.0 * numbers["largest_strain"], 1e-3):
+        text += f", on the way {numbers['largest_strain_on_the_way']:.1%}"
     if numbers["largest_bend_deg"] > 0.5:
         text += f", panels bend by up to {numbers['largest_bend_deg']:.0f} deg about a line"
     strained = np.abs(folding.sheet.strains(folding.x[-1] / folding.sheet.size))
