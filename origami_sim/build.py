@@ -9,13 +9,10 @@ from origami_sim.bodies import rigid
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.masses import Masses, Stated, positive
-from origami_sim.materials import MATERIALS, layered_rigidity, material
+from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.shell import Shell, assign, stated
-
-MEMBRANE_POISSON = 1.0 / 3.0
-"""The only Poisson's ratio that bars along triangle edges reproduce in shear."""
 
 
 class Sheet(Masses):

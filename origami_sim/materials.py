@@ -11,6 +11,9 @@ MU0 = 1.25663706212e-6
 EPS0 = 8.8541878128e-12
 """Permittivity of free space [F/m]."""
 
+MEMBRANE_POISSON = 1.0 / 3.0
+"""The only Poisson's ratio that bars along triangle edges reproduce in shear."""
+
 
 @dataclass(frozen=True)
 class Material:

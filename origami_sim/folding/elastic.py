@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from origami_sim.build import MEMBRANE_POISSON
+from origami_sim.materials import MEMBRANE_POISSON
 from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulate
 
 BEND = 0.1
