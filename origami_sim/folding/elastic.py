@@ -20,7 +20,7 @@ from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulat
 
 BEND = 0.1
 """Stiffness of the lines that triangulate a panel over that of a driven crease of that length: panels give way, so that
-what is not rigidly foldable can fold. Of 46 public patterns a half and double reach their targets alike."""
+what is not rigidly foldable can fold."""
 FREE = 1e-3
 """The same for creases without a target, which only have to be somewhere."""
 SLIVER = 0.05

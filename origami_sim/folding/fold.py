@@ -24,11 +24,11 @@ SOFTNESS = (1e-3, 1e-2, 1e-1)
 """Stiffnesses of creases over that of the sheet in its plane, tried in turn, from a sheet to a rubber skin that is
 drawn to its targets whatever it takes. The stiffest that reaches them is chosen."""
 STEPS = 20
-"""Steps of the targets. Half of them lose 1 of 46 public patterns, double gain none."""
+"""Steps of the targets, as many as a replay wants frames. Half of them take half the time and larger snaps."""
 ITERATIONS, LAST = 15, 60
-"""Iterations at most in a step, and at the full targets."""
+"""Iterations at most in a step, which only has to stay near the path, and at the full targets, where it has to get."""
 LOWER = 0.9
-"""Share of the energy below which another shape is taken as a snap rather than as the same."""
+"""Share of the energy below which another shape is taken as a snap rather than as the same minimum, less well found."""
 STRETCH = 0.05
 """Strain beyond which a sheet counts as torn, besides the drawing's inaccuracy: paper breaks at 2 to 5 per cent."""
 THICKNESS = 2e-4
