@@ -106,8 +106,8 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
     if against:
         worst = against[0]
         x, y = 1e3 * sheet.mesh.vertices[worst.node, :2]
-        return f"targets contradict each other at {len(against)} vertices", [
-            f"No shape has all these angles: at {len(against)} vertices the panels do not close, worst at ({x:.1f}, "
+        return f"targets contradict each other at {_vertices(len(against))}", [
+            f"No shape has all these angles: at {_vertices(len(against))} the panels do not close, worst at ({x:.1f}, "
             f"{y:.1f}) mm, where they miss by {np.degrees(worst.gap):.0f} deg and one of the {len(worst.creases)} "
             f"creases stays off by at least {np.degrees(worst.bound):.0f} deg. What is shown is the compromise of "
             "least energy.",
@@ -130,9 +130,9 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
     apart = sorted((v for v in folding.vertices if v.gap > folding.tolerance), key=lambda v: -v.gap)
     if apart:
         x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
-        return f"targets do not fit together at {len(apart)} vertices", [
-            f"At {len(apart)} vertices the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, where "
-            f"they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is shown is the "
+        return f"targets do not fit together at {_vertices(len(apart))}", [
+            f"At {_vertices(len(apart))} the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, "
+            f"where they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is shown is the "
             "compromise of least energy.",
             "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
             "that may take what it needs; facets (yellow) across the panels.",
@@ -142,6 +142,10 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
         "so far, or folds that have to be made one after the other.",
         "Try: facets (yellow) across large panels; more steps (--set steps=100); some of the angles first.",
     ]
+
+
+def _vertices(count: int) -> str:
+    return f"{count} vert{'ices' if count > 1 else 'ex'}"
 
 
 def _strain(folding: Folding, numbers) -> str:

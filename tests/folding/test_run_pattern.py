@@ -69,7 +69,7 @@ def test_as_json(call, three):
     assert code == 1
     found = json.loads(out)
     assert found["reached"] is False
-    assert found["reason"] == "targets contradict each other at 1 vertices"
+    assert found["reason"] == "targets contradict each other at 1 vertex"
     assert found["numbers"]["missed"] >= 1
     assert found["numbers"]["largest_error_deg"] > 59
 
