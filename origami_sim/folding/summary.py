@@ -132,8 +132,8 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
         x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
         return f"targets do not fit together at {_vertices(len(apart))}", [
             f"At {_vertices(len(apart))} the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, "
-            f"where they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is shown is the "
-            "compromise of least energy.",
+            f"where they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is "
+            "shown is the compromise of least energy.",
             "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
             "that may take what it needs; facets (yellow) across the panels.",
         ]
