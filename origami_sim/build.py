@@ -10,15 +10,12 @@ from origami_sim.dielectric import Electrodes
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
-from origami_sim.materials import MATERIALS, layered_rigidity, material
+from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, stated
 from origami_sim.statements import statement
-
-MEMBRANE_POISSON = 1.0 / 3.0
-"""The only Poisson's ratio that bars along triangle edges reproduce in shear."""
 
 
 class Sheet(Grounds, Electrodes):

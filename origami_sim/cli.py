@@ -1,7 +1,7 @@
 """`origami-sim`: run scenes, replay runs, compare and diagnose recordings, list effects, check strides.
 
-Exit codes: 0 done; 1 done, but the answer is no (a regression changed); 2 bad input, nothing written over; 3 a world
-went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier results untouched.
+Exit codes: 0 done; 1 done, but the answer is no (a regression changed, a pattern missed its target angles); 2 bad
+input, nothing written over; 3 a world went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted.
 """
 
 import argparse
@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
+PATTERNS = (".svg", ".fold", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -82,18 +83,16 @@ def _parser() -> argparse.ArgumentParser:
         p.add_argument("--json", action="store_true", help="print one JSON object instead of text")
         return p
 
-    p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
+    summary = "Simulate a device, or fold a crease pattern, and leave its run folder"
+    p = command("run", _run, summary, "origami-sim run box --set gap=2.54mm; origami-sim run crane.svg --set size=15cm")
     names = ", ".join(import_module("origami_sim.scenes").NAMES)
-    p.add_argument("scene", help=f"{names}; or a device of yours: my_flap.py, package.module:build, my_flap.toml")
-    p.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
-    )
+    yours = "or a device of yours: my_flap.py, package.module:build, my_flap.toml"
+    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold); {yours}")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (with unit)")
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
     p.add_argument("--panels", choices=("elastic", "rigid"), help="bars and bending lines, or rigid bodies on hinges")
-    p.add_argument(
-        "--quasistatic", action="store_true", help="equilibria along time, without inertia: creep, slow drives"
-    )
+    p.add_argument("--quasistatic", action="store_true", help="equilibria along time, no inertia: creep, slow drives")
     p.add_argument("--until", type=float, metavar="SECONDS", help="of a quasi-static motion: hold it on until then")
     p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
@@ -292,8 +291,11 @@ def _run(args) -> int:
     from origami_sim.results import check_writable
     from origami_sim.scene import scene_settings
 
-    module = device_module(args.scene)
-    name = module.__name__.rpartition(".")[2]
+    pattern = Path(args.scene).suffix.lower() in PATTERNS
+    module = import_module("origami_sim.folding.command") if pattern else device_module(args.scene)
+    name = Path(args.scene).stem if pattern else module.__name__.rpartition(".")[2]
+    if pattern:
+        module.check(args)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
@@ -308,6 +310,8 @@ def _run(args) -> int:
                 value = f"{s.value:g}" if isinstance(s.value, float) else s.value
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
+    if pattern:
+        return module.run(args, settings, _Bar(name))
     folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(name))

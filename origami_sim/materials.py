@@ -14,6 +14,9 @@ EPS0 = 8.8541878128e-12
 G = 9.80665
 """Standard gravity [m/s^2]."""
 
+MEMBRANE_POISSON = 1.0 / 3.0
+"""The only Poisson's ratio that bars along triangle edges reproduce in shear."""
+
 
 @dataclass(frozen=True)
 class Material:

@@ -1,4 +1,6 @@
-"""Any crease pattern from a file, folded towards its target angles.
+"""A crease pattern from a file as a motion in time, driven towards its target angles.
+
+For patterns that fold rigidly; `origami-sim run my.fold` folds any, without a choice of stiffness and time.
 
 python -m origami_sim.scenes.fold_file
 origami-sim run fold_file --set pattern=my.fold

@@ -196,20 +196,28 @@ def planar_faces(points, edges, *, file=None) -> list[tuple[int, ...]]:
     Raises:
         InputError: a face touches itself at a vertex, or contains another part of the graph (a hole).
     """
-    kept = {edge_key(a, b) for a, b in np.asarray(edges).tolist()}
-    while True:
-        loops = _trace_loops(points, kept)
-        owner = {side: n for n, loop in enumerate(loops) for side in face_sides(loop)}
-        bridges = {(a, b) for a, b in kept if owner[a, b] == owner[b, a]}
-        if not bridges:
-            break
-        kept -= bridges
+    kept, loops = closed_loops(points, edges)
     faces = [loop for loop in loops if signed_area(points[list(loop)]) > 0]
     for face in faces:
         if len(set(face)) < len(face):
             raise InputError(f"a face touches itself at a vertex (loop {list(face[:12])})", file=file)
     _refuse_islands(points, kept, faces, file)
     return faces
+
+
+def closed_loops(points, edges) -> tuple[set[tuple[int, int]], list[tuple[int, ...]]]:
+    """Return the edges of a planar graph that have different regions beside them, and the loops around all regions.
+
+    The loop around a bounded region is counter-clockwise, and so negative around a part of the graph from outside.
+    """
+    kept = {edge_key(a, b) for a, b in np.asarray(edges).tolist()}
+    while True:
+        loops = _trace_loops(points, kept)
+        owner = {side: n for n, loop in enumerate(loops) for side in face_sides(loop)}
+        bridges = {(a, b) for a, b in kept if owner[a, b] == owner[b, a]}
+        if not bridges:
+            return kept, loops
+        kept -= bridges
 
 
 def _trace_loops(points, kept) -> list[tuple[int, ...]]:

@@ -34,17 +34,19 @@ def self_intersects(corners) -> bool:
     n = len(corners)
     margin = 1e-12 * np.ptp(corners, axis=0).max() ** 2
     ahead = np.roll(corners, -1, axis=0)
-    for i in range(n):
-        a, b, c = corners[i], ahead[i], ahead[(i + 1) % n]
-        if abs(cross2(b - a, c - b)) <= margin and (b - a) @ (c - b) < 0:
+    back = np.roll(corners, -2, axis=0)
+    turn, along = cross2(ahead - corners, back - ahead), np.sum((ahead - corners) * (back - ahead), axis=1)
+    if np.any((np.abs(turn) <= margin) & (along < 0)):
+        return True
+    low, high = np.minimum(corners, ahead), np.maximum(corners, ahead)
+    for i in range(n - 2):
+        a, b, later = corners[i], ahead[i], slice(i + 2, n if i else n - 1)
+        p, q = corners[later], ahead[later]
+        straddles_here = cross2(b - a, p - a) * cross2(b - a, q - a) <= margin**2
+        straddles_there = cross2(q - p, a - p) * cross2(q - p, b - p) <= margin**2
+        apart = np.any((high[i] < low[later]) | (high[later] < low[i]), axis=1)
+        if np.any(straddles_here & straddles_there & ~apart):
             return True
-        for j in range(i + 2, n if i else n - 1):
-            p, q = corners[j], ahead[j]
-            straddles_here = cross2(b - a, p - a) * cross2(b - a, q - a) <= margin**2
-            straddles_there = cross2(q - p, a - p) * cross2(q - p, b - p) <= margin**2
-            apart = np.any(np.maximum(a, b) < np.minimum(p, q)) or np.any(np.maximum(p, q) < np.minimum(a, b))
-            if straddles_here and straddles_there and not apart:
-                return True
     return False
 
 
@@ -62,33 +64,44 @@ def clip_ears(corners, labels) -> list[tuple[int, int, int]] | None:
     """
     ring, triangles = list(range(len(corners))), []
     margin = 1e-12 * np.ptp(corners, axis=0).max() ** 2
+    ears: dict[int, tuple[float, list]] = {}  # corner -> length and ends of the diagonal that cuts it off
+    unknown = set(ring)
     while len(ring) > 3:
-        ears = []
-        for n, b in enumerate(ring):
-            a, c = ring[n - 1], ring[(n + 1) % len(ring)]
-            if _is_ear(corners, ring, a, b, c, margin):
-                ears.append((float(np.linalg.norm(corners[a] - corners[c])), sorted((labels[a], labels[c])), n))
+        place = {v: n for n, v in enumerate(ring)}
+        around = {b: (ring[place[b] - 1], ring[(place[b] + 1) % len(ring)]) for b in unknown}
+        blocked = set()
+        for b, (a, c) in around.items():
+            convex, free = _is_ear(corners, ring, a, b, c, margin)
+            if free:
+                ears[b] = (float(np.linalg.norm(corners[a] - corners[c])), sorted((labels[a], labels[c])))
+            elif convex:
+                blocked.add(b)  # until what lies in its triangle is cut off
         if not ears:
             return None
-        shortest = min(ears)[0]
-        _, n = min((ends, n) for length, ends, n in ears if length <= shortest * (1.0 + TIE))
-        triangles.append((ring[n - 1], ring[n], ring[(n + 1) % len(ring)]))
+        shortest = min(length for length, _ in ears.values())
+        _, n = min((ends, place[b]) for b, (length, ends) in ears.items() if length <= shortest * (1.0 + TIE))
+        a, b, c = ring[n - 1], ring[n], ring[(n + 1) % len(ring)]
+        triangles.append((a, b, c))
         del ring[n]
+        for v in (a, b, c):
+            ears.pop(v, None)
+        unknown = (blocked | {a, c}) - {b}
     triangles.append(tuple(ring))
     return triangles if all(signed_area(corners[list(t)]) > margin for t in triangles) else None
 
 
-def _is_ear(corners, ring, a, b, c, margin) -> bool:
+def _is_ear(corners, ring, a, b, c, margin) -> tuple[bool, bool]:
+    """Tell whether corner b is convex, and whether its triangle holds no other corner either."""
     pa, pb, pc = corners[a], corners[b], corners[c]
     if cross2(pb - pa, pc - pb) <= margin:
-        return False
+        return False, False
     others = corners[[v for v in ring if v not in (a, b, c)]]
     inside = (
         (cross2(pb - pa, others - pa) >= -margin)
         & (cross2(pc - pb, others - pb) >= -margin)
         & (cross2(pa - pc, others - pc) >= -margin)
     )
-    return not inside.any()
+    return True, not inside.any()
 
 
 def centroid(corners) -> np.ndarray:

@@ -14,6 +14,7 @@ from .assemble import assemble
 from .checks import COORDINATE_LIMIT, check_number
 from .crease_pattern import Pattern
 from .files import read_bytes
+from .holes import facets_of_holes
 from .planar import drop_holes, merge_distance, planar_faces, split_segments
 from .sizing import metres_of
 from .svg_drawing import read_drawing
@@ -96,6 +97,10 @@ def _pattern(drawing, scale, merge_tolerance, notes, file) -> Pattern:
     points, pieces = split_segments(starts[long_enough], ends[long_enough], tolerance, file=file)
 
     chosen = _edges(pieces, strokes, notes)
+    facets, holed = facets_of_holes(points, np.array(list(chosen)))
+    if holed:
+        chosen |= {key: ("F", 1.0) for key in facets}
+        notes.append(f"{holed} panels with a hole or a loose part in them were cut into facets.")
     found = planar_faces(points, np.array(list(chosen)), file=file)
     faces, holes = drop_holes(found, {key for key, (letter, _) in chosen.items() if letter == "B"})
     if not faces:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from origami_sim.errors import InputError
-from origami_sim.pattern import read_svg
+from origami_sim.pattern import read_svg, triangulate
 from origami_sim.pattern.planar import split_segments
+from origami_sim.pattern.topology import area_vector
 
 BORDER = '<rect x="0" y="0" width="20" height="10" stroke="#000" fill="none"/>'
 
@@ -232,3 +233,26 @@ def test_bad_xml(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(InputError, match=words):
         read_svg(path)
+
+
+@pytest.mark.parametrize(
+    ("inner", "faces_of_hole"),
+    [
+        ('<rect x="30" y="30" width="20" height="20" stroke="black"/>', 0),  # a window
+        ('<rect x="30" y="30" width="20" height="20" stroke="#00ff00"/>', 1),  # a piece that is cut out
+        ('<path d="M0 0 L30 20 L20 30 Z" stroke="black"/>', 0),  # a window that touches a corner
+    ],
+)
+def test_a_panel_with_a_hole_is_cut_into_facets(tmp_path, inner, faces_of_hole):
+    path = tmp_path / "hole.svg"
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><rect width="100" height="80" stroke="black"/>'
+        f'<line x1="70" y1="0" x2="70" y2="80" stroke="blue"/>{inner}</svg>'
+    )
+    pattern = read_svg(path, scale=1.0)
+    area = sum(np.linalg.norm(area_vector(pattern.vertices, f)) for f in pattern.faces)
+    hole = 400.0 if "rect" in inner else 250.0
+    assert area == pytest.approx(8000.0 - hole * (1 - faces_of_hole))
+    assert any("1 panels with a hole" in note for note in pattern.notes)
+    assert all(len(set(f)) == len(f) for f in pattern.faces)
+    triangulate(pattern)

@@ -1,0 +1,240 @@
+"""The sheet that is folded: stiff bars, soft hinges with target angles, and the search for its least energy.
+
+The energy is a sum of squares, of the strains of the mesh edges (bars) and of the departures of the fold angles from
+their targets (hinges), so that Levenberg and Marquardt's method finds its minima (Marquardt 1963,
+doi:10.1137/0111030); where the targets can be met without strain it converges quadratically. Model: bars and hinges
+after Schenk and Guest (2011) and Filipov, Liu, Tachi, Schenk and Paulino (2017); target angles as in Origami Simulator
+(Ghassaei, Demaine and Gershenfeld 2018), which follows the same energy down in time.
+
+Lengths are in units of the sheet's longest side, energies in those of its membrane stiffness E t.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from origami_sim.materials import MEMBRANE_POISSON
+from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulate
+
+BEND = 0.1
+"""Stiffness of the lines that triangulate a panel over that of a driven crease of that length: panels give way, so that
+what is not rigidly foldable can fold."""
+FREE = 1e-3
+"""The same for creases without a target, which only have to be somewhere."""
+SLIVER = 0.05
+"""Least width of a bar over its length. A sliver's bars would be limp, and it would turn inside out."""
+LONGEST_MOVE = 0.1
+"""Longest move of a node in one iteration: a triangle of a coarse pattern is not turned over in one go."""
+MERGED = 2.5e-3
+"""Change of a bar's length that counts as inaccuracy of the drawing, as `planar.COARSEST` does: hand-drawn lines miss
+each other by as much."""
+CLOSED = 0.1
+"""Distance from half a turn [rad] within which a given shape is folded flat, to the side of its target."""
+ROUNDING = 1e-18
+"""Energy below which a state is exact."""
+GAIN = 1e-4
+"""Relative fall of the energy in one iteration below which it is done."""
+STIFFEST, LARGEST = 1e-9, 1e3
+"""Range of the damping of iterations: below, rigid motions are no longer held; above, nothing moves any more."""
+
+
+@dataclass
+class Shape:
+    """A state of the sheet.
+
+    Attributes:
+        x: [N, 3] positions. angles: [H] continuous hinge angles [rad], creases first. energy: of the sheet there.
+    """
+
+    x: np.ndarray
+    angles: np.ndarray
+    energy: float = np.inf
+
+
+class Elastic:
+    """Bars and hinges of a triangulated pattern.
+
+    Args:
+        pattern: with fold angles for the creases that are to be driven; mountains and valleys without one fold flat.
+        softness: stiffness of a crease per length over E t and over the median length of the mesh edges.
+
+    Attributes:
+        mesh: the triangulation. size: longest side of the pattern [m].
+        reference: [N, 3] positions as given. bars, lengths: node pairs [B, 2] and their lengths [B].
+        hinges: [H, 4] creases, then bends. driven: [H] whether there is a target. target, start: [H] angles [rad].
+        weights: [H] stiffness of the hinges over softness.
+    """
+
+    def __init__(self, pattern: Pattern, softness: float = 1e-3):
+        self.pattern, self.mesh = pattern, triangulate(pattern)
+        mesh = self.mesh
+        self.size = float(np.ptp(mesh.vertices, axis=0).max())
+        self.reference = (mesh.vertices - mesh.vertices.mean(axis=0)) / self.size
+        self.bars, self.hinges = mesh.bars, np.vstack([mesh.creases, mesh.bends])
+        self.lengths = _lengths(self.reference, self.bars)
+        self.axes = _lengths(self.reference, self.hinges[:, 1:3])
+        given = np.concatenate([_targets(pattern)[mesh.crease_edge], np.full(len(mesh.bends), np.nan)])
+        self.driven, self.target = ~np.isnan(given), np.nan_to_num(given)
+        self.start = hinge_angles(self.reference, self.hinges)
+        flat = self.driven & (np.abs(self.start) > np.pi - CLOSED)  # folded flat, to the side of the target
+        self.start[flat] = near(self.start[flat], self.target[flat])
+        middle = float(np.median(self.lengths))
+        factor = np.where(self.driven, 1.0, BEND)
+        factor[: len(mesh.creases)][~self.driven[: len(mesh.creases)]] = FREE
+        self.weights = factor * middle * self.axes * self._stated()
+        self.sections = np.maximum(bar_sections(self.reference, mesh), SLIVER * self.lengths)
+        self.softness = softness
+        self._pattern_of_jacobian()
+
+    def _stated(self) -> np.ndarray:
+        """Stiffness per length that the file states for a crease, over the median of those; 1 where it states none."""
+        stiffness = np.concatenate(
+            [self.pattern.stiffness[self.mesh.crease_edge], np.full(len(self.mesh.bends), np.nan)]
+        )
+        per_length = stiffness / self.axes
+        known = np.isfinite(per_length) & (per_length > 0)
+        if not known.any():
+            return np.ones(len(per_length))
+        return np.where(known, per_length / np.median(per_length[known]), 1.0)
+
+    def _pattern_of_jacobian(self):
+        """Rows and columns of the Jacobian: bars, hinges, and hinges again for what is beyond half a turn."""
+        bars, hinges = len(self.bars), len(self.hinges)
+        of_bars = (3 * self.bars[:, :, None] + np.arange(3)).ravel()
+        of_hinges = (3 * self.hinges[:, :, None] + np.arange(3)).ravel()
+        self._columns = np.concatenate([of_bars, of_hinges, of_hinges])
+        rows = (np.arange(bars), bars + np.arange(hinges), bars + hinges + np.arange(hinges))
+        self._rows = np.concatenate([np.repeat(r, n) for r, n in zip(rows, (6, 12, 12), strict=True)])
+        self._shape = (bars + 2 * hinges, 3 * len(self.reference))
+
+    def angles(self, x, previous) -> np.ndarray:
+        """Return the hinge angles [H] of positions [N, 3], continuous from `previous` [rad]."""
+        return near(hinge_angles(x, self.hinges), previous)
+
+    def strains(self, x) -> np.ndarray:
+        """Return the strain of every bar [B]."""
+        return _lengths(x, self.bars) / self.lengths - 1.0
+
+    def misfits(self, x) -> np.ndarray:
+        """Return what of the strain [B] is more than the inaccuracy of a drawing, `MERGED`."""
+        change = np.abs(_lengths(x, self.bars) - self.lengths)
+        return np.maximum(change - MERGED, 0.0) / self.lengths
+
+    def errors(self, angles) -> np.ndarray:
+        """Return the distance of each driven crease from its target [rad]."""
+        return np.abs(angles - self.target)[self.driven]
+
+    def residuals(self, x, previous, target) -> tuple[np.ndarray, np.ndarray]:
+        """Return residuals, of which half the squares sum to the energy, and angles continuous from `previous`."""
+        angles = self.angles(x, previous)
+        hinge = np.sqrt(self.softness * self.weights)
+        beyond = np.sign(angles) * np.maximum(np.abs(angles) - np.pi, 0.0)
+        stretch = np.sqrt(self.sections / self.lengths) * (_lengths(x, self.bars) - self.lengths)
+        stop = np.sqrt(self.softness * np.median(self.lengths) * self.axes)
+        return np.concatenate([stretch, hinge * (angles - target), stop * beyond]), angles
+
+    def jacobian(self, x, angles) -> sp.csr_matrix:
+        """Return the derivatives of the residuals by the positions."""
+        along = x[self.bars[:, 1]] - x[self.bars[:, 0]]
+        scale = np.sqrt(self.sections / self.lengths) / np.linalg.norm(along, axis=1)
+        pull = scale[:, None] * along
+        turn = angle_gradients(x, self.hinges)
+        hinge = np.sqrt(self.softness * self.weights)[:, None, None] * turn
+        stop = np.sqrt(self.softness * np.median(self.lengths) * self.axes)
+        stop = np.where(np.abs(angles) > np.pi, stop, 0.0)[:, None, None] * turn
+        values = np.concatenate([np.concatenate([-pull, pull], axis=1).ravel(), hinge.ravel(), stop.ravel()])
+        return sp.csr_matrix((values, (self._rows, self._columns)), shape=self._shape)
+
+    def relax(self, shape: Shape, target, iterations: int, damping: float = 1e-6) -> Shape:
+        """Return the state of least energy near `shape`, or where `iterations` have led.
+
+        Args:
+            shape: where to start. target: [H] angles to which the hinges are drawn [rad].
+            damping: stiffness that holds every node in place during an iteration, to begin with.
+        """
+        x = shape.x
+        r, angles = self.residuals(x, shape.angles, target)
+        energy = float(r @ r)
+        for _ in range(iterations):
+            if energy < ROUNDING:
+                break
+            jacobian = self.jacobian(x, angles)
+            tangent, slope = (jacobian.T @ jacobian).tocsc(), jacobian.T @ r
+            while damping < LARGEST:
+                step = _solve(tangent, damping, -slope)
+                step *= min(1.0, LONGEST_MOVE / max(float(np.abs(step).max()), 1e-300))
+                tried, turned = self.residuals(x + step.reshape(-1, 3), angles, target)
+                gained = energy - float(tried @ tried)
+                if gained > 0.0:
+                    break
+                damping *= 5.0
+            else:
+                break  # nothing goes down any more
+            foreseen = energy - float(np.sum((r + jacobian @ step) ** 2))
+            x, r, angles, energy = x + step.reshape(-1, 3), tried, turned, energy - gained
+            if gained > 0.7 * foreseen:
+                damping = max(0.25 * damping, STIFFEST)
+            elif gained < 0.2 * foreseen:
+                damping *= 3.0
+            if gained < GAIN * energy:
+                break
+        return Shape(x, angles, 0.5 * max(energy, 0.0))
+
+
+def _targets(pattern: Pattern) -> np.ndarray:
+    """Return the fold angles [E] [rad], half a turn for mountains and valleys that give none."""
+    flat = {"M": -np.pi, "V": np.pi}
+    default = np.array([flat.get(letter, np.nan) for letter in pattern.assignments])
+    return np.where(np.isnan(pattern.fold_angles), default, pattern.fold_angles)
+
+
+def near(angles, previous) -> np.ndarray:
+    """Return `angles` moved by whole turns to within half a turn of `previous` [rad]."""
+    return previous + (angles - previous + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _solve(tangent, damping, force) -> np.ndarray:
+    """Return the step of (tangent + damping) step = force; no step where it cannot be solved."""
+    try:
+        factors = spla.splu(
+            (tangent + damping * sp.eye_array(len(force))).tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # exactly singular
+        return np.zeros_like(force)
+    step = factors.solve(force)
+    return step if np.all(np.isfinite(step)) else np.zeros_like(force)
+
+
+def angle_gradients(x, hinges) -> np.ndarray:
+    """Return the derivatives [H, 4, 3] of the hinge angles by the nodes i, j, k, l (see `pattern.triangulate`)."""
+    i, j, k, m = (x[hinges[:, n]] for n in range(4))
+    e, a, b = k - j, i - j, m - j
+    length = np.linalg.norm(e, axis=1)
+    n1, n2 = np.cross(a, e), np.cross(e, b)
+    least = 1e-24  # a triangle without area has no normal, and its hinge no moment
+    gi = (length / np.maximum(np.sum(n1 * n1, axis=1), least))[:, None] * n1
+    gl = (length / np.maximum(np.sum(n2 * n2, axis=1), least))[:, None] * n2
+    s = (np.sum(a * e, axis=1) / length**2)[:, None]
+    t = (np.sum(b * e, axis=1) / length**2)[:, None]
+    return np.stack([gi, -(1 - s) * gi - (1 - t) * gl, -s * gi - t * gl, gl], axis=1)
+
+
+def bar_sections(x, mesh: Triangulation) -> np.ndarray:
+    """Return the width [B] of sheet that each bar stands for, as in `build.Sheet`: 2 A / ((1 - nu) perimeter)."""
+    a, b, c = (x[mesh.triangles[:, n]] for n in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    perimeter = sum(np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a)))
+    share = 2.0 * area / ((1.0 - MEMBRANE_POISSON) * perimeter)
+    sides = np.sort(np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]]))
+    count = int(mesh.bars.max()) + 1
+    index = np.searchsorted(mesh.bars[:, 0] * count + mesh.bars[:, 1], sides[:, 0] * count + sides[:, 1])
+    return np.bincount(index, weights=np.tile(share, 3), minlength=len(mesh.bars))
+
+
+def _lengths(x, pairs) -> np.ndarray:
+    return np.linalg.norm(x[pairs[:, 1]] - x[pairs[:, 0]], axis=1)

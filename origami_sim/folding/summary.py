@@ -1,0 +1,171 @@
+"""What became of a pattern, in sentences and numbers: reached or missed, by how much, where, why, and what to try."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fold import STRETCH, Folding
+from .intersections import crossing_pairs
+
+WORST = 8
+"""Creases that a table of the worst lists."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The end of a folding.
+
+    Attributes:
+        reached: whether all driven creases are within the tolerance and the sheet is whole.
+        sentences: to print. reason: why targets were missed, in a few words; empty if they were not.
+        numbers: by name, for machines. worst: table of the creases furthest from their targets.
+        creases: the same of all creases.
+    """
+
+    reached: bool
+    sentences: list[str]
+    reason: str
+    numbers: dict[str, float]
+    worst: dict[str, np.ndarray]
+    creases: dict[str, np.ndarray]
+
+
+def summarise(folding: Folding, thickness: float) -> Summary:
+    """Return what became of a pattern; triangles that cross by more than `thickness` [m] pass through each other."""
+    sheet, errors = folding.sheet, folding.errors
+    missed = int(np.sum(errors > folding.tolerance))
+    crossing = len(crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness))
+    bends = np.abs(folding.angles[-1] - sheet.start)[len(sheet.mesh.creases) :]
+    numbers = {
+        "reached": float(folding.reached),
+        "creases": float(len(errors)),
+        "missed": float(missed),
+        "largest_error_deg": float(np.degrees(errors.max())),
+        "rms_error_deg": float(np.degrees(np.sqrt(np.mean(errors**2)))),
+        "largest_strain": folding.stretch,
+        "largest_strain_on_the_way": folding.stretch_on_the_way,
+        "largest_bend_deg": float(np.degrees(bends.max(initial=0.0))),
+        "crossing_pairs": float(crossing),
+        "snaps": float(len(folding.snaps)),
+    }
+    creases = _table(folding)
+    order = np.argsort(-creases["error_deg"], kind="stable")
+    order = order[creases["error_deg"][order] > np.degrees(folding.tolerance)][:WORST]
+    reason, advice = _why(folding)
+    said = [
+        _verdict(folding, missed, order, creases),
+        *advice,
+        _strain(folding, numbers),
+        _crossings(crossing, thickness),
+    ]
+    if folding.snaps:
+        at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
+        more = f" and {len(folding.snaps) - 6} more" if len(folding.snaps) > 6 else ""
+        said.append(f"The sheet snaps to another shape on its way, at {at}{more} of the angles.")
+    worst = {name: column[order] for name, column in creases.items()}
+    return Summary(folding.reached, said, reason, numbers, worst, creases)
+
+
+def _table(folding: Folding) -> dict[str, np.ndarray]:
+    """Return the driven creases: edge of the pattern, middle [mm], target, angle and error [deg]."""
+    sheet = folding.sheet
+    which = np.flatnonzero(sheet.driven)
+    ends = sheet.mesh.vertices[sheet.hinges[which, 1:3]]
+    target, angle = np.degrees(sheet.target[which]), np.degrees(folding.angles[-1, which])
+    return {
+        "edge": sheet.mesh.crease_edge[which],
+        "x_mm": 1e3 * ends.mean(axis=1)[:, 0],
+        "y_mm": 1e3 * ends.mean(axis=1)[:, 1],
+        "target_deg": target,
+        "angle_deg": angle,
+        "error_deg": np.abs(angle - target),
+    }
+
+
+def _verdict(folding: Folding, missed: int, order, creases) -> str:
+    count, limit = len(folding.errors), f"{np.degrees(folding.tolerance):.3g} deg"
+    if not missed:
+        worst = np.degrees(folding.errors.max())
+        whole = "" if not folding.torn else ", but only by tearing the sheet"
+        return f"All {count} creases fold to within {max(worst, 0.01):.2f} deg of their targets{whole}."
+    first = {name: column[order[0]] for name, column in creases.items()}
+    wrong = int(np.sum((creases["angle_deg"] * creases["target_deg"] < 0) & (np.abs(creases["angle_deg"]) > 1.0)))
+    popped = f" {wrong} of them have popped to the other side." if wrong else ""
+    return (
+        f"MISSED: {missed} of {count} creases end more than {limit} from their targets; the furthest, edge "
+        f"{first['edge']} at ({first['x_mm']:.1f}, {first['y_mm']:.1f}) mm, by {first['error_deg']:.1f} deg "
+        f"({first['angle_deg']:.1f} instead of {first['target_deg']:.1f}).{popped}"
+    )
+
+
+def _why(folding: Folding) -> tuple[str, list[str]]:
+    """Return the reason in a few words, and sentences that say it and what to try."""
+    if folding.reached:
+        return "", []
+    against, sheet = folding.contradictions, folding.sheet
+    if against:
+        worst = against[0]
+        x, y = 1e3 * sheet.mesh.vertices[worst.node, :2]
+        return f"targets contradict each other at {_vertices(len(against))}", [
+            f"No shape has all these angles: at {_vertices(len(against))} the panels do not close, worst at ({x:.1f}, "
+            f"{y:.1f}) mm, where they miss by {np.degrees(worst.gap):.0f} deg and one of the {len(worst.creases)} "
+            f"creases stays off by at least {np.degrees(worst.bound):.0f} deg. What is shown is the compromise of "
+            "least energy.",
+            "Try: other angles for the creases there (opacity in SVG, edges_foldAngle in FOLD); a facet (yellow) "
+            "across a panel beside it; or another distance below which points are one (--set merge=0.002).",
+        ]
+    if folding.curved:
+        count = sum(v.curved for v in folding.vertices)
+        return "curved creases cannot fold flat", [
+            f"Its creases are curves ({count} corners): the panels beside a curve bend 1 / cos(angle / 2) "
+            "times as much as the curve, without bound towards 180 deg (Fuchs and Tabachnikov 1999): no sheet folds "
+            "them flat. What is shown is the compromise of least energy.",
+            "Try: smaller angles (opacity in SVG); 90 deg is what most curved folds take.",
+        ]
+    if folding.torn:
+        return "only a torn sheet gets there", [
+            f"The targets strain the sheet by more than {STRETCH:.0%}: it would tear.",
+            "Try: smaller angles; facets (yellow) across the strained panels; or vertices put where they belong.",
+        ]
+    apart = sorted((v for v in folding.vertices if v.gap > folding.tolerance), key=lambda v: -v.gap)
+    if apart:
+        x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
+        return f"targets do not fit together at {_vertices(len(apart))}", [
+            f"At {_vertices(len(apart))} the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, "
+            f"where they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is "
+            "shown is the compromise of least energy.",
+            "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
+            "that may take what it needs; facets (yellow) across the panels.",
+        ]
+    return "no way there was found", [
+        "No vertex forbids these angles, but following the sheet there ends in a cul-de-sac: panels that may not bend "
+        "so far, or folds that have to be made one after the other.",
+        "Try: facets (yellow) across large panels; more steps (--set steps=100); some of the angles first.",
+    ]
+
+
+def _vertices(count: int) -> str:
+    return f"{count} vert{'ices' if count > 1 else 'ex'}"
+
+
+def _strain(folding: Folding, numbers) -> str:
+    text = f"Largest strain {numbers['largest_strain']:.2%}"
+    if numbers["largest_strain_on_the_way"] > max(2.0 * numbers["largest_strain"], 1e-3):
+        text += f", on the way {numbers['largest_strain_on_the_way']:.1%}"
+    if numbers["largest_bend_deg"] > 0.5:
+        text += f", panels bend by up to {numbers['largest_bend_deg']:.0f} deg about a line"
+    strained = np.abs(folding.sheet.strains(folding.x[-1] / folding.sheet.size))
+    if numbers["largest_strain"] > STRETCH and not folding.torn:
+        bar = int(np.argmax(strained))
+        text += (
+            f"; that is an edge of {1e3 * folding.sheet.lengths[bar] * folding.sheet.size:.2g} mm, where the drawing "
+            "is inexact"
+        )
+    return text + "."
+
+
+def _crossings(count: int, thickness: float) -> str:
+    depth = f"deeper than the sheet's thickness ({1e3 * thickness:.3g} mm)"
+    if not count:
+        return f"No panel passes through another {depth}."
+    return f"{count} pairs of triangles pass through each other {depth}: there is no contact between panels here."

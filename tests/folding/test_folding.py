@@ -1,0 +1,142 @@
+"""Folding to target angles: what is possible is reached, what is not is said, with where and why."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from drawings import drawn, frame
+
+from origami_sim.errors import InputError
+from origami_sim.folding import fold, read, summarise
+from origami_sim.folding.consistency import vertices
+from origami_sim.folding.elastic import Elastic
+from origami_sim.pattern import grid, miura, waterbomb
+
+TWIST = np.radians(30)
+
+
+def square_twist(path):
+    """A square twist of Origami Simulator's kind: flat-foldable, but not rigidly."""
+    inner = [0.5 * np.array([np.cos(t), np.sin(t)]) for t in TWIST + 0.5 * np.pi * np.arange(4)]
+    lines = list(frame(4, 4, -2, -2))
+    for n, p in enumerate(inner):
+        q = inner[(n + 1) % 4]
+        lines.append(("V", *p, *q))
+    ways = [np.array(w) for w in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+    for n, p in enumerate(inner):
+        ahead = ways[n]
+        lines.append(("V", *p, *(p + (2 - p @ ahead) * ahead)))
+        side = ways[(n + 1) % 4]
+        lines.append(("M", *p, *(p + (2 - p @ side) * side)))
+    return drawn(path, lines)
+
+
+@pytest.mark.parametrize("target", [60.0, 150.0, 180.0])
+def test_a_miura_sheet_folds_to_the_closed_form(target):
+    pattern = miura(3, 3, 0.02, 0.02, np.radians(60), target_angle=np.radians(target))
+    folding = fold(pattern)
+    assert folding.reached
+    assert np.degrees(folding.errors.max()) < 0.01
+    assert folding.stretch < 1e-5
+    assert not folding.snaps
+
+
+def test_every_frame_is_of_the_sheet_and_continuous():
+    folding = fold(waterbomb(0.1, target_angle=np.radians(170)))
+    assert len(folding.x) == 21
+    for x, angles in zip(folding.x, folding.angles, strict=True):
+        assert np.abs(folding.sheet.strains(x / folding.sheet.size)).max() < 0.01
+        np.testing.assert_allclose(folding.sheet.angles(x, angles), angles, atol=1e-9)
+    assert np.abs(np.diff(folding.angles, axis=0)).max() < np.radians(40)
+
+
+def test_a_square_twist_folds_flat_by_bending_its_panels(tmp_path):
+    folding = fold(read(square_twist(tmp_path / "twist.svg")))
+    assert folding.reached
+    assert np.degrees(folding.errors.max()) < 1.0
+    assert folding.stretch < 0.01
+
+
+def test_a_map_folds_one_crease_after_the_other(tmp_path):
+    """At a vertex of right angles only one of two lines can turn at a time."""
+    lines = [*frame(2, 2), ("V", 0, 1, 1, 1), ("V", 1, 1, 2, 1), ("M", 1, 0, 1, 1), ("V", 1, 1, 1, 2)]
+    folding = fold(read(drawn(tmp_path / "map.svg", lines)))
+    assert folding.reached
+    first, second = np.abs(folding.angles[:, :2]).max(axis=1), np.abs(folding.angles[:, 2:4]).max(axis=1)
+    both = np.minimum(first, second)
+    assert np.degrees(both).max() > 175
+
+
+def test_targets_that_contradict_each_other_are_said_to(tmp_path):
+    """Three creases that fold flat never close (Maekawa): some crease stays 60 degrees off, wherever the sheet goes."""
+    ends = [(0, 2), (-2, -2 / np.sqrt(3)), (2, -2 / np.sqrt(3))]
+    lines = [("B", *a, *b) for a, b in zip(ends, ends[1:] + ends[:1], strict=True)]
+    lines += [("V", 0, 0, *e) for e in ends]
+    pattern = read(drawn(tmp_path / "three.svg", lines))
+    folding = fold(pattern)
+    assert not folding.reached
+    (vertex,) = vertices(Elastic(pattern))
+    assert np.degrees(vertex.gap) == pytest.approx(180, abs=1e-4)
+    assert np.degrees(vertex.bound) == pytest.approx(60, abs=1e-4)
+    assert np.degrees(folding.errors.max()) > 60 - 1e-6
+    found = summarise(folding, 2e-4)
+    assert not found.reached
+    assert found.numbers["missed"] == len(found.worst["edge"]) > 0
+    text = " ".join(found.sentences)
+    for words in ("MISSED: ", "No shape has all these angles", "at least 60 deg", "Try: "):
+        assert words in text
+
+
+def test_curved_creases_do_not_fold_flat(tmp_path):
+    arc = [(2 * np.cos(t), 2 * np.sin(t)) for t in np.radians(np.linspace(20, 160, 12))]
+    lines = [("V", *a, *b) for a, b in pairwise(arc)]
+    outer = [(1.4 * x, 1.4 * y) for x, y in arc]
+    inner = [(0.6 * x, 0.6 * y) for x, y in arc]
+    for line in (outer, inner):
+        lines += [("B", *a, *b) for a, b in pairwise(line)]
+    for n in (0, -1):
+        lines += [("B", *outer[n], *arc[n]), ("B", *arc[n], *inner[n])]
+    folding = fold(read(drawn(tmp_path / "curve.svg", lines)))
+    assert folding.curved
+    if not folding.reached:
+        assert summarise(folding, 2e-4).reason == "curved creases cannot fold flat"
+    half = fold(read(drawn(tmp_path / "half.svg", lines, opacity=0.25)))
+    assert half.reached and not half.curved
+    assert half.stretch < 0.01
+
+
+def test_a_tolerance_decides_what_counts_as_reached():
+    pattern = waterbomb(0.1, target_angle=np.radians(120))
+    pattern.fold_angles[pattern.edges_assigned("M")[0]] += np.radians(4)
+    assert fold(pattern).reached
+    assert not fold(pattern, tolerance=np.radians(0.1)).reached
+
+
+def test_a_shape_that_is_folded_already_stays_as_it_is():
+    pattern = miura(2, 2, 0.02, 0.02, np.radians(60), fold_angle=np.radians(80))
+    folding = fold(pattern)
+    assert folding.reached
+    np.testing.assert_allclose(np.ptp(folding.x, axis=0), 0.0, atol=1e-9)
+
+
+def test_nothing_to_fold_is_refused():
+    with pytest.raises(InputError, match="no target angle"):
+        fold(grid(2, 1, 0.02, 0.02))
+    with pytest.raises(InputError, match="no crease"):
+        fold(grid(1, 1, 0.1, 0.1))
+
+
+def test_halves_of_a_split_vertex_are_merged(tmp_path):
+    """A vertex of four creases drawn as two of three, 1.5 mm apart on 20 cm: no odd vertex folds flat."""
+    ends = [(np.cos(t), np.sin(t)) for t in np.radians([0, 70, 180, 290])]
+    border = [(2, -2), (2, 2), (-2, 2), (-2, -2)]
+    lines = [("B", *a, *b) for a, b in zip(border, border[1:] + border[:1], strict=True)]
+    for n, (letter, (x, y)) in enumerate(zip("VMVV", ends, strict=True)):
+        reach = 2 / max(abs(x), abs(y))
+        lines.append((letter, 0.03 if n < 2 else 0.0, 0.0, x * reach, y * reach))
+    lines.append(("V", 0, 0, 0.03, 0))
+    pattern = read(drawn(tmp_path / "split.svg", lines))
+    middle = pattern.vertices.mean(axis=0)
+    assert np.sum(np.linalg.norm(pattern.vertices - middle, axis=1) < 0.05) == 1
+    assert any("were merged" in note for note in pattern.notes)
+    assert fold(pattern).reached

@@ -1,0 +1,109 @@
+"""`origami-sim run PATTERN`: what it prints, its exit codes and what it leaves."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from drawings import drawn, frame
+
+from origami_sim import cli
+from origami_sim.pattern import grid, miura, triangulate, waterbomb, write_fold, write_mesh
+from origami_sim.results import load_run
+
+DEGREES = np.pi / 180
+
+
+@pytest.fixture
+def call(capfd, tmp_path, monkeypatch):
+    """Runs a command line in an empty folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as e:
+            cli.main([str(a) for a in arguments])
+        return e.value.code, *capfd.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def bomb(tmp_path):
+    path = tmp_path / "bomb.fold"
+    write_fold(waterbomb(0.1, target_angle=100 * DEGREES), path)
+    return path
+
+
+@pytest.fixture
+def three(tmp_path):
+    """Three valleys that fold flat: impossible."""
+    ends = [(0, 2), (-2, -1.2), (2, -1.2)]
+    lines = [("B", *a, *b) for a, b in zip(ends, ends[1:] + ends[:1], strict=True)]
+    return drawn(tmp_path / "three.svg", lines + [("V", 0, 0, *e) for e in ends])
+
+
+def test_a_pattern_that_folds(call, bomb, tmp_path):
+    code, out, _ = call("run", bomb)
+    assert code == 0
+    assert re.search(r"All 6 creases fold to within 0\.01 deg of their targets\.", out)
+    assert "No panel passes through another" in out
+    run = load_run(tmp_path / "runs" / "bomb")
+    assert len(run.trajectory.times) == 21
+    np.testing.assert_allclose(run.tables["creases"]["error_deg"], 0.0, atol=1e-3)
+    assert (tmp_path / "runs" / "bomb" / "folded.png").stat().st_size > 5_000
+    assert run.replay.stat().st_size > 5_000
+
+
+def test_a_pattern_that_does_not(call, three):
+    code, out, _ = call("run", three)
+    assert code == 1
+    assert re.search(r"MISSED: [123] of 3 creases end more than 5 deg .* edge \d+ at \(.*\) mm, by \d+\.\d deg", out)
+    assert "No shape has all these angles" in out
+    assert "Try: " in out
+    assert re.search(r"target_deg +angle_deg +error_deg", out)
+
+
+def test_as_json(call, three):
+    code, out, _ = call("run", three, "--json")
+    assert code == 1
+    found = json.loads(out)
+    assert found["reached"] is False
+    assert found["reason"] == "targets contradict each other at 1 vertex"
+    assert found["numbers"]["missed"] >= 1
+    assert found["numbers"]["largest_error_deg"] > 59
+
+
+def test_size_and_scale_from_the_command_line(call, tmp_path):
+    path = drawn(tmp_path / "fold.svg", [*frame(300, 100), ("V", 100, 0, 100, 100, 0.5)])
+    for given, size in (("size=15cm", 0.15), ("scale=1mm", 0.3), ("merge=0.001", 0.2)):
+        assert call("run", path, "--set", given)[0] == 0
+        x = load_run(tmp_path / "runs" / "fold").trajectory.model.position
+        assert np.ptp(x[:, 0]) == pytest.approx(size)
+    code, out, _ = call("run", path, "--settings")
+    assert code == 0
+    assert "size = 0 m" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["none.svg"], r"none\.svg: no such file"),
+        (["bomb.fold", "--set", "size=1cm", "--set", "scale=1cm"], r"exclude each other"),
+        (["bomb.fold", "--set", "stiffness=1"], r"cannot apply this setting.*crease_stiffness"),
+        (["bomb.fold", "--set", "merge=0.001"], r"only drawings have points to merge"),
+        (["bomb.fold", "--panels", "rigid"], r"no such option.*--panels"),
+        (["bomb.fold", "--set", "steps=0"], r"out of its range.*steps"),
+        (["flat.fold"], r"flat\.fold: .*no target angle"),
+        (["sheet.obj"], r"sheet\.obj: a mesh has a shape, but no fold to go to"),
+    ],
+)
+def test_what_is_refused(call, bomb, tmp_path, arguments, words):
+    write_fold(grid(2, 1, 0.02, 0.02), tmp_path / "flat.fold")
+    shape = miura(1, 1, 0.02, 0.02, 1.0)
+    write_mesh(shape.vertices, triangulate(shape).triangles, tmp_path / "sheet.obj")
+    code, _, err = call("run", *arguments)
+    assert code == 2
+    assert re.match(rf"origami-sim: .*{words}", err)
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
