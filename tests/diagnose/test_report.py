@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from origami_sim.build import Sheet
+from origami_sim.diagnose.budget import Share
 from origami_sim.diagnose.diagnosis import (
     VERDICTS,
     Acting,
@@ -26,9 +27,12 @@ from origami_sim.diagnose.diagnosis import (
     Suspected,
     Trace,
 )
-from origami_sim.diagnose.report import SECTIONS, geometry_of, page, read_report, write_report
-from origami_sim.diagnose.report_markup import amount, element, interval, percent, plus_minus
-from origami_sim.diagnose.report_plots import POINTS, Plot, ticks
+from origami_sim.diagnose.page import geometry_of, page, read_report, write_report
+from origami_sim.diagnose.page.law import law_of
+from origami_sim.diagnose.page.markup import amount, element, interval, percent, plus_minus
+from origami_sim.diagnose.page.plots import POINTS, Plot, ticks
+from origami_sim.diagnose.page.wording import number_of, worded, words_of
+from origami_sim.effects import CATALOGUE
 from origami_sim.errors import InputError
 from origami_sim.pattern import grid
 
@@ -95,39 +99,43 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
     best = f"crease_viscosity at {middle}"
     second = f"crease_friction at {middle}"
     traces = [ring_down(r, c, frames, rng) for r in ("first drop", "second <drop>") for c in range(3)]
-    number = Number("crease_viscosity.damping", "N m s/rad", 2.13e-5, 2.04e-5, 2.22e-5, NAN, NAN, False)
-    stiffness = Number("stiffness", "N m/rad", 1.312e-3, 1.29e-3, 1.33e-3, 1.25e-3, 5e-5, False)
-    friction = Number("crease_friction.moment", "N m", 8.1e-6, 6.4e-6, 9.8e-6, NAN, NAN, True)
+    number = Number("crease_viscosity.viscosity", "N m s/rad", 2.13e-5, 2.04e-5, 2.22e-5, NAN, NAN, False)
+    stiffness = Number("crease.stiffness", "N m/rad", 1.312e-3, 1.29e-3, 1.33e-3, 1.25e-3, 5e-5, False)
+    friction = [
+        Number("crease_friction.friction_moment", "N m", 8.1e-6, 6.4e-6, 9.8e-6, 0.0, math.inf, False),
+        Number("crease_friction.yield_angle", "rad", 0.03, 0.01, 0.05, 0.01, 0.01, True),
+    ]
     rms = [4.1e-3, 4.0e-3, 4.2e-3]
     candidates = [
-        Candidate(best, "mechanism", ["crease_viscosity"], [middle], [stiffness, number], 0.968, 412.3, 21.4, rms,
-                  [99.1, 98.7, 98.8], "predicts held-out data best"),
-        Candidate(second, "mechanism", ["crease_friction"], [middle], [stiffness, friction], 0.027, 371.0, 24.9,
-                  [5.2e-3, 5.5e-3, 5.1e-3], [97.0, 96.1, 96.8], "predicts held-out data worse by 41.3 +- 8.0",
-                  "crease_friction.moment lies on its bound (8.1e-06 N m)"),
+        Candidate(best, "mechanism", ["crease_viscosity"], [middle], [stiffness, number], 0.968, 412.3, rms,
+                  [99.1, 98.7, 98.8], "chosen"),
+        Candidate(second, "mechanism", ["crease_friction"], [middle], [stiffness, *friction], 0.027, 408.7,
+                  [5.2e-3, 5.5e-3, 5.1e-3], [97.0, 96.1, 96.8],
+                  "misses the recordings by 41.3 +- 8.0 more in squares over the noise",
+                  "crease_friction.yield_angle lies on its bound (0.03 rad)"),
         Candidate("air_drag at panel 2", "mechanism", ["air_drag"], ["panel 2"],
-                  [Number("air_drag.drag_coefficient", "1", 3.1, 2.0, 4.2, 1.2, 0.4, False)], 0.003, 180.0, 33.0,
-                  [0.021, 0.019, 0.022], [82.0, 81.0, 80.2], "predicts held-out data worse by 232 +- 30",
+                  [Number("air_drag.drag_coefficient", "1", 3.1, 2.0, 4.2, 1.2, 0.4, False)], 0.003, 180.0,
+                  [0.021, 0.019, 0.022], [82.0, 81.0, 80.2], "misses the recordings by 464 more in squares",
                   "air_drag.drag_coefficient left its prior by 4.7 sd"),
-        Candidate("nominal refitted", "nominal", [], [], [stiffness], 0.001, 0.0, 0.0, [0.043, 0.04, 0.045],
-                  [61.0, 62.0, 60.0], "misses the recordings"),
-        Candidate("layer_thinning at all creases", "mechanism", ["layer_thinning"], ["all creases"], [], NAN, NAN, NAN,
+        Candidate("nominal refitted", "nominal", [], [], [stiffness], 0.001, 0.0, [0.043, 0.04, 0.045],
+                  [61.0, 62.0, 60.0], "the simplest"),
+        Candidate("layer_thinning at all creases", "mechanism", ["layer_thinning"], ["all creases"], [], NAN, NAN,
                   [NAN] * 3, [NAN] * 3, failed="a world went unstable at 0.21 s <node 4>"),
     ]  # fmt: skip
-    names = [best, second, "air_drag at panel 2", "crease_viscosity at all creases", "time_scale at the measurement"]
-    effects = ["crease_viscosity", "crease_friction", "air_drag", "crease_stiffening", "sensor_delay", "gravity_tilt"]
+    names = [best, second, "air_drag at panel 2", "crease_viscosity at all creases", "clock_rate at the measurement"]
+    effects = ["crease_viscosity", "crease_friction", "air_drag", "crease_stiffening", "crease_offset", "crease_hysteresis"]
     screening = [
         Suspected(f"{e} at {s}", e, s, "crease", z, 2.2e-5 * z / 60, 4e-7, "N m s/rad", (z / 64) ** 2 * 0.97,
                   "refitted" if z > 30 else "")
         for z, (e, s) in zip(
             np.geomspace(63.5, 0.4, 18), [(e, s) for e in effects for s in CREASES], strict=True)
     ]  # fmt: skip
-    screening.append(Suspected("hum at the drive", "hum", "the drive", "drive", NAN, NAN, NAN, "V", NAN, "not excited"))
+    screening.append(Suspected("voltage_sag at the drive", "voltage_sag", "the drive", "drive", NAN, NAN, NAN, "V", NAN, "not excited"))
     overlap = [[1.0, 0.93, 0.61, 0.99, 0.12], [0.93, 1, 0.55, 0.9, 0.1], [0.61, 0.55, 1, 0.58, 0.3],
                [0.99, 0.9, 0.58, 1, 0.14], [0.12, 0.1, 0.3, 0.14, NAN]]  # fmt: skip
     sentence = (
-        f"At {middle} the model lacks crease_viscosity (damping 21 µN m s/rad, 95 %: 20 to 22), p = 0.97; held-out "
-        "error falls from 10.7 to 1.02 times the noise floor (of what could be removed, 100 % is)."
+        f"Found: Kelvin-Voigt loss of a crease at {middle} (viscosity 21 µN m s/rad, 95 %: 20 to 22), p = 0.97; it "
+        "explains 91 % of the mismatch, numbers of the model 4 %; 5 % is real and not named."
     )
     correlations = []
     for c in range(3):
@@ -147,9 +155,10 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
         isolability=overlap,
         places=[place(middle, 0.93, rng), place(CREASES[0], 0.05, rng), place(CREASES[2], 0.015, rng),
                 place("shift x", 0.005, rng)],
-        p_value=0.005,
-        p_small=0.02,
-        structure=(31.0, 0.4),
+        budget=[Share("numbers of the model", "numbers", 0.04), Share(best, "effect", 0.91),
+                Share("not named", "rest", 0.05)],
+        marginals={best: 0.968, second: 0.027, "air_drag at panel 2": 0.003, "crease_friction at all creases": 0.02},
+        compared=0.97,
         onset=0.31,
         traces=traces,
         correlations=correlations,
@@ -170,22 +179,33 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
         settings={"command": "origami-sim diagnose model.toml first.csv second.csv", "seed": 0, "segment": None,
                   "draws": 199, "start": "fit"},
         seconds={"segments": 1.1, "nominal": 6.4, "screening": 9.1, "refit": 21.0, "report": NAN},
-        patch={"crease_viscosity.damping": 2.13e-5, "stiffness": 1.312e-3},
+        patch={"crease_viscosity.viscosity@1": 2.13e-5, "crease.stiffness": 1.312e-3},
         subject="three creases & <four panels>",
         recordings=["first drop", "second <drop>"],
     )  # fmt: skip
     if verdict == "ADEQUATE":
-        out.chosen, out.onset, out.experiments, out.places, out.p_value, out.patch = [], NAN, [], [], 0.62, {}
+        out.chosen, out.onset, out.experiments, out.places, out.patch, out.budget = [], NAN, [], [], {}, []
     elif verdict == "TIE":
         out.chosen = [best, second]
     elif verdict == "SEVERAL":
         out.chosen, candidates[0].label = [best, "air_drag at panel 2"], f"{best} + air_drag at panel 2"
+        candidates[0].effects, candidates[0].sites = ["crease_viscosity", "air_drag"], [middle, "panel 2"]
+        candidates[0].numbers.append(candidates[2].numbers[0])
+        out.budget[1:2] = [Share(best, "effect", 0.61), Share("air_drag at panel 2", "effect", 0.3)]
+    elif verdict == "UNKNOWN":
+        out.probability, out.budget = NAN, [Share(best, "effect", 0.3), Share("not named", "rest", 0.7)]
+    elif verdict == "MEASUREMENT":
+        out.chosen = ["clock_rate at the measurement"]
+        out.budget[1] = Share(out.chosen[0], "measurement", 0.91)
+    elif verdict == "PARAMETER":
+        out.chosen, out.budget = ["crease.stiffness"], [Share("numbers of the model", "numbers", 1.0)]
     elif verdict == "UNTESTABLE":  # nothing could be done at all
-        out.probability = out.p_value = out.onset = NAN
+        out.probability = out.onset = NAN
         out.candidates, out.screening, out.isolability_labels, out.isolability = [], [], [], []
         out.places, out.traces, out.correlations, out.experiments, out.baselines = [], [], [], [], []
         out.error_after = out.error_refitted = out.error_before = [NAN] * 3
         out.noise, out.chosen, out.patch, out.notes, out.settings, out.seconds = [NAN] * 3, [], {}, [], {}, {}
+        out.budget, out.marginals, out.compared = [], {}, 0.0
     return out
 
 

@@ -1,0 +1,161 @@
+"""One plot for each law that is named: what the recorded motion lacks against what it goes with, and the law in it."""
+
+import numpy as np
+
+from origami_sim.diagnose.diagnosis import Candidate, Curve, Diagnosis, Place, Trace
+from origami_sim.diagnose.page.law import Law, law_of
+from origami_sim.diagnose.page.markup import Html, element
+from origami_sim.diagnose.page.measures import array
+from origami_sim.diagnose.page.pieces import against, legend, moment_of
+from origami_sim.diagnose.page.plots import Plot, span_of
+from origami_sim.diagnose.page.wording import SEPARATOR, title_of, words_of
+from origami_sim.effects import CATALOGUE
+
+MOST = 4
+"""Laws that are drawn; more are named in the headline only."""
+
+TALL = 230
+"""Height of these plots [px]."""
+
+POINTS = 121
+"""Points of a drawn law."""
+
+
+def laws(d: Diagnosis) -> list[Html]:
+    """A figure for each named law, in the order in which they are named."""
+    out, seen = [], set()
+    for label in d.chosen:
+        c = _row(d, label)
+        for part in label.split(SEPARATOR):
+            if part in seen or len(out) == MOST or part.partition(" at ")[0] not in CATALOGUE:
+                continue
+            seen.add(part)
+            drawn = _law(d, part, c)
+            if drawn is not None:
+                out.append(drawn)
+    return out
+
+
+def _row(d: Diagnosis, label: str) -> Candidate | None:
+    """The most probable explanation that is, or else holds, what is named."""
+    rows = [c for c in d.candidates if not c.failed]
+    whole = [c for c in rows if c.label == label or set(c.label.split(SEPARATOR)) == set(d.chosen)]
+    holds = [c for c in rows if label in c.label.split(SEPARATOR)]
+    return next(iter([*whole, *holds]), None)
+
+
+def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
+    effect, _, site = label.partition(" at ")
+    law = law_of(effect, _values(effect, site, c)) if c is not None else None
+    if CATALOGUE[effect].family == "measurement":
+        return _trace(d, label)
+    place = _place(d, site)
+    curve = _curve(place, effect, law) if place is not None else None
+    if place is None or curve is None:
+        return _trace(d, label)
+    name, unit = moment_of(place.site)
+    name = f"missing {name}"
+    x = np.linspace(min(curve.x), max(curve.x), POINTS)
+    y, said = _through(law, curve, x) if law is not None and law.against == curve.against else (x[:0], "")
+    plot = against(place.site, curve, name, unit, height=TALL, also=y)
+    if len(y):
+        plot.line(x, y, "law", title=title_of(effect))
+    goes = curve.against.replace("_", " ")
+    caption = element(
+        "figcaption",
+        element("b", _capital(words_of(label))),
+        element("span", f"{_capital(name)} at {place.site} against {goes}, before this was named.{said}"),
+    )
+    entries = [("place", "recorded motion, ± 2 se")] + ([("law", "the law with its fitted numbers")] if len(y) else [])
+    return element("figure", caption, plot.html(), legend(*entries), class_="law")
+
+
+def _values(effect: str, site: str, c: Candidate) -> dict[str, float]:
+    """Fitted numbers of an effect at a site, by name; the effects' numbers come in the order of the effects."""
+    mine = [n for n in c.numbers if n.label.startswith(f"{effect}.")]
+    alike = [s for e, s in zip(c.effects, c.sites, strict=True) if e == effect]
+    if site not in alike or len(mine) % len(alike):
+        return {}
+    each = len(mine) // len(alike)
+    first = alike.index(site) * each
+    return {n.label.partition(".")[2].partition("[")[0]: n.value for n in mine[first : first + each]}
+
+
+def _place(d: Diagnosis, site: str) -> Place | None:
+    """The place itself, or the one where most is missing."""
+    own = [p for p in d.places if p.site == site]
+    return max(own or d.places, key=lambda p: p.share, default=None)
+
+
+def _curve(place: Place, effect: str, law: Law | None) -> Curve | None:
+    """What the missing moment goes with: what the law says, what drives it, or what explains most of it."""
+    curves = [c for c in place.curves if len(c.x) > 2]
+    if law is not None:
+        return next((c for c in curves if c.against == law.against), None)
+    drives = [n for n in CATALOGUE[effect].drives if n != "time"] or [effect.partition("_")[0]]
+    driven = [c for c in curves if any(c.against.startswith(n) for n in drives)]
+    plain = [c for c in curves if not c.against.startswith(("phase of", "time since"))]
+    return max(driven or plain or curves, key=_structure, default=None)
+
+
+def _structure(c: Curve) -> float:
+    """Mean square of a curve about its mean, over its error."""
+    mean, error = array(c.mean), np.maximum(array(c.error), 1e-300)
+    return float(np.nanmean(((mean - np.nanmean(mean)) / error) ** 2))
+
+
+def _through(law: Law, c: Curve, x: np.ndarray) -> tuple[np.ndarray, str]:
+    """The law at x, and what was taken off it.
+
+    The refitted model has bent its own stiffness and loss towards the law as far as it could. In the plotted quantity
+    that is a straight line; it is found from what the bins have beyond the law.
+    """
+    said = "".join(f" {_capital(k.replace('_', ' '))} taken as {v:g}." for k, v in law.assumed.items())
+    at, mean, error = array(c.x), array(c.mean), array(c.error)
+    y = law.moment(x)
+    if law.straight(x) or len(at) < 4:
+        return y, said
+    weight = 1.0 / np.maximum(error, 1e-3 * np.ptp(mean) + 1e-300)
+    line = np.polyfit(at, mean - law.moment(at), 1, w=weight)
+    more = " The law is drawn less the straight line that refitting the model's own numbers had taken over."
+    return y + np.polyval(line, x), more + said
+
+
+def _trace(d: Diagnosis, label: str) -> Html | None:
+    """For what acts on the recording and not at a crease: the residual that it explains, before and after."""
+    mine = [t for t in d.traces if f"channel {t.component}" in label] or d.traces
+    t = max(mine, key=_gain, default=None)
+    if t is None:
+        return None
+    x, y = array(t.times), array(t.recorded)
+    before, after = y - array(t.refitted), y - array(t.after)
+    plot = Plot(
+        f"residual of {t.component} of {t.recording} in time",
+        span_of(x, margin=0.0),
+        span_of(before, after, zero=True),
+        x_name="time",
+        x_unit="s",
+        y_name="residual",
+        y_unit=t.unit,
+        height=TALL,
+    )
+    ends = array(plot.x)
+    if t.noise > 0:
+        plot.band(ends, np.full(2, -2 * t.noise), np.full(2, 2 * t.noise), "noise")
+    plot.level(0.0, "zero").line(x, before, "refitted", breaks=t.breaks).line(x, after, "after", breaks=t.breaks)
+    caption = element(
+        "figcaption",
+        element("b", _capital(words_of(label))),
+        element("span", f"Recorded minus predicted {t.component} in {t.recording}, the channel that gains most by it."),
+    )
+    key = legend(("refitted", "without it"), ("after", "with it"))
+    return element("figure", caption, plot.html(), key, class_="law")
+
+
+def _gain(t: Trace) -> float:
+    recorded, refitted, after = (array(v) for v in (t.recorded, t.refitted, t.after))
+    return float(np.nansum((recorded - refitted) ** 2 - (recorded - after) ** 2)) / max(t.noise, 1e-300) ** 2
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
