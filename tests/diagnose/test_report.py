@@ -1,5 +1,6 @@
 """The page of a diagnosis: complete, safe and equal to its data for every verdict; readable in a real browser."""
 
+import html
 import html.parser
 import json
 import math
@@ -123,14 +124,25 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
                   [NAN] * 3, [NAN] * 3, failed="a world went unstable at 0.21 s <node 4>"),
     ]  # fmt: skip
     names = [best, second, "air_drag at panel 2", "crease_viscosity at all creases", "clock_rate at the measurement"]
-    effects = ["crease_viscosity", "crease_friction", "air_drag", "crease_stiffening", "crease_offset", "crease_hysteresis"]
+    effects = [
+        "crease_viscosity",
+        "crease_friction",
+        "air_drag",
+        "crease_stiffening",
+        "crease_offset",
+        "crease_hysteresis",
+    ]
     screening = [
         Suspected(f"{e} at {s}", e, s, "crease", z, 2.2e-5 * z / 60, 4e-7, "N m s/rad", (z / 64) ** 2 * 0.97,
                   "refitted" if z > 30 else "")
         for z, (e, s) in zip(
             np.geomspace(63.5, 0.4, 18), [(e, s) for e in effects for s in CREASES], strict=True)
     ]  # fmt: skip
-    screening.append(Suspected("voltage_sag at the drive", "voltage_sag", "the drive", "drive", NAN, NAN, NAN, "V", NAN, "not excited"))
+    screening.append(
+        Suspected(
+            "voltage_sag at the drive", "voltage_sag", "the drive", "drive", NAN, NAN, NAN, "V", NAN, "not excited"
+        )
+    )
     overlap = [[1.0, 0.93, 0.61, 0.99, 0.12], [0.93, 1, 0.55, 0.9, 0.1], [0.61, 0.55, 1, 0.58, 0.3],
                [0.99, 0.9, 0.58, 1, 0.14], [0.12, 0.1, 0.3, 0.14, NAN]]  # fmt: skip
     sentence = (
@@ -236,16 +248,21 @@ class Read(html.parser.HTMLParser):
             self.headings.append(data)
 
 
+FIRST = ["Where the mismatch goes", "Explanations"]
+FOLDED = ["Next experiment", "Recorded and predicted", "Where it goes wrong", "Error of every model", "All suspects",
+          "What looks alike", "What is left", "Notes and settings"]  # fmt: skip
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_page_is_complete_for_every_verdict(verdict, tmp_path):
     diagnosis = example(verdict)
     path = write_report(diagnosis, tmp_path / "new" / "report.html", geometry=GEOMETRY)
     text = path.read_text(encoding="utf-8")
     seen = Read(text)
-    assert seen.headings == list(SECTIONS.values())
+    assert seen.headings == [*FIRST, *FOLDED]
     assert len(set(seen.ids)) == len(seen.ids)
     internal = [link[1:] for link in seen.links if link.startswith("#")]
-    assert set(SECTIONS) <= set(internal) <= set(seen.ids)
+    assert set(internal) <= set(seen.ids)
     assert not re.search(r"\b(nan|none|undefined|inf|null|NaN|None)\b", " ".join(seen.words))
     outside = re.sub(r'href="data:[^"]*"', "", text)
     assert not re.search(r"https?:|src=|@import|url\(", outside)
@@ -253,6 +270,17 @@ def test_page_is_complete_for_every_verdict(verdict, tmp_path):
     assert verdict in " ".join(seen.words)
     assert [p.name for p in path.parent.iterdir()] == ["report.html"]
     assert len(text) < 3e6
+    assert "$" not in re.sub(r"<script>.*</script>", "", outside, flags=re.S)  # nothing of the skeleton is left
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_no_identifier_is_read_outside_of_the_calibration(verdict):
+    d = example(verdict)
+    d.notes.append("Not tested, because these recordings do not tell: crease_hysteresis at left crease, air_drag.")
+    d.patch, d.settings = {}, {}  # these are to be typed, not read
+    words = " ".join(Read(page(d, GEOMETRY)).words)
+    assert not [n for n in CATALOGUE if "_" in n and n in words]
+    assert not re.search(r"\b[a-z]+_[a-z]+\b", words)
 
 
 def test_names_are_escaped():
@@ -264,19 +292,105 @@ def test_names_are_escaped():
     assert not {"drop", "node", "too", "four"} & set(seen.tags)
 
 
+def test_words_for_labels_and_numbers():
+    assert words_of("crease_friction at hinge2 + gravity at the body") == (
+        "dry friction in a crease at hinge2 with weight of the nodes at the body"
+    )
+    assert words_of("crease_viscosity at A") == "Kelvin-Voigt loss of a crease at A"
+    assert number_of("crease_friction.friction_moment", owner=False) == "friction moment"
+    assert number_of("inertia.mass") == "mass"
+    assert worded("crease.stiffness[A] left its prior") == "stiffness at A of linear elastic crease left its prior"
+    plain = "The friction of a crease at 0.5 T, see run.csv: a load of 1.5 +- 0.1 N."
+    assert worded(plain) == plain.replace("+-", "±")
+
+
+def test_budget_is_one_bar_whose_parts_are_its_shares():
+    text = page(example("SEVERAL"), GEOMETRY)
+    bar = re.search(r'<div class="budget".*?</div>', text)[0]
+    assert [float(w) for w in re.findall(r"width:([\d.]+)%", bar)] == pytest.approx([4, 61, 30, 5])
+    words = " ".join(Read(text).words)
+    assert "numbers of the model that were off" in words and "real, but not named" in words
+    assert "Nothing beyond the noise is missed." in " ".join(Read(page(example("ADEQUATE"))).words)
+
+
+def test_three_numbers_follow_from_the_data():
+    d = example()
+    tiles = re.findall(r'<div class="tile">.*?<b>(.*?)</b>', page(d))
+    noise = np.array(d.noise)
+    before, after = (float(np.sqrt(np.mean((np.array(e) / noise) ** 2))) for e in (d.error_before, d.error_after))
+    assert tiles == ["97 %", f"{before:.0f} → {after:.1f}", "97 %"]
+    d = example("UNKNOWN")
+    assert re.findall(r'<div class="tile">.*?<b>(.*?)</b>', page(d))[0] == "not stated"
+
+
 def test_numbers_on_the_page_follow_from_the_data():
     d = example()
     text = "".join(Read(page(d, GEOMETRY)).words)
-    noise = np.array(d.noise)
-    before, after = (float(np.sqrt(np.mean((np.array(e) / noise) ** 2))) for e in (d.error_before, d.error_after))
-    assert f"{before:.0f} × → {after:.1f} ×" in text
     t = d.traces[0]
     y, f = np.array(t.recorded), np.array(t.after)
     fit = 100 * (1 - np.sqrt(np.mean((y - f) ** 2)) / y.std())
     assert f"now {fit:.1f} %" in text
     assert "21.30 µN m s/rad (20.40 to 22.20)" in text  # 2.13e-5, half-width 0.09e-5
-    assert "+412 ± 21" in text
     assert "1.2 sd away" in text  # (1.312 - 1.25) / 0.05
+
+
+def test_probabilities_and_shares_have_columns_of_their_own():
+    text = page(example(), GEOMETRY)
+    for column in re.findall(r'data-label="([^"]*)"', text):
+        assert sum(w in column.lower() for w in ("probab", "share", "explains", "p-value")) < 2, column
+    drawn = Read(re.search(r'<figure class="heat">.*?</figure>', text)[0] + "")
+    assert "Probability that an effect" in " ".join(drawn.words) and "hare" not in " ".join(drawn.words)
+    unknown = Read(re.search(r'<figure class="heat">.*?</figure>', page(example("UNKNOWN"), GEOMETRY))[0])
+    assert "Share of the structure" in " ".join(unknown.words) and "robab" not in " ".join(unknown.words)
+
+
+def test_law_of_the_catalogue_from_fitted_numbers():
+    x = np.array([-2.0, -0.1, 0.1, 2.0])
+    loss = law_of("crease_viscosity", {"viscosity": 3e-5})
+    assert loss.against == "rate" and loss.moment(x) == pytest.approx(-3e-5 * x) and loss.straight(x)
+    rubbing = law_of("crease_friction", {"friction_moment": 2e-5, "yield_angle": 0.01})
+    assert rubbing.against == "rate" and rubbing.moment(x) == pytest.approx(-2e-5 * np.sign(x))
+    assert not rubbing.straight(x) and not rubbing.assumed
+    cubic = law_of("crease_stiffening", {"cubic_stiffness": 1e-4})
+    assert cubic.against == "angle" and cubic.moment(x) == pytest.approx(-1e-4 * x**3)
+    assert cubic.assumed == {"rest_angle": 0.0}
+    for needs_more in ("crease_relaxation", "air_drag", "magnetic_torque", "clock_rate", "no such effect"):
+        assert law_of(needs_more, {"stiffness_1": 1.0}) is None
+
+
+def drawn_law(text: str) -> np.ndarray:
+    """Points [n, 2] of the drawn law, in parts of the plot's box."""
+    start, steps = re.search(r' d="M([^"]*)" class="law"', text)[1].split("l")
+    first = [int(v) for v in start.split()]
+    rest = np.array(re.findall(r"-?\d+", steps), int).reshape(-1, 2)
+    return np.vstack([first, first + np.cumsum(rest, axis=0)]) / (2000, 1000)
+
+
+def test_law_is_drawn_through_what_is_missing():
+    d, site = example(), CREASES[1]
+    row = d.candidates[1]  # dry friction, of which the refitted loss has taken a part
+    d.chosen, row.numbers[1].value = [row.label], 2e-5
+    rate = d.places[0].curves[1]
+    x = np.array(rate.x)
+    rate.mean = (-2e-5 * np.sign(x) + 1.2e-5 * x + 1e-6).tolist()
+    text = page(d)
+    assert "less the straight line" in text and f"at {site.replace('&', '&amp;').replace('<b>', '&lt;b&gt;')}" in text
+    line = drawn_law(text)
+    assert len(line) > 20
+    low, high = (f(np.array(rate.mean)) for f in (np.min, np.max))
+    heights = np.interp((np.array(x) - x[0]) / np.ptp(x), (line[:, 0] - line[0, 0]) / np.ptp(line[:, 0]), line[:, 1])
+    dots = re.search(r'class="figures evidence".*', text)[0]
+    spots = np.array(re.findall(r'd="M(\d+) (\d+)h0" class="place dots"', dots)[: len(x)], int) / (2000, 1000)
+    far = np.abs(x) > 0.2  # bins beside the jump
+    assert heights[far] == pytest.approx(spots[far, 1], abs=0.01)
+    assert high - low > 0
+
+
+def test_recorder_and_numbers_show_the_residual_that_they_explain():
+    for verdict, name in (("MEASUREMENT", "recorder&#x27;s clock"), ("PARAMETER", "What is left")):
+        evidence = re.search(r'class="figures evidence".*?</figure>', page(example(verdict)))[0]
+        assert name in evidence or html.unescape(name) in html.unescape(evidence)
+        assert "residual [" in evidence
 
 
 def test_power_that_is_not_explained_is_drawn_block_by_block():
@@ -406,7 +520,7 @@ function probe(name, width, text) {
   document.body.append(frame);
 }
 const pages = PAGES;
-for (const [name, text] of Object.entries(pages)) for (const w of [1280, 390]) probe(`${name} ${w}`, w, text);
+for (const [name, text] of Object.entries(pages)) for (const w of [1600, 1280, 390]) probe(`${name} ${w}`, w, text);
 </script></body>"""
 
 
@@ -424,7 +538,7 @@ def test_in_a_real_browser(tmp_path):
     found = re.search(r"FOUND(\{.*\})END", shown)
     assert found, f"the browser did not finish: {shown[-500:]}"
     seen = json.loads(found[1])
-    assert len(seen) == 6
+    assert len(seen) == 9
     for name, facts in seen.items():
         verdict, width = name.split()
         assert facts["wrong"] == [], name

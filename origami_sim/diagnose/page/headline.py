@@ -53,7 +53,7 @@ def numbers(d: Diagnosis) -> Html:
     if np.isfinite(known(d.probability)):
         out.append(("Probability", percent(d.probability), OF.get(d.verdict, "of what is named here")))
     else:
-        out.append(("Probability", "none", "no explanation is believed"))
+        out.append(("Probability", "not stated", "no explanation is believed"))
     if np.isfinite(after):
         again = f"; {number(refitted)} by refitting alone" if np.isfinite(refitted) else ""
         out.append(("Error", f"{number(before)} → {number(after)}", f"times the {unit}, as given → now{again}"))

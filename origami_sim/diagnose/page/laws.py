@@ -22,7 +22,7 @@ POINTS = 121
 
 
 def laws(d: Diagnosis) -> list[Html]:
-    """A figure for each named law, in the order in which they are named."""
+    """A figure for each named law, in the order in which they are named; where none is, one of the error in time."""
     out, seen = [], set()
     for label in d.chosen:
         c = _row(d, label)
@@ -33,6 +33,9 @@ def laws(d: Diagnosis) -> list[Html]:
             drawn = _law(d, part, c)
             if drawn is not None:
                 out.append(drawn)
+    if not out:
+        drawn = _trace(d, "What is left", "before")
+        out += [drawn] if drawn is not None else []
     return out
 
 
@@ -46,13 +49,14 @@ def _row(d: Diagnosis, label: str) -> Candidate | None:
 
 def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     effect, _, site = label.partition(" at ")
+    heading = _capital(words_of(label))
     law = law_of(effect, _values(effect, site, c)) if c is not None else None
     if CATALOGUE[effect].family == "measurement":
-        return _trace(d, label)
+        return _trace(d, heading, channel=site.removeprefix("channel "))
     place = _place(d, site)
     curve = _curve(place, effect, law) if place is not None else None
     if place is None or curve is None:
-        return _trace(d, label)
+        return _trace(d, heading)
     name, unit = moment_of(place.site)
     name = f"missing {name}"
     x = np.linspace(min(curve.x), max(curve.x), POINTS)
@@ -63,8 +67,8 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     goes = curve.against.replace("_", " ")
     caption = element(
         "figcaption",
-        element("b", _capital(words_of(label))),
-        element("span", f"{_capital(name)} at {place.site} against {goes}, before this was named.{said}"),
+        element("b", heading),
+        element("span", f"What the refitted model lacks at {place.site}, against the {goes} there.{said}"),
     )
     entries = [("place", "recorded motion, ± 2 se")] + ([("law", "the law with its fitted numbers")] if len(y) else [])
     return element("figure", caption, plot.html(), legend(*entries), class_="law")
@@ -121,14 +125,18 @@ def _through(law: Law, c: Curve, x: np.ndarray) -> tuple[np.ndarray, str]:
     return y + np.polyval(line, x), more + said
 
 
-def _trace(d: Diagnosis, label: str) -> Html | None:
-    """For what acts on the recording and not at a crease: the residual that it explains, before and after."""
-    mine = [t for t in d.traces if f"channel {t.component}" in label] or d.traces
-    t = max(mine, key=_gain, default=None)
+def _trace(d: Diagnosis, heading: str, without: str = "refitted", *, channel: str = "") -> Html | None:
+    """For what acts on the recording and not at a crease: the residual that it explains, before and after.
+
+    Args:
+        without: the prediction that is drawn beside what was found, see `Trace`. channel: which, if it is a matter of
+            one; else the one that gains most.
+    """
+    t = max([t for t in d.traces if t.component == channel] or d.traces, key=lambda t: _gain(t, without), default=None)
     if t is None:
         return None
     x, y = array(t.times), array(t.recorded)
-    before, after = y - array(t.refitted), y - array(t.after)
+    before, after = y - array(getattr(t, without)), y - array(t.after)
     plot = Plot(
         f"residual of {t.component} of {t.recording} in time",
         span_of(x, margin=0.0),
@@ -139,22 +147,18 @@ def _trace(d: Diagnosis, label: str) -> Html | None:
         y_unit=t.unit,
         height=TALL,
     )
-    ends = array(plot.x)
     if t.noise > 0:
-        plot.band(ends, np.full(2, -2 * t.noise), np.full(2, 2 * t.noise), "noise")
-    plot.level(0.0, "zero").line(x, before, "refitted", breaks=t.breaks).line(x, after, "after", breaks=t.breaks)
-    caption = element(
-        "figcaption",
-        element("b", _capital(words_of(label))),
-        element("span", f"Recorded minus predicted {t.component} in {t.recording}, the channel that gains most by it."),
-    )
-    key = legend(("refitted", "without it"), ("after", "with it"))
+        plot.band(array(plot.x), np.full(2, -2 * t.noise), np.full(2, 2 * t.noise), "noise")
+    plot.level(0.0, "zero").line(x, before, without, breaks=t.breaks).line(x, after, "after", breaks=t.breaks)
+    said = f"Recorded minus predicted {t.component} in {t.recording}, where it changes most. Shaded: noise, ± 2 sd."
+    caption = element("figcaption", element("b", heading), element("span", said))
+    key = legend((without, "as given" if without == "before" else "without it"), ("after", "now"))
     return element("figure", caption, plot.html(), key, class_="law")
 
 
-def _gain(t: Trace) -> float:
-    recorded, refitted, after = (array(v) for v in (t.recorded, t.refitted, t.after))
-    return float(np.nansum((recorded - refitted) ** 2 - (recorded - after) ** 2)) / max(t.noise, 1e-300) ** 2
+def _gain(t: Trace, without: str) -> float:
+    recorded, before, after = array(t.recorded), array(getattr(t, without)), array(t.after)
+    return float(np.nansum((recorded - before) ** 2 - (recorded - after) ** 2)) / max(t.noise, 1e-300) ** 2
 
 
 def _capital(text: str) -> str:

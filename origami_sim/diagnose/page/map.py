@@ -104,14 +104,13 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
         note += " Squares: held nodes."
     return element(
         "figure",
-        element("div", svg, texts, class_="origami", style=f"aspect-ratio:{wide:.0f}/{tall:.0f}"),
         element(
             "figcaption",
             element("b", "On the device"),
-            element("span", note),
-            ramp,
-            element("span", " Not on the drawing: ", chips) if chips else None,
+            element("span", note, element("span", " Elsewhere: ", chips) if chips else None),
         ),
+        element("div", svg, texts, class_="origami", style=f"aspect-ratio:{wide:.0f}/{tall:.0f}"),
+        ramp,
         class_="heat",
     )
 

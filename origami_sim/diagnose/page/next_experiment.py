@@ -8,7 +8,7 @@ from origami_sim.diagnose.page.wording import worded, words_of
 
 
 def finding(d: Diagnosis) -> str:
-    return worded(d.experiments[0].what) if d.experiments else "none is proposed"
+    return worded(d.experiments[0].what) if d.experiments else "nothing is proposed"
 
 
 def section(d: Diagnosis) -> list:

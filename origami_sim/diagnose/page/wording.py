@@ -67,8 +67,6 @@ def _effect(label: str) -> str:
 
 @cache
 def _names() -> re.Pattern:
-    """Names of effects that no sentence would hold by chance, and others where a site follows."""
-    names = sorted(CATALOGUE, key=len, reverse=True)
-    sure = "|".join(re.escape(n) for n in names if "_" in n)
-    other = "|".join(re.escape(n) for n in names if "_" not in n)
-    return re.compile(rf"\b(?:{sure})\b|\b(?:{other})(?= at )")
+    """Names of effects that no sentence would hold by chance; a single word is a word already."""
+    names = sorted((n for n in CATALOGUE if "_" in n), key=len, reverse=True)
+    return re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
