@@ -15,6 +15,9 @@ WORDS = {"numbers": "numbers of the model that were off", "rest": "real, but not
 WIDE = 0.22
 """Part of the bar from which its name has room inside, on a screen that is not narrow."""
 
+NARROW = 0.12
+"""Part of the bar below which not even the percentage has room on a narrow screen."""
+
 LITTLE = 0.005
 """Share below which a part is not listed."""
 
@@ -37,7 +40,7 @@ def section(d: Diagnosis, over: float) -> Html:
             "span",
             element("b", percent(s.share)) if s.share >= 0.05 else "",
             element("span", f" {name_of(s)}") if s.share >= WIDE else "",
-            class_=f"b-{kind}",
+            class_=f"b-{kind}" + (" slim" if s.share < NARROW else ""),
             style=f"width:{100 * s.share:.2f}%",
             title=f"{name_of(s)}: {percent(s.share)}",
         )

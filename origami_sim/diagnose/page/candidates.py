@@ -8,7 +8,7 @@ from origami_sim.diagnose.page.measures import has_noise, known, multiples
 from origami_sim.diagnose.page.pieces import bar, figure, fold, nothing, quiet, row, table
 from origami_sim.diagnose.page.wording import SEPARATOR, number_of, worded, words_of
 
-OPEN = 6
+OPEN = 5
 """Explanations that are listed at first."""
 
 KINDS = {"nominal": "the model, refitted", "mechanism": "physics", "measurement": "measurement"}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import Candidate, Curve, Diagnosis, Place, Trace
+from origami_sim.diagnose.diagnosis import Candidate, Curve, Diagnosis, Trace
 from origami_sim.diagnose.page.law import Law, law_of
 from origami_sim.diagnose.page.markup import Html, element
 from origami_sim.diagnose.page.measures import array
@@ -50,28 +50,37 @@ def _row(d: Diagnosis, label: str) -> Candidate | None:
 def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     effect, _, site = label.partition(" at ")
     heading = _capital(words_of(label))
-    law = law_of(effect, _values(effect, site, c)) if c is not None else None
     if CATALOGUE[effect].family == "measurement":
         return _trace(d, heading, channel=site.removeprefix("channel "))
-    place = _place(d, site)
-    curve = _curve(place, effect, law) if place is not None else None
-    if place is None or curve is None:
+    law = law_of(effect, _values(effect, site, c)) if c is not None else None
+    found = _missing(d, site)
+    curve = _curve(found[1], effect, law) if found is not None else None
+    if found is None or curve is None:
         return _trace(d, heading)
-    name, unit = moment_of(place.site)
-    name = f"missing {name}"
+    where, _, name, unit = found
     x = np.linspace(min(curve.x), max(curve.x), POINTS)
-    y, said = _through(law, curve, x) if law is not None and law.against == curve.against else (x[:0], "")
-    plot = against(place.site, curve, name, unit, height=TALL, also=y)
+    y, said = _through(law, curve, x) if law is not None else (x[:0], "")
+    plot = against(where, curve, f"missing {name}", unit, height=TALL, also=y)
     if len(y):
         plot.line(x, y, "law", title=title_of(effect))
     goes = curve.against.replace("_", " ")
     caption = element(
         "figcaption",
         element("b", heading),
-        element("span", f"What the refitted model lacks at {place.site}, against the {goes} there.{said}"),
+        element("span", f"What the refitted model lacks at {where}, against the {goes} there.{said}"),
     )
     entries = [("place", "recorded motion, ± 2 se")] + ([("law", "the law with its fitted numbers")] if len(y) else [])
     return element("figure", caption, plot.html(), legend(*entries), class_="law")
+
+
+def _missing(d: Diagnosis, site: str) -> tuple[str, list[Curve], str, str] | None:
+    """Where, the curves of what is missing there, its name and unit: at the site, or else where most is missing."""
+    own = [p for p in d.places if p.site == site]
+    acting = next((a for a in d.acting if a.site == site and a.curves), None)
+    if acting is not None and not own:
+        return site, acting.curves[1:], acting.what.split()[0], acting.unit
+    p = max(own or d.places, key=lambda p: p.share, default=None)
+    return None if p is None else (p.site, p.curves, *moment_of(p.site))
 
 
 def _values(effect: str, site: str, c: Candidate) -> dict[str, float]:
@@ -85,19 +94,14 @@ def _values(effect: str, site: str, c: Candidate) -> dict[str, float]:
     return {n.label.partition(".")[2].partition("[")[0]: n.value for n in mine[first : first + each]}
 
 
-def _place(d: Diagnosis, site: str) -> Place | None:
-    """The place itself, or the one where most is missing."""
-    own = [p for p in d.places if p.site == site]
-    return max(own or d.places, key=lambda p: p.share, default=None)
-
-
-def _curve(place: Place, effect: str, law: Law | None) -> Curve | None:
+def _curve(curves: list[Curve], effect: str, law: Law | None) -> Curve | None:
     """What the missing moment goes with: what the law says, what drives it, or what explains most of it."""
-    curves = [c for c in place.curves if len(c.x) > 2]
+    curves = [c for c in curves if len(c.x) > 2]
     if law is not None:
         return next((c for c in curves if c.against == law.against), None)
-    drives = [n for n in CATALOGUE[effect].drives if n != "time"] or [effect.partition("_")[0]]
-    driven = [c for c in curves if any(c.against.startswith(n) for n in drives)]
+    e = CATALOGUE[effect]
+    names = [n for n in e.drives if n != "time"] or (["rate"] if e.dissipates else [effect.partition("_")[0]])
+    driven = [c for c in curves if c.against.startswith(tuple(names))]
     plain = [c for c in curves if not c.against.startswith(("phase of", "time since"))]
     return max(driven or plain or curves, key=_structure, default=None)
 

@@ -9,6 +9,9 @@ from origami_sim.effects import CATALOGUE, get
 SEPARATOR = " + "
 """Between the effects of one explanation in its label."""
 
+WHOLE = ("the measurement", "the drive", "the ground")
+"""Sites that an effect's title says already."""
+
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
 _PLAIN_OWNERS = ("inertia", "setting")
 """Owners of a model's numbers that are no effects and say nothing to a reader."""
@@ -62,7 +65,9 @@ def site_of(label: str) -> str:
 
 def _effect(label: str) -> str:
     name, at, site = label.partition(" at ")
-    return f"{title_of(name)}{at}{site}" if name in CATALOGUE else worded(label)
+    if name not in CATALOGUE:
+        return worded(label)
+    return title_of(name) if site in WHOLE else f"{title_of(name)}{at}{site}"
 
 
 @cache
