@@ -512,7 +512,14 @@ function probe(name, width, text) {
     page.querySelectorAll("details").forEach(d => { d.open = true; });
     const sizes = [...page.querySelectorAll("svg")].map(s => s.getBoundingClientRect());
     const hidden = [...page.querySelectorAll("a, summary")].filter(a => a.getClientRects().length === 0).length;
-    found[name] = { wrong: view.wrong, inner: view.innerWidth, scroll: page.documentElement.scrollWidth,
+    const beyond = [...page.querySelectorAll("figure, td, th, .tile, .budget")].filter(e => {
+      const box = e.getBoundingClientRect();
+      return [...e.children].some(c => {
+        const inner = c.getBoundingClientRect();
+        return inner.width > 0 && (inner.right > box.right + 1 || inner.left < box.left - 1);
+      });
+    }).length;
+    found[name] = { beyond, wrong: view.wrong, inner: view.innerWidth, scroll: page.documentElement.scrollWidth,
       svg: sizes.length, empty: sizes.filter(r => r.width < 20 || r.height < 20).length, hidden,
       paths: page.querySelectorAll("svg path").length, text: page.body.innerText.length };
     left -= 1;
@@ -545,6 +552,7 @@ def test_in_a_real_browser(tmp_path):
         assert facts["wrong"] == [], name
         assert facts["inner"] == int(width), name
         assert facts["scroll"] <= facts["inner"], name
+        assert facts["beyond"] == 0, name  # nothing sticks out of its figure, cell or tile
         assert facts["svg"] == pages[verdict].count("<svg"), name
         assert facts["empty"] == 0, name
         assert facts["paths"] == pages[verdict].count("<path"), name

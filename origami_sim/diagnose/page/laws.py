@@ -1,5 +1,7 @@
 """One plot for each law that is named: what the recorded motion lacks against what it goes with, and the law in it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Candidate, Curve, Diagnosis, Trace
@@ -58,6 +60,7 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     if found is None or curve is None:
         return _trace(d, heading)
     where, _, name, unit = found
+    curve = replace(curve, error=_error(curve).tolist())
     x = np.linspace(min(curve.x), max(curve.x), POINTS)
     y, said = _through(law, curve, x) if law is not None else (x[:0], "")
     plot = against(where, curve, f"missing {name}", unit, height=TALL, also=y)
@@ -104,6 +107,18 @@ def _curve(curves: list[Curve], effect: str, law: Law | None) -> Curve | None:
     driven = [c for c in curves if c.against.startswith(tuple(names))]
     plain = [c for c in curves if not c.against.startswith(("phase of", "time since"))]
     return max(driven or plain or curves, key=_structure, default=None)
+
+
+def _error(c: Curve) -> np.ndarray:
+    """Standard error of each mean: no more than how much neighbours scatter about a smooth curve.
+
+    Second differences of independent means have six times their variance. What was written down knows the noise of
+    single accelerations only, most of which cancels in a mean over a motion that goes on.
+    """
+    mean, error = array(c.mean), array(c.error)
+    if len(mean) < 5:
+        return error
+    return np.minimum(error, np.sqrt(np.mean(np.diff(mean, 2) ** 2) / 6.0))
 
 
 def _structure(c: Curve) -> float:
