@@ -312,13 +312,11 @@ def _write(folder: Path, found: Diagnosis, keep: Keep, settings: Settings, scene
 
 def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
     whole = d.to_dict()
-    keys = ("verdict", "sentence", "probability", "chosen", "p_value", "components", "noise")
+    keys = ("verdict", "sentence", "probability", "chosen", "budget", "compared", "components", "noise")
     errors = ("error_before", "error_refitted", "error_after", "patch", "notes", "seconds")
     return {
         **{k: whole[k] for k in (*keys, *errors)},
-        "candidates": [
-            {k: c[k] for k in ("label", "probability", "gain", "error", "failed")} for c in whole["candidates"]
-        ],
+        "candidates": [{k: c[k] for k in ("label", "probability", "odds", "failed")} for c in whole["candidates"]],
         "files": {n: [str(p) for p in f] if isinstance(f, list) else str(f) for n, f in files.items()},
         "exit_code": d.exit_code,
     }

@@ -59,7 +59,7 @@ def numbers(d: Diagnosis) -> Html:
         out.append(("Error", f"{number(before)} → {number(after)}", f"times the {unit}, as given → now{again}"))
     else:
         out.append(("Error", "not measured", "nothing could be left out and predicted"))
-    out.append(("Compared", percent(known(d.compared)), "of the recorded frames"))
+    out.append(("Compared", "100 %" if d.compared >= 1.0 else percent(known(d.compared)), "of the recorded frames"))
     return element(
         "div",
         [element("div", element("span", a), element("b", b), element("small", c), class_="tile") for a, b, c in out],

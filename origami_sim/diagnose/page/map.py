@@ -14,6 +14,9 @@ LABELLED = 8
 LEAST = 0.05
 """Part from which a panel carries its name."""
 
+NARROW, HIGH = 350.0, 340.0
+"""Width of the drawing on the narrowest screen that labels must fit, and its greatest height [px]."""
+
 EVERY = {"all creases": "creases", "all panels": "panels"}
 """Sites that stand for several."""
 
@@ -88,7 +91,8 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
         role="img",
         aria_label=f"the device, its creases and panels coloured: {about}",
     )
-    texts = _labels(labels, tall / wide)
+    texts = _labels(labels, tall / wide, min(NARROW, HIGH * wide / tall))
+    style = f"aspect-ratio:{wide:.0f}/{tall:.0f};max-width:{HIGH * wide / tall:.0f}px"
     drawn = {c["name"] for c in g["creases"]} | {p["name"] for p in g["panels"]} | set(EVERY)
     others = [(n, s) for n, s in shares.items() if n not in drawn and known(s, 0.0) >= 0.01]
     chips = [element("span", f"{n} {percent(s)}", class_="chip") for n, s in sorted(others, key=lambda o: -o[1])]
@@ -109,13 +113,12 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
             element("b", "On the device"),
             element("span", note, element("span", " Elsewhere: ", chips) if chips else None),
         ),
-        element("div", svg, texts, class_="origami", style=f"aspect-ratio:{wide:.0f}/{tall:.0f}"),
-        ramp,
+        element("div", element("div", svg, texts, class_="origami", style=style), ramp),
         class_="heat",
     )
 
 
-def _labels(labels: list[tuple[str, float, list]], aspect: float, width: float = 350.0) -> list[Html]:
+def _labels(labels: list[tuple[str, float, list]], aspect: float, width: float) -> list[Html]:
     """Names where they do not cover each other on a narrow page; where there is no room, the percentage alone."""
     taken: list[tuple[float, float, float]] = []
     out = []
