@@ -487,6 +487,7 @@ def test_lines_break_where_segments_begin_and_values_are_missing():
 
 def test_numbers_are_rounded_to_their_uncertainty():
     assert interval(1.23456e-3, 1.18e-3, 1.29e-3, "N m") == "1.235 mN m (1.180 to 1.290)"
+    assert interval(2.6e-23, -2.8e-7, 2.8e-7, "N m") == "0 nN m (−280 to 280)"
     assert interval(0.0123, NAN, 0.02, "kg") == "12.3 g"
     assert plus_minus(412.3, 21.4, sign=True) == "+412 ± 21"
     assert plus_minus(-0.01234, 0.0011, "m") == "−12.3 ± 1.1 mm"

@@ -21,8 +21,9 @@ def section(d: Diagnosis) -> list:
     head = ("Explanation", "Probability", "Log odds", "Numbers, 95 % interval", f"Error × {unit}", "Remarks")
     rows = [_candidate(head, c, d) for c in d.candidates]
     about = (
-        "Log odds: natural logarithm of the posterior odds over the model without an effect. Error: root mean square "
-        "over all channels, on data that were left out of the fit."
+        "Probability: of exactly these effects there and no others. Log odds: natural logarithm of the posterior odds "
+        "over the model without an effect. Error: root mean square over all channels, on data that were left out of "
+        "the fit."
     )
     out = [quiet(about), table(head, rows[:OPEN], "Explanations", kind="wide")]
     if len(rows) > OPEN:

@@ -88,9 +88,8 @@ def page(diagnosis: Diagnosis, geometry: dict | None = None) -> str:
         ),
     ]
     title = f"{d.verdict}: {d.subject}" if d.subject else f"{d.verdict}: diagnosis"
-    kept = {
-        name: (files(__package__) / name).read_text(encoding="utf-8") for name in ("page.html", "page.css", "page.js")
-    }
+    folder = files("origami_sim.diagnose.page")
+    kept = {n: (folder / n).read_text(encoding="utf-8") for n in ("page.html", "page.css", "page.js")}
     return Template(kept["page.html"]).substitute(
         title=join([title]), style=kept["page.css"], script=kept["page.js"], body=Html("\n".join(body))
     )

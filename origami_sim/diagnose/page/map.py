@@ -1,5 +1,8 @@
 """The map: the device with its creases and panels coloured by how probable it is that something acts there."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Diagnosis
@@ -65,7 +68,7 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
         shapes.append(element("g", title, fill, element("path", d=edges, class_="edge")))
         if share >= LEAST and panel["triangles"]:
             centre = at[np.unique(triangles[panel["triangles"]])].mean(0)
-            labels.append((panel["name"], share, [centre + np.array([0.0, dy]) for dy in (0.0, -0.08, 0.08)]))
+            labels.append((panel["name"], share, partial(_about, centre)))
     each = sorted(shares.get(c["name"], 0.0) for c in g["creases"])
     fewest = each[-LABELLED] if len(each) > LABELLED else -1.0
     for crease in g["creases"]:
@@ -81,7 +84,7 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
         )
         if share >= fewest and not any(label[0] == crease["name"] for label in labels):
             a, b = at[crease["nodes"]]
-            labels.append((crease["name"], share, [a + t * (b - a) for t in (0.5, 0.2, 0.8, 0.35, 0.65, 0.0, 1.0)]))
+            labels.append((crease["name"], share, partial(_along, a, b)))
     for node in g.get("held", []):
         shapes.append(element("path", d="M{} {}h0".format(*xy[node]), class_="held"))
     svg = element(
@@ -118,15 +121,37 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
     )
 
 
-def _labels(labels: list[tuple[str, float, list]], aspect: float, width: float) -> list[Html]:
-    """Names where they do not cover each other on a narrow page; where there is no room, the percentage alone."""
+def _along(a: np.ndarray, b: np.ndarray, half: float) -> list[np.ndarray]:
+    """Places for a label of some half width: on a line, or beside it where the label would cover it."""
+    on = [a + t * (b - a) for t in (0.5, 0.2, 0.8, 0.35, 0.65, 0.0, 1.0)]
+    across, up = np.abs(b - a)
+    if across < up or across > 3.0 * half:
+        return on
+    left, right = (a, b) if a[0] < b[0] else (b, a)
+    away = np.array([half + 0.03, 0.0])
+    return [*(p for p in (right + away, left - away) if half <= p[0] <= 1.0 - half), *on]
+
+
+def _about(centre: np.ndarray, half: float) -> list[np.ndarray]:
+    """Places for a label in a panel."""
+    return [centre + np.array([0.0, dy]) for dy in (0.0, -0.08, 0.08)]
+
+
+def _labels(labels: list[tuple[str, float, Callable]], aspect: float, width: float) -> list[Html]:
+    """Names where they do not cover each other on a narrow page; where there is no room, the percentage alone.
+
+    Args:
+        labels: name, part, and places for a label of some half width. aspect: height by width of the drawing.
+    """
     taken: list[tuple[float, float, float]] = []
     out = []
     for name, share, places in sorted(labels, key=lambda label: -label[1]):
         high = 24 / width / aspect
         for text in (f" {name}", ""):
             half = (6.6 * len(percent(share) + text) + 14) / width / 2
-            spots = [(float(np.clip(x, half, 1 - half)), float(np.clip(y, high / 2, 1 - high / 2))) for x, y in places]
+            spots = [
+                (float(np.clip(x, half, 1 - half)), float(np.clip(y, high / 2, 1 - high / 2))) for x, y in places(half)
+            ]
             free = [
                 (x, y) for x, y in spots if all(abs(x - u) > half + h or abs(y - v) > high for u, v, h in taken)
             ]  # fmt: skip

@@ -82,7 +82,9 @@ def in_time(name: str, site: str, unit: str, times: Sequence, values: Sequence, 
     return plot.level(0.0, "zero").line(x, y, "place")
 
 
-def against(site: str, c: Curve, name: str, unit: str, *, height: int = 180, also: Sequence[float] = ()) -> Plot:
+def against(
+    site: str, c: Curve, name: str, unit: str, *, height: int = 180, also: Sequence[float] | np.ndarray = ()
+) -> Plot:
     """A binned curve with bars of two standard errors.
 
     Args:
