@@ -387,6 +387,26 @@ def test_law_is_drawn_through_what_is_missing():
     assert high - low > 0
 
 
+def test_one_missing_thing_is_drawn_by_its_own_size():
+    d, site = example(), CREASES[1]
+    curve = Curve("rate", "rad/s", np.linspace(-2, 2, 9).tolist(), (-2.13e-5 * np.linspace(-2, 2, 9)).tolist(),
+                  [1e-7] * 9, [9] * 9)  # fmt: skip
+    time = Curve("time", "s", [0.1, 0.2], [1e-5, -1e-5], [1e-7] * 2, [9] * 2)
+    d.acting = [Acting("moment at", site, 1.1, [], "", math.nan, "N m", [time, curve])]
+    said = "The moment at middle &lt;b&gt; &amp; crease that is missing, against the rate there."
+    assert said in page(d)
+    both = example("SEVERAL")  # then it holds the other one as well
+    both.acting = d.acting
+    assert said not in page(both)
+
+
+def test_experiments_that_tell_nothing_are_not_proposed():
+    d = example()
+    d.experiments = [Experiment("repeat the same experiment", ["a", "b"], 1e-6, 9999)]
+    text = " ".join(Read(page(d)).words)
+    assert "repeat the same" not in text and "would tell the explanations apart" in text
+
+
 def test_recorder_and_numbers_show_the_residual_that_they_explain():
     for verdict, name in (("MEASUREMENT", "recorder&#x27;s clock"), ("PARAMETER", "What is left")):
         evidence = re.search(r'class="figures evidence".*?</figure>', page(example(verdict)))[0]

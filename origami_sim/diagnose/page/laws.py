@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from origami_sim.diagnose.describe import NEAR
 from origami_sim.diagnose.diagnosis import Candidate, Curve, Diagnosis, Trace
 from origami_sim.diagnose.page.law import Law, law_of
 from origami_sim.diagnose.page.markup import Html, element
@@ -59,7 +60,7 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     curve = _curve(found[1], effect, law) if found is not None else None
     if found is None or curve is None:
         return _trace(d, heading)
-    where, _, name, unit = found
+    where, _, name, unit, about = found
     curve = replace(curve, error=_error(curve).tolist())
     x = np.linspace(min(curve.x), max(curve.x), POINTS)
     y, said = _through(law, curve, x) if law is not None else (x[:0], "")
@@ -70,20 +71,28 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     caption = element(
         "figcaption",
         element("b", heading),
-        element("span", f"What the refitted model lacks at {where}, against the {goes} there.{said}"),
+        element("span", f"{about}, against the {goes} there.{said}"),
     )
     entries = [("place", "recorded motion, ± 2 se")] + ([("law", "the law with its fitted numbers")] if len(y) else [])
-    return element("figure", caption, plot.html(), legend(*entries), class_="law")
+    return element("figure", caption, element("div", plot.html(), legend(*entries)), class_="law")
 
 
-def _missing(d: Diagnosis, site: str) -> tuple[str, list[Curve], str, str] | None:
-    """Where, the curves of what is missing there, its name and unit: at the site, or else where most is missing."""
+def _missing(d: Diagnosis, site: str) -> tuple[str, list[Curve], str, str, str] | None:
+    """Where, the curves of what is missing, its name and unit, and what it is: at the site, or where most is missing.
+
+    Where one thing is missing, its size from window to window, by all coordinates, is known better than the moment that
+    one coordinate lacks by itself.
+    """
     own = [p for p in d.places if p.site == site]
-    acting = next((a for a in d.acting if a.site == site and a.curves), None)
-    if acting is not None and not own:
-        return site, acting.curves[1:], acting.what.split()[0], acting.unit
+    near = [a for a in d.acting if a.curves and a.left < NEAR * d.acting[0].left]
+    alone = next((a for a in near if a.site == site), None)
+    if alone is not None and (d.verdict != "SEVERAL" or not own):
+        name = alone.what.split()[0]
+        return site, alone.curves[1:], name, alone.unit, f"The {name} {alone.what.split()[1]} {site} that is missing"
     p = max(own or d.places, key=lambda p: p.share, default=None)
-    return None if p is None else (p.site, p.curves, *moment_of(p.site))
+    if p is None:
+        return None
+    return p.site, p.curves, *moment_of(p.site), f"What the refitted model lacks at {p.site}"
 
 
 def _values(effect: str, site: str, c: Candidate) -> dict[str, float]:
@@ -172,7 +181,7 @@ def _trace(d: Diagnosis, heading: str, without: str = "refitted", *, channel: st
     said = f"Recorded minus predicted {t.component} in {t.recording}, where it changes most. Shaded: noise, ± 2 sd."
     caption = element("figcaption", element("b", heading), element("span", said))
     key = legend((without, "as given" if without == "before" else "without it"), ("after", "now"))
-    return element("figure", caption, plot.html(), key, class_="law")
+    return element("figure", caption, element("div", plot.html(), key), class_="law")
 
 
 def _gain(t: Trace, without: str) -> float:

@@ -51,8 +51,8 @@ def _drawing(g: dict, shares: dict[str, float], about: str) -> Html:
     flat, depth = _projected(array(g["nodes"]))
     low, high = flat.min(0), flat.max(0)
     size = np.maximum(high - low, 0.02 * float((high - low).max()) or 1.0)
-    # a tall or a long strip gets a box of at most 2 : 1 with room for labels
-    box = np.maximum(size, size.max() * np.array([0.75, 0.45])) * 1.24
+    # a long strip gets a box of at most 2 : 1, a tall one a square with room for labels beside it
+    box = np.maximum(size, size.max() * np.array([1.0, 0.45])) * 1.24
     at = np.column_stack([(flat[:, 0] - (low + high)[0] / 2), -(flat[:, 1] - (low + high)[1] / 2)]) / box + 0.5
     wide, tall = 1000.0, 1000.0 * box[1] / box[0]
     xy = np.round(at * [wide, tall], 1)

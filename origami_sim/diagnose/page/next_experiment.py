@@ -1,21 +1,28 @@
 """What to record next, so that the explanations part."""
 
-from origami_sim.diagnose.diagnosis import Diagnosis
+from origami_sim.diagnose.diagnosis import Diagnosis, Experiment
 from origami_sim.diagnose.page.markup import element, number
 from origami_sim.diagnose.page.measures import known
 from origami_sim.diagnose.page.pieces import nothing, quiet
 from origami_sim.diagnose.page.wording import worded, words_of
 
+WORTHWHILE = 0.1
+"""Expected separation below which an experiment is not listed: it would take hundreds of repeats."""
+
 
 def finding(d: Diagnosis) -> str:
-    return worded(d.experiments[0].what) if d.experiments else "nothing is proposed"
+    listed = _listed(d)
+    if listed:
+        return worded(listed[0].what)
+    return "nothing that was considered would tell more" if d.experiments else "nothing is proposed"
 
 
 def section(d: Diagnosis) -> list:
-    if not d.experiments:
-        return [nothing("No further experiment is proposed.")]
+    listed = _listed(d)
+    if not listed:
+        return [nothing("No further experiment that was considered would tell the explanations apart.")]
     out = []
-    for n, e in enumerate(d.experiments):
+    for n, e in enumerate(listed):
         runs = f"{e.repeats} recording{'s' if e.repeats != 1 else ''}"
         out.append(
             element(
@@ -28,3 +35,7 @@ def section(d: Diagnosis) -> list:
         )
     about = "d′ is the distance between the predictions in standard deviations of the noise; best first."
     return [quiet(about), element("ol", out, class_="experiments")]
+
+
+def _listed(d: Diagnosis) -> list[Experiment]:
+    return [e for e in d.experiments if known(e.expected, 0.0) >= WORTHWHILE]
