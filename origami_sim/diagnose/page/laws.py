@@ -56,7 +56,7 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     if CATALOGUE[effect].family == "measurement":
         return _trace(d, heading, channel=site.removeprefix("channel "))
     law = law_of(effect, _values(effect, site, c)) if c is not None else None
-    found = _missing(d, site)
+    found = _missing(d, site, law)
     curve = _curve(found[1], effect, law) if found is not None else None
     if found is None or curve is None:
         return _trace(d, heading)
@@ -77,16 +77,17 @@ def _law(d: Diagnosis, label: str, c: Candidate | None) -> Html | None:
     return element("figure", caption, element("div", plot.html(), legend(*entries)), class_="law")
 
 
-def _missing(d: Diagnosis, site: str) -> tuple[str, list[Curve], str, str, str] | None:
+def _missing(d: Diagnosis, site: str, law: Law | None) -> tuple[str, list[Curve], str, str, str] | None:
     """Where, the curves of what is missing, its name and unit, and what it is: at the site, or where most is missing.
 
-    Where one thing is missing, its size from window to window, by all coordinates, is known better than the moment that
-    one coordinate lacks by itself.
+    Where one thing is missing, its size, by all coordinates, is known better than the moment that one coordinate lacks
+    by itself. But it is a mean over windows in time, which rounds what is not straight.
     """
     own = [p for p in d.places if p.site == site]
     near = [a for a in d.acting if a.curves and a.left < NEAR * d.acting[0].left]
     alone = next((a for a in near if a.site == site), None)
-    if alone is not None and (d.verdict != "SEVERAL" or not own):
+    bent = law is not None and not law.straight(np.linspace(-1.0, 1.0, 9))
+    if alone is not None and not (own and (bent or d.verdict == "SEVERAL")):
         name = alone.what.split()[0]
         return site, alone.curves[1:], name, alone.unit, f"The {name} {alone.what.split()[1]} {site} that is missing"
     p = max(own or d.places, key=lambda p: p.share, default=None)
