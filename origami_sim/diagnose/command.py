@@ -19,8 +19,8 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
+from origami_sim.diagnose.page import geometry_of, write_report
 from origami_sim.diagnose.patch import patched, write_patch
-from origami_sim.diagnose.report import geometry_of, write_report
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Free, Subject

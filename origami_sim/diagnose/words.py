@@ -8,6 +8,9 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.recording.units import quantity
 
+PEOPLE = ("Coulomb", "Kelvin", "Maxwell")
+"""Names with which titles of effects begin; they keep their capital."""
+
 
 def kind(f: Fit) -> str:
     """nominal, mechanism or measurement."""
@@ -73,7 +76,8 @@ def title(effect: str) -> str:
     text = importlib.import_module(f"origami_sim.effects.{e.name}").__doc__ or e.name
     text = text.strip().splitlines()[0].split(":")[0].rstrip(".")
     first = text.split()[0]
-    return text if len(first) > 1 and first.isupper() else text[0].lower() + text[1:]
+    named = first.startswith(PEOPLE) or (len(first) > 1 and first.isupper())
+    return text if named else text[0].lower() + text[1:]
 
 
 def joined(names: Sequence[str]) -> str:

@@ -8,14 +8,14 @@ with nominal numbers N, the fit's own effects H, further effects G_J, *flaws* b 
 little in every device), a *discrepancy* c that is smooth in each channel, and one in the forces, which is the variance
 of the gaps between tied segments (see `linear`). All priors are normal but those of strengths, which are mixtures of
 normals on the scale of detectability d'. So all that is unknown is summed out in closed form, with the
-leading normal of each mixture (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
+leading normals of each mixture (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, logsumexp
 
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
@@ -157,23 +157,32 @@ class Summed:
         norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
         shape = 1.0 / np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         slabs = np.array(hyper.slabs)
-        tight = np.where(sets.strength, norm / slabs[-1], shape)
-        for last in (False, True):
-            # of the mixture that is a strength's prior, the normal that is as wide as the strength is large
+        tight, nearest = np.where(sets.strength, norm / slabs[-1], shape), np.zeros((n, k), int)
+        logs: list[np.ndarray] = []
+        values: list[np.ndarray] = []
+        for near in (None, -1, 0, 1):
+            # of the mixture that is a strength's prior: normals about as wide as the strength is large
+            if near is not None:
+                chosen = np.clip(nearest + near, 0, len(slabs) - 1)
+                tight = np.where(sets.strength, norm / slabs[chosen], shape)
             full = a + np.eye(k) * (tight**2)[:, None, :]
             inverse = np.linalg.inv(full)
             move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
             value = sets.at + move
-            if not last:
+            if near is None:
                 size = np.abs(np.log(np.maximum(np.abs(value * norm), 1e-9)[:, :, None] / slabs))
-                tight = np.where(sets.strength, norm / slabs[np.argmin(size, axis=2)], shape)
-        sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
-        left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
-        out = self.log - 0.5 * (left + np.sum((value * tight) ** 2, axis=1))
-        out += np.sum(np.log(tight), axis=1) - 0.5 * np.linalg.slogdet(full)[1]
-        out -= np.sum(sets.strength, axis=1) * np.log(len(slabs))
-        out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
-        return out, value
+                nearest = np.argmin(size, axis=2)
+                continue
+            sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
+            left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
+            log = self.log - 0.5 * (left + np.sum((value * tight) ** 2, axis=1))
+            log += np.sum(np.log(tight), axis=1) - 0.5 * np.linalg.slogdet(full)[1]
+            log -= np.sum(sets.strength, axis=1) * np.log(len(slabs))
+            log += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
+            apart = np.any(chosen != nearest + near, axis=1) & (near != 0)  # the same normal again, at an end
+            logs.append(np.where(apart, -np.inf, log))
+            values.append(value)
+        return logsumexp(logs, axis=0), values[1]
 
 
 def summed(p: Problem, smooth: float, flaws: float) -> Summed:

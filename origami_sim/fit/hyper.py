@@ -13,7 +13,7 @@ class Hyper:
 
     Attributes:
         slabs: standard deviations of strengths on the scale of detectability d', equally likely.
-        effects: probability of one more effect, given those that are there. most: effects in a set, at most.
+        effects: probability of one more effect, given those that are there: most objects that are diagnosed lack one. most: effects in a set, at most.
         gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
         smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
@@ -21,8 +21,8 @@ class Hyper:
         fewer: probability of each size over that of the next smaller one: of gaps, of smooth, and of flaws.
     """
 
-    slabs: tuple[float, ...] = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0, 1600.0)
-    effects: float = 0.4
+    slabs: tuple[float, ...] = (4.0, 12.0, 40.0, 120.0, 400.0, 1200.0)
+    effects: float = 0.6
     most: int = 5
     gaps: tuple[float, ...] = (1e-5, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
     smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)

@@ -11,7 +11,7 @@ from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject, diagnose, factor
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
-from origami_sim.diagnose.report import geometry_of, write_report
+from origami_sim.diagnose.page import geometry_of, write_report
 from origami_sim.drive import Drive
 from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble

@@ -137,7 +137,8 @@ def _exponent(value: float) -> int:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """Fixed notation where it is short, powers of ten elsewhere."""
+    """Fixed notation where it is short, powers of ten elsewhere; zero where nothing is left of the digits asked for."""
+    value = value if round(value, decimals) else 0.0
     size = _exponent(value)
     if value and (size < -3 or size > 4):
         mantissa = value / 10.0**size

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.diagnose.report_markup import Html, element, scaled_unit
+from origami_sim.diagnose.page.markup import Html, element, scaled_unit
 
 POINTS = 900
 """Most points that a drawn line has; longer ones keep the least and the greatest value of every column."""

@@ -1,0 +1,41 @@
+"""What to record next, so that the explanations part."""
+
+from origami_sim.diagnose.diagnosis import Diagnosis, Experiment
+from origami_sim.diagnose.page.markup import element, number
+from origami_sim.diagnose.page.measures import known
+from origami_sim.diagnose.page.pieces import nothing, quiet
+from origami_sim.diagnose.page.wording import worded, words_of
+
+WORTHWHILE = 0.1
+"""Expected separation below which an experiment is not listed: it would take hundreds of repeats."""
+
+
+def finding(d: Diagnosis) -> str:
+    listed = _listed(d)
+    if listed:
+        return worded(listed[0].what)
+    return "nothing that was considered would tell more" if d.experiments else "nothing is proposed"
+
+
+def section(d: Diagnosis) -> list:
+    listed = _listed(d)
+    if not listed:
+        return [nothing("No further experiment that was considered would tell the explanations apart.")]
+    out = []
+    for n, e in enumerate(listed):
+        runs = f"{e.repeats} recording{'s' if e.repeats != 1 else ''}"
+        out.append(
+            element(
+                "li",
+                element("b", worded(e.what)),
+                element("span", f"expected separation d′ = {number(known(e.expected))} in one recording; do {runs}"),
+                element("small", "separates ", " from ".join(map(words_of, e.separates))) if e.separates else None,
+                class_="best" if n == 0 else None,
+            )
+        )
+    about = "d′ is the distance between the predictions in standard deviations of the noise; best first."
+    return [quiet(about), element("ol", out, class_="experiments")]
+
+
+def _listed(d: Diagnosis) -> list[Experiment]:
+    return [e for e in d.experiments if known(e.expected, 0.0) >= WORTHWHILE]
