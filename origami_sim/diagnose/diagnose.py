@@ -37,7 +37,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
 
-ROUNDS = 2
+ROUNDS = 3
 """Times that weights follow the best explanation: what it leaves is the noise that all are judged by."""
 
 SAME = 0.1

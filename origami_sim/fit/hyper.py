@@ -13,7 +13,8 @@ class Hyper:
 
     Attributes:
         slabs: standard deviations of strengths on the scale of detectability d', equally likely.
-        effects: probability of one more effect, given those that are there: most objects that are diagnosed lack one. most: effects in a set, at most.
+        effects: probability of one more effect, given those that are there: most objects that are diagnosed lack one.
+        most: effects in a set, at most.
         gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
         smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
