@@ -10,7 +10,6 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
-from origami_sim.diagnose.trust import FILE as TRUST
 from origami_sim.errors import InputError
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -23,7 +22,7 @@ def state(truth: Path) -> dict:
     Args:
         truth: folder of the truth generator.
     """
-    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts] + [TRUST]
+    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts]
     case = PACKAGE / "prove" / "case.py"
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -51,15 +50,19 @@ def _numbers(value) -> bool:
 
 
 def thresholds() -> dict[str, dict]:
-    """The numbers in capitals of every module of the diagnosis, and its default options."""
-    import origami_sim.diagnose as package
+    """The numbers in capitals of every module of the estimator and the diagnosis, priors, and default options."""
+    import origami_sim.diagnose
+    import origami_sim.fit
     from origami_sim.diagnose import Options
+    from origami_sim.fit.hyper import HYPER
 
-    out: dict = {"options": asdict(Options())}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
-        mine = {n: v for n, v in vars(module).items() if n.isupper() and _numbers(v)}
-        out |= {info.name: mine} if mine else {}
+    out: dict = {"options": asdict(Options()), "priors": asdict(HYPER)}
+    for package in (origami_sim.fit, origami_sim.diagnose):
+        for info in pkgutil.iter_modules(package.__path__):
+            module = importlib.import_module(f"{package.__name__}.{info.name}")
+            mine = {n: v for n, v in vars(module).items() if n.isupper() and _numbers(v)}
+            short = f"{package.__name__.rpartition('.')[2]}.{info.name}"
+            out |= {short: mine} if mine else {}
     return json.loads(json.dumps(out))  # as it is stored
 
 
