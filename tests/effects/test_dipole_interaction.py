@@ -6,9 +6,9 @@ from effects.kit import make_model, quiet, random_rotation, slope, start
 
 from origami_sim.build import Sheet
 from origami_sim.diagnose import diagnose
-from origami_sim.fit.hypothesis import suspects
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import suspects
 from origami_sim.materials import MU0
 from origami_sim.model import magnets
 from origami_sim.pattern import strip
