@@ -55,7 +55,9 @@ def test_the_effect_its_site_and_its_strength_are_found(found, rubbing):
     best = max(found.nodes, key=lambda k: chance[k])
     assert found.label(best) == "crease_friction at crease 1" and chance[best] > 0.5
     f = found.nodes[best].fit
-    assert f.theta[-1] == pytest.approx(2e-5, rel=0.2) and f.cost < 0.6 * rubbing[2].cost
+    numbers = {n.label: t for n, t in zip(f.free, f.theta, strict=True)}
+    assert numbers["crease_friction.friction_moment"] == pytest.approx(2e-5, rel=0.2)
+    assert f.cost < rubbing[2].cost - 50.0
     assert marginals(found)["crease_friction at crease 1"] > 0.5 and next(iter(by_effect(found))) == "crease_friction"
 
 
@@ -105,7 +107,7 @@ def test_numbers_of_which_no_model_can_be_built_are_not_tried_and_end_nothing():
     )
     assert forward.step(Hypothesis((one,)), np.array([1.1, 1.0, 1.0, 1e-6])) == 0.0
     assert screen(forward, [one], base, weights)
-    theta = np.concatenate([base.theta, [0.0]])
+    theta = np.concatenate([base.theta, [f.start for f in one.free]])
     found = fit(forward, Hypothesis((one,)), weights, theta=theta, local=base.local)
     assert found.failed or found.theta[0] <= 1.02
 
@@ -180,6 +182,8 @@ def test_what_acts_at_a_crease_is_told_least_where_that_crease_is_clamped(rubbin
     """Friction at the second crease against nothing missing: clamping that crease is no experiment for it."""
     forward, _, base, weights, _ = rubbing
     best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
+    # with the same numbers of the model: these differ by what friction was taken for
+    best = replace(best, theta=np.concatenate([base.theta, best.theta[len(base.theta) :]]))
     judged = SimpleNamespace(best=best, tied=[best, base], others=[base])
     menu = {e.what: e for e in propose(forward, judged, weights, most=99)}
     clamped = [menu[f"crease {c} clamped as it is in the reference state"].expected for c in (0, 1)]

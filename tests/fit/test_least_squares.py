@@ -52,7 +52,7 @@ class Valley:
     Where y is below `lowest`, the simulation fails.
     """
 
-    local = 0
+    local, nudge = 0, 0.01
     model = SimpleNamespace(contacts=())
     blocks = (made(np.zeros((2, 1))),)
 
@@ -94,7 +94,7 @@ def test_a_curved_valley_is_followed_to_a_bound():
 class Film:
     """Something whose strength shows by its logarithm, and slows the simulation down as it grows."""
 
-    local = 0
+    local, nudge = 0, 0.01
     model = SimpleNamespace(contacts=())
     blocks = (made(np.log1p([30.0, 10.0])[:, None]),)
     subject = SimpleNamespace(nominals=(Free("film", "x", "-", start=0.0, scale=1.0, spread=1e-3),))
