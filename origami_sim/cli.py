@@ -154,7 +154,12 @@ def _parser() -> argparse.ArgumentParser:
         choices=("rest", "fit"),
         help="simulate from rest, or fit every start (default: as recorded)",
     )
-    p.add_argument("--seed", type=int, default=0, help="of the draws under the null hypothesis (default 0)")
+    p.add_argument(
+        "--panels",
+        choices=("auto", "rigid", "elastic"),
+        default="auto",
+        help="rigid bodies, or bars that bend (default: rigid where bending could not show)",
+    )
     p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
 
     p = command(

@@ -18,7 +18,6 @@ from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.rollouts import Rollouts
 from origami_sim.fit.starts import channel_tangent, local_line, spans
 from origami_sim.recording import Recording
-from origami_sim.solve.timestep import stable_step
 
 GROWTH = 3.0
 """Growth of a difference in the start within a segment: numbers are found by linear steps only where it is small.
@@ -142,20 +141,18 @@ def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
 def bar_rollouts(subject: Subject, recordings: list[Recording], o: Options) -> Predictor:
     """Predictions by bars, from rest or from free starts."""
     whole = max(float(r.times[-1] - r.times[0]) for r in recordings)
-    start = o.start or ("fit" if o.segment is not None else starting(subject, recordings))
+    told = any(r.start is not None for r in recordings)
+    start = o.start or ("fit" if o.segment is not None or told else starting(subject, recordings))
     if start == "rest" and o.start is None and not steady(subject, recordings, whole, o.threads):
         start = "fit"
     if start == "rest":  # later segments would not begin there
         return BarRollouts(subject, recordings, start="rest", threads=o.threads)
-    step = stable_step(*subject.build({f.name: f.start for f in subject.nominals})[:2]).dt
-    step = min(step, float(np.median(np.diff(recordings[0].times))))  # without stiffness any step is stable
     length = o.segment
     if length is None:
         count = FEWEST if len(recordings) == 1 else max(1, FEWEST // len(recordings))
-        length = min(whole / count, max(o.steps * step / FEWEST, whole / 100))
-        length = min(length, predictable(BarRollouts(subject, recordings, segment=length, most=4, threads=o.threads)))
-    most = max(FEWEST, int(o.steps * step / length)) // len(recordings)
-    return BarRollouts(subject, recordings, segment=length, most=max(1, most), threads=o.threads)
+        probe = BarRollouts(subject, recordings, segment=whole / count, most=4, threads=o.threads)
+        length = min(whole / count, predictable(probe))
+    return BarRollouts(subject, recordings, segment=length, threads=o.threads)
 
 
 def starting(subject: Subject, recordings: list[Recording]) -> str:

@@ -38,24 +38,20 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weight
     def missed(f: Fit) -> float:
         line = f.reweighted(weights, noise).linear
         assert line is not None
-        return max(sum(float(r @ r) for r in line.cleared(line.residual)) + f.penalty - count, 0.0)
+        return sum(float(r @ r) for r in line.cleared(line.residual)) + f.penalty
 
     first, second, last = missed(given), missed(base), missed(best)
-    total = max(first, second, last)
+    numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
+    total = numbers + gain + rest
     if total <= 0.0:
         return []
-    out = []
-    if first > second:
-        out.append(Share("numbers of the model", "numbers", (first - second) / total))
-        total = first
+    out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
     suspects = best.hypothesis.suspects
-    gain = max(second - last, 0.0)
     parts = _parts(best, weights, noise) if len(suspects) > 1 else np.ones(len(suspects))
     for s, part in zip(suspects, parts, strict=True):
         out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", gain * part / total))
-    out.append(Share("not named", "rest", min(last, second) / total))
-    whole = sum(s.share for s in out) or 1.0
-    return [Share(s.name, s.kind, s.share / whole) for s in out]
+    out.append(Share("not named", "rest", rest / total))
+    return [Share(s.name, s.kind, float(s.share)) for s in out]
 
 
 def _parts(f: Fit, old: Weights, new: Weights) -> np.ndarray:

@@ -40,7 +40,7 @@ from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
 
-THOROUGH = Options(rate=400.0, steps=600_000, screened=16, finalists=12, most=4, draws=4999)
+THOROUGH = Options(rate=400.0, fits=48)
 
 
 def run(args: Namespace) -> int:
@@ -53,9 +53,6 @@ def run(args: Namespace) -> int:
     if replaced and set(replaced) != {r.name for r in data}:
         say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
     for recording in data:
-        if recording.gravity or recording.start:
-            key = "gravity" if recording.gravity else "start"
-            raise InputError("is not used in a diagnosis yet", file=recording.metadata.get("sidecar"), field=key)
         say(lint_report(recording))
     for note in data.notes:
         say(f"note: {note}")
@@ -224,12 +221,10 @@ def _priors(
 def _options(args: Namespace) -> Options:
     if args.segment is not None and not args.segment > 0:
         raise InputError("must be positive", field="--segment", value=args.segment, allowed="> 0 s")
-    if args.seed < 0:
-        raise InputError("must not be negative", field="--seed", value=args.seed, allowed=">= 0")
     if args.start_at == "rest" and args.segment is not None:
         raise InputError("segments have starts of their own", field="--start-at", value="rest", allowed="no --segment")
     options = THOROUGH if args.thorough else Options()
-    return replace(options, segment=args.segment, start=args.start_at, seed=args.seed)
+    return replace(options, panels=args.panels, segment=args.segment, start=args.start_at)
 
 
 def _check_folder(folder: Path, model: str) -> None:
@@ -312,13 +307,11 @@ def _write(folder: Path, found: Diagnosis, keep: Keep, settings: Settings, scene
 
 def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
     whole = d.to_dict()
-    keys = ("verdict", "sentence", "probability", "chosen", "p_value", "components", "noise")
+    keys = ("verdict", "sentence", "probability", "chosen", "budget", "compared", "components", "noise")
     errors = ("error_before", "error_refitted", "error_after", "patch", "notes", "seconds")
     return {
         **{k: whole[k] for k in (*keys, *errors)},
-        "candidates": [
-            {k: c[k] for k in ("label", "probability", "gain", "error", "failed")} for c in whole["candidates"]
-        ],
+        "candidates": [{k: c[k] for k in ("label", "probability", "odds", "failed")} for c in whole["candidates"]],
         "files": {n: [str(p) for p in f] if isinstance(f, list) else str(f) for n, f in files.items()},
         "exit_code": d.exit_code,
     }

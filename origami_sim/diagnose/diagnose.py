@@ -17,7 +17,7 @@ from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.nominal import nominal_fits, weights_from
+from origami_sim.diagnose.nominal import as_given, nominal_fits, weights_from
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
@@ -108,8 +108,8 @@ def diagnose(
     signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("search", 0.0)
-    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part))
-    given, base, weights, posterior = settled(forward, given, base, weights, posterior, tell)
+    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
+    given, base, weights, posterior = settled(forward, given, base, weights, posterior, o.fits, tell)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:
@@ -184,7 +184,7 @@ def diagnose(
 
 
 def settled(
-    forward: Predictor, given: Fit, base: Fit, weights: Weights, p: Posterior, tell: Report
+    forward: Predictor, given: Fit, base: Fit, weights: Weights, p: Posterior, most: int, tell: Report
 ) -> tuple[Fit, Fit, Weights, Posterior]:
     """All judged by what the best explanation leaves, as given and refitted as well, and searched again."""
     for _ in range(ROUNDS):
@@ -193,12 +193,12 @@ def settled(
         new = weights_from(forward, p.nodes[best].fit)
         if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
             break
-        given = carried_on(forward, given.reweighted(weights, new), new, fixed=True, most=4)
         base = carried_on(forward, base.reweighted(weights, new), new)
-        if base.failed or given.failed:
+        if base.failed:
             break
+        given = as_given(forward, base, new)
         p = reweighted(p, forward, base, new)
-        p = extended(p, forward, progress=lambda part: tell("search", part))
+        p = extended(p, forward, progress=lambda part: tell("search", part), most=most)
         weights = new
     return given, base, weights, p
 
@@ -213,7 +213,9 @@ def share_compared(forward: Predictor) -> float:
 def scored(p: Posterior) -> list[tuple[Signature, float]]:
     """Signatures with the z by which each alone explains what the model without an effect misses, best first."""
     node = p.nodes[frozenset()]
-    gram = node.grid[0][0].gram
+    cell = node.grid[0]
+    assert cell is not None
+    gram = cell.gram
     z = np.zeros(len(p.signatures))
     for n, o in enumerate(node.others):
         size = np.sqrt(max(gram[n, n], 0.0))

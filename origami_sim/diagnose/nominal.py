@@ -1,7 +1,6 @@
 """The model without any effect, as given and refitted, and what residuals are measured by."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -72,29 +71,24 @@ def nominal_fits(forward: Predictor) -> tuple[Fit, Fit, Weights]:
         )
     gaps = np.concatenate([b.values - v[0] for b, v in zip(forward.blocks, rough, strict=True)])
     weights = Weights(np.maximum(np.sqrt(np.nanmean(gaps**2, axis=0)), forward.blocks[0].noise), 1.0, GAP)
-    given = fit(forward, Hypothesis(), weights, fixed=True, most=4, done=0.01)
-    base = _checked(given)
+    base = _checked(fit(forward, Hypothesis(), weights, most=3, done=0.01))
     for _ in range(ROUNDS):
         new = weights_from(forward, base)
-        settled = np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME)
-        if settled and base is not given:
+        if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
             break
-        before, weights = weights, new
-        if base is given:
-            base = fit(forward, Hypothesis(), weights, local=given.local, most=5, done=0.01)
-        else:
-            base = carried_on(forward, base.reweighted(before, weights), weights, most=5)
-        _checked(base)
+        base = _checked(carried_on(forward, base.reweighted(weights, new), new, most=4))
+        weights = new
     base = _checked(carried_on(forward, base, weights))
-    return fit(forward, Hypothesis(), weights, local=given.local, fixed=True, most=6, done=0.01), base, weights
+    return as_given(forward, base, weights), base, weights
+
+
+def as_given(forward: Predictor, base: Fit, weights: Weights) -> Fit:
+    """The model with its numbers as they were given, and starts that are fitted."""
+    options = {"local": base.local, "known": base.linear, "fixed": True}
+    return _checked(fit(forward, Hypothesis(), weights, most=6, done=0.01, **options))
 
 
 def _checked(f: Fit) -> Fit:
     if f.failed:
         raise InputError(f"the nominal model cannot be fitted: {f.failed}", field="model")
     return f
-
-
-def tightened(f: Fit, old: Weights, new: Weights) -> Fit:
-    """A fit judged with other weights, where it is."""
-    return replace(f.reweighted(old, new))

@@ -50,7 +50,7 @@ class Node:
     """A fitted set.
 
     Attributes:
-        key: indices of its suspects. fit: about which everything is linear. evidence: [gaps, smooth] log evidence.
+        key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
         grid: the summed problems by cell.
     """
@@ -60,7 +60,7 @@ class Node:
     evidence: np.ndarray
     groups: list[Group]
     others: list[int]
-    grid: list[list[Summed]]
+    grid: list[Summed | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class Posterior:
     """Over sets of effects, and sizes of discrepancy.
 
     Attributes:
-        signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, [gaps, smooth] log
+        signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         weights: of the fits.
     """
@@ -92,12 +92,13 @@ class Posterior:
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
-        total = {k: float(logsumexp(v)) for k, v in self.log.items()}
-        whole = logsumexp(list(total.values()))
-        return {k: float(np.exp(v - whole)) for k, v in total.items()}
+        cells = np.array([v.ravel() for v in self.log.values()])
+        peak = cells.max()
+        total = np.exp(cells - peak).sum(axis=1)
+        return dict(zip(self.log, (total / total.sum()).tolist(), strict=True))
 
     def cells(self, key: Key | None = None) -> np.ndarray:
-        """[gaps, smooth] posterior of sizes of discrepancy, given a set or over all."""
+        """(cells,) posterior of sizes of discrepancy and flaws, given a set or over all."""
         log = self.log[key] if key is not None else logsumexp(np.stack(list(self.log.values())), axis=0)
         return np.exp(log - logsumexp(log))
 
@@ -193,7 +194,7 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
     """Judges a fitted set, and all that add one or two effects to it."""
     hyper = out.hyper
     node = _node(out, forward, key, f)
-    cells = hyper.log_gaps()[:, None] + hyper.log_smooth()
+    cells = hyper.log_cells
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
     out.estimates.pop(key, None)
@@ -215,6 +216,8 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
     pairs = []
     for a, one in enumerate(ranked[:PARTNERS]):
         first = frozenset((node.others[one - len(own)],))
+        if len(own) + 2 > hyper.most:
+            break
         pairs += [(*own, one, n) for n in ranked[a + 1 :] if _compatible(out, first, node.others[n - len(own)])]
     _judge(out, node, pairs, prior, cells)
 
@@ -230,26 +233,26 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
     if not sets:
         return np.zeros(0)
     members = _members(node.fit.hypothesis, out)
-    own, shape = len(members), cells.shape
+    own = len(members)
     keys = [frozenset(members[c] if c < own else node.others[c - own] for c in s) for s in sets]
-    found, peak = np.full((len(sets), *shape), -np.inf), np.full(len(sets), -np.inf)
+    found, peak = np.full((len(sets), len(cells)), -np.inf), np.full(len(sets), -np.inf)
     values: dict[int, np.ndarray] = {}
-    order = np.argsort(-(node.evidence + cells).ravel())
+    order = np.argsort(-(node.evidence + cells))
     width: dict[tuple[int, int], list[int]] = {}
     for n, s in enumerate(sets):
         width.setdefault((len(s), sum(len(node.groups[g].columns) for g in s)), []).append(n)
-    count = len(node.grid[0][0].gram) - 1
+    count = next(len(c.gram) for c in node.grid if c is not None) - 1
     laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
     log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
     for c in order[: CELLS if len(sets) > MANY else None]:
-        g, k = np.unravel_index(c, shape)
-        if not np.isfinite(node.evidence[g, k]):
+        cell = node.grid[c]
+        if cell is None:
             continue
         for mine, rows in laid:
-            log, value = node.grid[g][k].of(rows, out.hyper)
-            found[mine, g, k] = log + cells[g, k] + log_prior[mine]
-            for n in np.flatnonzero(found[mine, g, k] > peak[mine]):
-                peak[mine[n]], values[mine[n]] = found[mine[n], g, k], value[n]
+            log, value = cell.of(rows, out.hyper)
+            found[mine, c] = log + cells[c] + log_prior[mine]
+            for n in np.flatnonzero(found[mine, c] > peak[mine]):
+                peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
     for n, key in enumerate(keys):
         if key in out.nodes or key in out.failed or n not in values:
             continue
@@ -257,7 +260,7 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
         away = len(key ^ node.key)
         if before is None or (away, -_best(node)) < (len(key ^ before.parent), -_best(out.nodes[before.parent])):
             out.log[key], out.estimates[key] = found[n], Estimate(node.key, sets[n], values[n])
-    return logsumexp(found.reshape(len(sets), -1), axis=1)
+    return logsumexp(found, axis=1)
 
 
 def _best(node: Node) -> float:
@@ -266,6 +269,8 @@ def _best(node: Node) -> float:
 
 def _compatible(out: Posterior, key: Key, n: int) -> bool:
     """Whether a suspect can be added to a set."""
+    if len(key) >= out.hyper.most:
+        return False
     s = out.suspect(n)
     return all(distinct_sites(out.suspect(k), s) and not _same_place(out.suspect(k), s) for k in key)
 
@@ -306,20 +311,21 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         added = [out.signatures[o].parts[n] for o in others]
         effects.append(np.concatenate([t[:, columns], np.stack(added, axis=1) if added else np.zeros((len(t), 0))], 1))
     smooth = cosines(forward, f, line)
-    grid, evidence = [], np.empty((len(hyper.gaps), len(hyper.smooth)))
     tied = any(t is not None for t in line.tie)
     own = [tuple(range(len(f.hypothesis.suspects)))]
     laid = Sets.of(own, groups, len(own[0]), count + len(others))
-    for g, gap in enumerate(hyper.gaps):
-        if not tied and g:
-            evidence[g] = -np.inf
-            grid.append(grid[0])
+    grid: list[Summed | None] = []
+    evidence, problems = np.full(len(hyper.cells), -np.inf), {}
+    for c, (gap, size, flaws) in enumerate(hyper.cells):
+        if not tied and gap != hyper.gaps[0]:
+            grid.append(None)
             continue
-        now, theirs = _regapped(line, effects, out.weights, gap)
-        p = problem(now, nominal, precision, away, theirs, smooth)
-        row = [summed(p, k, hyper) for k in hyper.smooth]
-        grid.append(row)
-        evidence[g] = [s.of(laid, hyper)[0][0] for s in row]
+        if gap not in problems:
+            now, theirs = _regapped(line, effects, out.weights, gap)
+            problems[gap] = problem(now, nominal, precision, away, theirs, smooth)
+        cell = summed(problems[gap], size, flaws)
+        grid.append(cell)
+        evidence[c] = cell.of(laid, hyper)[0][0]
     return Node(key, f, evidence, groups, others, grid)
 
 
@@ -387,7 +393,9 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
             begin.append(np.array([strength, *(f.start for f in rest)]))
         column += len(node.groups[g].columns)
     hypothesis = Hypothesis(tuple(suspects))
-    return fit(forward, hypothesis, out.weights, theta=np.concatenate(begin), local=node.fit.local)
+    # derivatives by the numbers of the model and by starts hardly change with an effect
+    near = {"known": node.fit.linear, "kept": len(forward.subject.nominals)}
+    return fit(forward, hypothesis, out.weights, theta=np.concatenate(begin), local=node.fit.local, **near)
 
 
 def marginals(p: Posterior) -> dict[str, float]:

@@ -71,7 +71,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, weights: Weig
     if not tested:
         text = "None of the catalogue's suspects is excited by these recordings."
         return Judgement("UNTESTABLE", text, 1.0, [], **common)
-    discrepancy = 1.0 - float(p.cells(best)[0, 0])
+    discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
     if not lead:
         found = _nothing_named(forward, given, base, p, shares, rest, discrepancy, classes[lead], compared)
         return replace(found, **{k: v for k, v in common.items() if k != "best"}, best=shown)
@@ -111,8 +111,9 @@ def _nothing_named(forward, given, base, p, shares, rest, discrepancy, chance, c
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
         return Judgement("UNTESTABLE", text, chance, [], base)
-    if odds_of_numbers(given, base) <= 0.0:
-        text = f"The model is adequate: its error is {over:.2f} times the noise."
+    off = [m for m, v in zip(base.free, base.theta, strict=True) if abs(v - m.start) > m.spread]
+    if odds_of_numbers(given, base) <= 0.0 or not off:
+        text = f"The model is adequate: within what is known of its numbers, its error is {over:.2f} times the noise."
         return Judgement("ADEQUATE", text, chance, [], base)
     far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
     f, t = far[0]
@@ -187,10 +188,9 @@ def widened(p: Posterior, key: Key) -> Fit:
 def deviations(node: Node, p: Posterior) -> np.ndarray:
     """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI]."""
     f = node.fit
-    cell = np.unravel_index(
-        np.argmax(node.evidence + p.hyper.log_gaps()[:, None] + p.hyper.log_smooth()), node.evidence.shape
-    )
-    gram = node.grid[cell[0]][cell[1]].gram
+    cell = node.grid[int(np.argmax(node.evidence + p.hyper.log_cells))]
+    assert cell is not None
+    gram = cell.gram
     mine = node.groups[: len(f.hypothesis.suspects)]
     columns = [c for g in mine for c in g.columns]
     spread = np.concatenate([g.spread for g in mine])

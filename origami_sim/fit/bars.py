@@ -93,9 +93,6 @@ class BarRollouts(Rollouts):
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         drive, state, step = self._driven(shots, model, parameters), self._state(shots), shots.step
-        memory = self._memory(shots)
-        if memory is not None:
-            state.memory[:] = memory
         substeps = max(1, int(np.ceil(step / stable_step(model, parameters).dt * (1 - 1e-12))))
         raw: list[np.ndarray] = []
         calm = min(self._calm_frames(recording, len(shots.blocks[0].times)), shots.frames - 1)

@@ -172,11 +172,11 @@ class Summed:
         return out, value
 
 
-def summed(p: Problem, smooth: float, hyper: Hyper = HYPER) -> Summed:
-    """Sums out flaws and a discrepancy of the channels whose size is `smooth` standard deviations of noise."""
+def summed(p: Problem, smooth: float, flaws: float) -> Summed:
+    """Sums out flaws and a discrepancy of the channels whose sizes are standard deviations of noise, see `Hyper`."""
     c, k = p.columns, len(p.gram) - 1 - p.columns
     norms = np.sqrt(np.maximum(np.diag(p.gram)[:c], 1e-12))
-    share = hyper.flaws / np.sqrt(max(c, 1))
+    share = flaws / np.sqrt(max(c, 1))
     scale = np.concatenate([np.where(norms > 1e-5, share / norms, 0.0), np.full(k, smooth)])
     u = p.gram[: c + k, : c + k] * scale[:, None] * scale
     rows = [*range(c), len(p.gram) - 1]

@@ -1,6 +1,8 @@
 """The numbers on which every verdict depends: priors of how effects, flaws and discrepancy are distributed."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -11,38 +13,43 @@ class Hyper:
 
     Attributes:
         slabs: standard deviations of strengths on the scale of detectability d', equally likely.
+        effects: probability of one more effect, given those that are there. most: effects in a set, at most.
+        gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
+        smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
-        effects: probability of one more effect, given those that are there.
-        gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment; the first
-            stands for none. smooth: of a discrepancy of the channels, in deviations of the noise.
-        lacking: probability that forces, or channels, have a discrepancy at all.
+            A precise recording shows more of them.
+        fewer: probability of each size over that of the next smaller one: of gaps, of smooth, and of flaws.
     """
 
-    slabs: tuple[float, ...] = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 400.0)
-    flaws: float = 4.0
+    slabs: tuple[float, ...] = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0, 1600.0)
     effects: float = 0.4
+    most: int = 5
     gaps: tuple[float, ...] = (1e-5, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-    smooth: tuple[float, ...] = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-    lacking: float = 0.15
+    smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)
+    flaws: tuple[float, ...] = (2.0, 8.0, 32.0, 128.0)
+    fewer: float = 0.3
 
     @property
     def widest(self) -> float:
         """Strengths beyond this detectability are not told from each other."""
         return 10.0 * self.slabs[-1]
 
-    def log_gaps(self) -> np.ndarray:
-        """Log prior of the sizes of gaps."""
-        return _some(len(self.gaps), self.lacking)
+    @cached_property
+    def cells(self) -> list[tuple[float, float, float]]:
+        """All combinations of gaps, smooth and flaws."""
+        return list(product(self.gaps, self.smooth, self.flaws))
 
-    def log_smooth(self) -> np.ndarray:
-        """Log prior of the sizes of the channels' discrepancy."""
-        return _some(len(self.smooth), self.lacking)
+    @cached_property
+    def log_cells(self) -> np.ndarray:
+        """Log prior of each of them."""
+        parts = [np.arange(len(v)) * np.log(self.fewer) for v in (self.gaps, self.smooth, self.flaws)]
+        parts = [p - np.log(np.sum(np.exp(p))) for p in parts]
+        return np.array([a + b + c for a, b, c in product(*parts)])
 
-
-def _some(count: int, lacking: float) -> np.ndarray:
-    if count == 1:
-        return np.zeros(1)
-    return np.log(np.concatenate([[1.0 - lacking], np.full(count - 1, lacking / (count - 1))]))
+    @cached_property
+    def clean(self) -> np.ndarray:
+        """Whether a cell has next to no discrepancy, of forces or of channels."""
+        return np.array([gap <= self.gaps[1] and smooth == 0.0 for gap, smooth, _ in self.cells])
 
 
 HYPER = Hyper()

@@ -87,9 +87,6 @@ class RigidRollouts(Rollouts):
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         state = self._state(shots)
-        memory = self._memory(shots)
-        if memory is not None:
-            state.memory[:] = memory
         drive = self._driven(shots, model, parameters)
         batch = self._batch(model, parameters, drive, state, tolerance=TOLERANCE)
         if isinstance(batch, RigidBatch):

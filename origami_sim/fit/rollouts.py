@@ -24,6 +24,7 @@ from origami_sim.fit.hypothesis import (
 from origami_sim.fit.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.starts import CAREFUL, NEAR, channel_tangent, read_start, seen_first, spans
+from origami_sim.fit.stated import stated
 from origami_sim.fit.track import coordinates
 from origami_sim.fit.worlds import World, Worlds
 from origami_sim.model import Model, Parameters, State
@@ -53,7 +54,8 @@ class Shots:
 
     Attributes:
         recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
-            [s]. local: [K, B, L] shifts of starts, or None. step: between frames [s]. frames: of each rollout. ends:
+            [s]. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
+            step: between frames [s]. frames: of each rollout. ends:
             the frame at which the next blocks begin; 0: none is tied to them.
     """
 
@@ -62,6 +64,7 @@ class Shots:
     worlds: list[World]
     late: np.ndarray
     local: np.ndarray | None
+    memory: np.ndarray | None
     step: float
     frames: int
     ends: int
@@ -96,7 +99,7 @@ class Rollouts(Worlds, ABC):
         values, noise = stacked(recording)
         part = slice(first, first + frames)
         arm, m = self.articulation, self.articulation.size
-        pose, rates, known = arm.reference(), np.zeros(m), np.zeros(0)
+        pose, rates, known, found = arm.reference(), np.zeros(m), np.zeros(0), None
         if self.start == "fit":
             found = read_start(self.model, arm, recording, values, noise, first)
             pose, rates = found.pose, found.rates
@@ -105,9 +108,11 @@ class Rollouts(Worlds, ABC):
             wide = np.hypot(CAREFUL * np.where(told, found.error, 0.0), np.maximum(usual, np.abs(rates)))
             known = np.concatenate([spans(arm, self.model), wide])
         times = recording.times[part] - recording.times[first]
-        return Block(
-            index, first, times, values[part].copy(), noise, pose, rates, known, begin=seen_first(values[part])
-        )
+        begin = seen_first(values[part])
+        block = Block(index, first, times, values[part].copy(), noise, pose, rates, known, begin=begin)
+        if found is None or first > 0:
+            return block
+        return stated(self, block, self.usual_rates(index), found.error, found.shown)
 
     def usual_rates(self, index: int) -> np.ndarray:
         """(m,) root mean square of the rates of the coordinates in a recording, where channels tell them.
@@ -145,11 +150,14 @@ class Rollouts(Worlds, ABC):
         ends: dict[int, np.ndarray | None] = {}
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
-            worlds, impossible = self.worlds_of(each, theta, effects, r) if mine else ([], [])
+            if not mine:
+                continue
+            worlds, impossible = self.worlds_of(each, theta, effects, r)
+            memories = self._memories(r, worlds, [self.blocks[b] for b in mine])
             for group in _by_length(self.blocks, mine):
                 most = max(1, TOGETHER // len(group))
                 parts = [
-                    self._roll(r, group, worlds[k : k + most], None if local is None else local[k : k + most])
+                    self._roll(r, group, worlds, local, memories, slice(k, k + most))
                     for k in range(0, len(worlds), most)
                 ]
                 for n, b in enumerate(group):
@@ -170,9 +178,10 @@ class Rollouts(Worlds, ABC):
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """See `Predictor.step`."""
 
-    def _roll(self, r: int, group: list[int], worlds: list[World], local):
-        """Per block values [K, n, D] and ends [K, L]; the batch runs over worlds, then over blocks."""
+    def _roll(self, r: int, group: list[int], worlds: list[World], local, memories, part: slice):
+        """Per block values [K, n, D] and ends [K, L] of a part of the worlds; batches run over these, then blocks."""
         recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
+        worlds, local = worlds[part], None if local is None else local[part]
         k, count = len(worlds), len(blocks)
         model, times = worlds[0][0], blocks[0].times
         step = float(np.median(np.diff(recording.times)))
@@ -187,7 +196,12 @@ class Rollouts(Worlds, ABC):
         starts = None if local is None else local[:, group]
         moves, of = distinct_motions(worlds, late, starts)
         some = None if starts is None else starts[moves]
-        shots = Shots(r, blocks, [worlds[m] for m in moves], late[moves], some, step, max(frames, ends + 1), ends)
+        memory = None
+        if memories is not None:
+            first = np.stack([memories[b.first][:, part][:, moves] for b in blocks], axis=2)
+            memory = first.reshape(len(first), -1)
+        chosen = [worlds[m] for m in moves]
+        shots = Shots(r, blocks, chosen, late[moves], some, memory, step, max(frames, ends + 1), ends)
         raw, arrived = self._filmed(shots)
         turning = angle_mask(recording)
         begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
@@ -233,7 +247,7 @@ class Rollouts(Worlds, ABC):
         count, model = len(blocks), worlds[0][0]
         if self.start != "fit":
             x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
-            return State.at_rest(model, x.shape[1], position=x)
+            return remembering(State.at_rest(model, x.shape[1], position=x), shots)
         m = self.articulation.size
         base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
         x = np.empty((len(model.position), len(worlds) * count, 3))
@@ -254,23 +268,23 @@ class Rollouts(Worlds, ABC):
             v[:, at] = np.einsum("mnwa,mw->nwa", arm.jacobian(pose, own_x), u)
         state = State.at_rest(model, x.shape[1], position=x)
         state.v[:] = v
-        return state
+        return remembering(state, shots)
 
-    def _memory(self, shots: Shots) -> np.ndarray | None:
-        """Memory [M, K B] of the laws where segments start: that of the recorded motion up to there; None: no memory.
+    def _memories(self, r: int, worlds: list[World], wanted: Sequence[Block]) -> dict[int, np.ndarray] | None:
+        """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
 
-        All nodes are held and carried along as recorded, from segment to segment, so that the laws feel the motion
-        without changing it. Before that they rest.
+        It is that of the recorded motion up to there. All nodes are held and carried along as recorded, from segment to
+        segment, so that the laws feel the motion without changing it. Before that they rest.
         """
-        r, worlds, blocks = shots.recording, shots.worlds, shots.blocks
-        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
+        model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
-        every = np.union1d(every, [b.first for b in blocks])
+        every = np.union1d(every, [b.first for b in wanted])
         if not len(State.at_rest(model).memory) or not np.any(every):
             return None
         path = self.path(r)
         if path is None:
             return None
+        parameters = Parameters.join([p for _, p in worlds])
         times = self.recordings[r].times - self.recordings[r].times[0]
         step = float(np.median(np.diff(times)))
         held = replace(model, free=np.zeros_like(model.free))
@@ -282,18 +296,18 @@ class Rollouts(Worlds, ABC):
             state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
             batch = self._batch(held, parameters, drive.held(0.0), state)
             batch.carry(path[[frame, frame], :, None], LEAD * step)
-            return self._batch(held, parameters, drive, replace(state, memory=batch.state().memory))
+            return self._batch(held, parameters, drive, replace(state, memory=batch.memory()))
 
         out: dict[int, np.ndarray] = {}
         last, batch = -LEAD - 1, None
-        for first in map(int, every[every <= max(b.first for b in blocks)]):
+        for first in map(int, every[every <= max(b.first for b in wanted)]):
             if batch is None or first - last > LEAD:
                 last = max(first - LEAD, 0)
                 batch = rested(last)
             if first > last:
                 batch.carry(path[last : first + 1, :, None], step)
             last, out[first] = first, batch.memory()
-        return np.stack([out[b.first] for b in blocks], axis=2).reshape(len(out[last]), -1)
+        return out
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)
@@ -309,6 +323,13 @@ class Rollouts(Worlds, ABC):
                 pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
                 self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
         return self._paths[r]
+
+
+def remembering(state: State, shots: Shots) -> State:
+    """The state with the memory that the laws have there."""
+    if shots.memory is not None:
+        state.memory[:] = shots.memory
+    return state
 
 
 def joined_poses(poses: Sequence[Pose]) -> Pose:

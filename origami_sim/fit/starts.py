@@ -29,12 +29,13 @@ class Reading:
 
     Attributes:
         pose: coordinates. rates: (m,) of the coordinates. error: (m,) standard deviation of the rates; infinite where
-            no channel tells them.
+            no channel tells them. shown: (m,) the same of the coordinates, from one frame.
     """
 
     pose: Pose
     rates: np.ndarray
     error: np.ndarray
+    shown: np.ndarray
 
 
 def read_start(model: Model, arm: Articulation, recording: Recording, values, noise, first: int) -> Reading:
@@ -57,7 +58,8 @@ def read_start(model: Model, arm: Articulation, recording: Recording, values, no
     rates = inverse @ (np.nan_to_num(slope) * weight)
     spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
     told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
-    return Reading(pose, rates, np.where(told, spread, np.inf))
+    shown = np.where(told, np.linalg.norm(inverse, axis=1), np.inf)
+    return Reading(pose, rates, np.where(told, spread, np.inf), shown)
 
 
 def channel_tangent(model: Model, arm: Articulation, recording: Recording, pose: Pose, near: np.ndarray):

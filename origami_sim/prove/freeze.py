@@ -50,19 +50,18 @@ def _numbers(value) -> bool:
 
 
 def thresholds() -> dict[str, dict]:
-    """The numbers in capitals of every module of the estimator and the diagnosis, priors, and default options."""
+    """The numbers in capitals of every module of the diagnosis, and its default options."""
     import origami_sim.diagnose
     import origami_sim.fit
     from origami_sim.diagnose import Options
     from origami_sim.fit.hyper import HYPER
 
-    out: dict = {"options": asdict(Options()), "priors": asdict(HYPER)}
-    for package in (origami_sim.fit, origami_sim.diagnose):
+    out: dict = {"options": asdict(Options()), "hyperparameters": asdict(HYPER)}
+    for package in (origami_sim.diagnose, origami_sim.fit):
         for info in pkgutil.iter_modules(package.__path__):
             module = importlib.import_module(f"{package.__name__}.{info.name}")
             mine = {n: v for n, v in vars(module).items() if n.isupper() and _numbers(v)}
-            short = f"{package.__name__.rpartition('.')[2]}.{info.name}"
-            out |= {short: mine} if mine else {}
+            out |= {f"{package.__name__.rpartition('.')[2]}.{info.name}": mine} if mine else {}
     return json.loads(json.dumps(out))  # as it is stored
 
 

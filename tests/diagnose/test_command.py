@@ -625,7 +625,7 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
         (("--model", "pendulum_chain", "--set", "gravity=0"), "--set: out of its range"),
         (("--model", "pendulum_chain", "--set", "weight=1"), "--set: cannot apply"),
         (("--model", "pendulum_chain", "--segment", "0"), "must be positive"),
-        (("--model", "pendulum_chain", "--seed", "-1"), "must not be negative"),
+        (("--model", "pendulum_chain", "--panels", "soft"), "invalid choice: 'soft'"),
         (("--model", "pendulum_chain", "--out", "taken"), "is a file"),
         (("--model", "pendulum_chain", "--out", "/proc/x"), "/proc/x: cannot be written"),
         (("--model", "pendulum_chain", "--out", 300 * "x"), "cannot be written"),
@@ -863,7 +863,7 @@ def test_a_patch_reads_back_as_it_was_written(diagnosed, tmp_path):
 
 
 def test_the_start_can_be_chosen_but_not_rest_for_segments():
-    chosen = {"segment": None, "seed": 0, "thorough": False, "start_at": "fit"}
+    chosen = {"segment": None, "panels": "auto", "thorough": False, "start_at": "fit"}
     assert command._options(SimpleNamespace(**chosen)).start == "fit"  # type: ignore[arg-type]
     assert command._options(SimpleNamespace(**chosen | {"start_at": None, "segment": 1.0})).start is None  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"starts of their own.*--start-at.*no --segment"):

@@ -10,8 +10,8 @@ from origami_sim.fit.evidence import Group, Sets, problem, summed
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.linear import Linearisation, Rows
 
-HYPER = Hyper(slabs=(3.0, 10.0, 40.0), flaws=2.0, effects=0.4)
-COUNT, SMOOTH = 24, 0.7
+HYPER = Hyper(slabs=(3.0, 10.0, 40.0), effects=0.4)
+COUNT, SMOOTH, FLAWS = 24, 0.7, 2.0
 PRECISION, AWAY = np.array([0.8, 0.0]), np.array([0.3, 0.0])
 LAPLACE = 0.12
 """Of the log evidence: a strength's prior is taken at its best value, where it falls by a part of itself."""
@@ -33,7 +33,7 @@ class Toy:
         p = np.eye(COUNT) - np.outer(self.numbers[:, 1], self.numbers[:, 1]) / (self.numbers[:, 1] @ self.numbers[:, 1])
         plain = p @ np.linalg.inv(np.eye(COUNT) + p @ known @ known.T @ p) @ p
         norms = np.sqrt(np.einsum("rc,rs,sc->c", self.effects, plain, self.effects))
-        flaws = self.effects * (HYPER.flaws / np.sqrt(len(scale)) / norms)
+        flaws = self.effects * (FLAWS / np.sqrt(len(scale)) / norms)
         self.root = np.concatenate([known, flaws, SMOOTH * self.smooth], axis=1)
         self.precision = p @ np.linalg.inv(np.eye(COUNT) + p @ self.root @ self.root.T @ p) @ p
         self.norms = np.sqrt(np.einsum("rc,rs,sc->c", self.effects, self.precision, self.effects))
@@ -45,7 +45,7 @@ class Toy:
 
     def summed(self, residual):
         line = Linearisation([Rows(COUNT)], [residual], [self.numbers], [np.zeros((COUNT, 0))], [None])
-        return summed(problem(line, np.arange(2), PRECISION, AWAY, [self.effects], [self.smooth]), SMOOTH, HYPER)
+        return summed(problem(line, np.arange(2), PRECISION, AWAY, [self.effects], [self.smooth]), SMOOTH, FLAWS)
 
     def log_density(self, residual) -> np.ndarray:
         """Of residuals [..., n] without any effect, but for a constant."""
@@ -139,6 +139,17 @@ def test_a_shape_beside_a_strength_has_its_own_prior():
     prior = slab(strength * norm) + np.log(norm) - 0.5 * (shapes / spread) ** 2 - np.log(spread * np.sqrt(2 * np.pi))
     cell = np.log((strength[1, 0] - strength[0, 0]) * (shapes[0, 1] - shapes[0, 0]))
     assert out == pytest.approx(log + logsumexp(prior - 0.5 * square) + cell, abs=LAPLACE)
+
+
+def test_larger_flaws_excuse_more():
+    """An effect of d' 12 is nothing beside flaws of as much, and is told beside those of 2."""
+    toy = Toy([1.0, 5.0])
+    residual = toy.drawn(np.random.default_rng(6), np.array([12.0, 0.0]) / toy.norms)
+    line = Linearisation([Rows(COUNT)], [residual], [toy.numbers], [np.zeros((COUNT, 0))], [None])
+    p = problem(line, np.arange(2), PRECISION, AWAY, [toy.effects], [toy.smooth])
+    sets = [Sets.of([k], groups([0, 0]), 0, 2) for k in [(), (0,)]]
+    odds = [np.diff([summed(p, SMOOTH, f).of(s, HYPER)[0][0] for s in sets])[0] for f in (2.0, 8.0, 32.0)]
+    assert odds[0] > odds[1] > odds[2] and odds[0] > 10.0 and odds[2] < 2.0
 
 
 def test_stated_probabilities_are_frequencies():

@@ -67,7 +67,7 @@ def test_a_sealed_run_goes_on_with_the_diagnosis_that_it_began_with(tmp_path):
     first = freeze.freeze(tmp_path, truth, sealed=True)
     assert freeze.freeze(tmp_path, truth, sealed=True) == first
     held = first["thresholds"]
-    assert held["options"]["rate"] > 0 and 0 < held["priors"]["effects"] < 1
+    assert held["options"]["rate"] > 0 and 0 < held["hyperparameters"]["effects"] < 1
     assert held["diagnose.verdict"] and len(held["fit.least_squares"]["STEPS"]) > 1  # several numbers of one name
     stored = tmp_path / freeze.FROZEN
     stored.write_text(json.dumps({**first, "diagnosis": "0" * 64}))
