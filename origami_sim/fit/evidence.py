@@ -20,6 +20,12 @@ from scipy.special import log_ndtr, logsumexp
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
 
+ROUNDS = 4
+"""Times that the mode of strengths is found, each with the prior's curvature at the last one.
+
+Without the curvature two effects that look the same would have a volume far beyond what the prior gives them.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -158,10 +164,14 @@ class Summed:
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
         wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         tight = np.where(sets.strength, norm / hyper.widest, 1.0 / wide)
-        full = a + np.eye(k) * (tight**2)[:, None, :]
-        inverse = np.linalg.inv(full)
-        move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
-        value = sets.at + move
+        full, inverse, value, move = a, a, sets.at, sets.at
+        for turn in range(ROUNDS):
+            if turn:  # as narrow as the normals are that a strength of this size may come from
+                tight = np.where(sets.strength, norm * _narrow(value * norm, hyper), tight)
+            full = a + np.eye(k) * (tight**2)[:, None, :]
+            inverse = np.linalg.inv(full)
+            move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
+            value = sets.at + move
         sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
         left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
         out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
@@ -188,8 +198,20 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
 
 
-def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Log density of a strength at detectability d': a mixture of normals."""
+def _log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log densities [..., s] of a strength at detectability d' under each of the normals, equally likely."""
     widths = np.array(hyper.slabs)
     log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
-    return logsumexp(log, axis=-1) - np.log(len(widths))
+    return log - np.log(len(widths))
+
+
+def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log density of a strength at detectability d': a mixture of normals."""
+    return logsumexp(_log_slabs(d, hyper), axis=-1)
+
+
+def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """One over the root mean square width of the normals, each as probable as it is at detectability d'."""
+    log = _log_slabs(d, hyper)
+    share = np.exp(log - logsumexp(log, axis=-1, keepdims=True))
+    return np.sqrt(share @ (1.0 / np.square(hyper.slabs)))
