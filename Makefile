@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all bench prove lint setup clean
+.PHONY: demo test test-all bench prove docs lint setup clean
 
 setup: .venv/ready
 
@@ -29,6 +29,10 @@ SEED ?= 1
 prove: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[proof]'
 	$(BIN)/origami-sim prove --cases $(CASES) --seed $(SEED)
+
+docs: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 lint: setup
 	$(BIN)/ruff check .

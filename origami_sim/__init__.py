@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from origami_sim.bodies import rigid
     from origami_sim.build import Sheet
+    from origami_sim.design import Design, read_design, write_design
+    from origami_sim.device import device_module
     from origami_sim.diagnose import Diagnosis, Subject, diagnose
+    from origami_sim.dielectric import Stack
     from origami_sim.drive import Drive, Signal, ramp, series, sine
     from origami_sim.effects import CATALOGUE
     from origami_sim.errors import InputError
+    from origami_sim.explore import Found, Way, gradient, optimise, solve_for, sweep
     from origami_sim.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
     from origami_sim.model import Model, Parameters, State
     from origami_sim.pattern import (
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
         write_fold,
         write_mesh,
     )
+    from origami_sim.quantities import si
     from origami_sim.recording import Recording, read_recording
     from origami_sim.replay import open_replay, screenshot, write_replay
     from origami_sim.results import format_table, load_run, save_run
@@ -48,6 +53,11 @@ __version__ = "0.1.0"
 _HOMES = {
     "bodies": "rigid",
     "build": "Sheet",
+    "design": "Design read_design write_design",
+    "device": "device_module",
+    "dielectric": "Stack",
+    "explore": "Found Way gradient optimise solve_for sweep",
+    "quantities": "si",
     "diagnose": "Diagnosis Subject diagnose",
     "drive": "Drive Signal ramp series sine",
     "effects": "CATALOGUE",
@@ -72,7 +82,7 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     # a sheet
     "Pattern", "cross", "grid", "kresling", "miura", "sheet", "strip", "uncreased", "waterbomb",
     "read_pattern", "read_fold", "read_svg", "read_mesh", "write_fold", "write_mesh", "triangulate",
-    "Sheet", "isotropic", "orthotropic", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
+    "Sheet", "si", "Stack", "isotropic", "orthotropic", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
     # a model and what drives it
     "Model", "Parameters", "State", "rigid", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
     # solutions
@@ -82,6 +92,9 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     "save_run", "load_run", "format_table", "write_replay", "open_replay", "screenshot",
     # recordings and scenes
     "Recording", "read_recording", "read_calibration", "scene_module",
+    # devices as files, and questions of a designer
+    "device_module", "Design", "read_design", "write_design",
+    "sweep", "solve_for", "optimise", "gradient", "Found", "Way",
     # what a model lacks
     "diagnose", "Diagnosis", "Subject",
     "InputError",

@@ -6,19 +6,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.bodies import rigid
-from origami_sim.effects import get
+from origami_sim.dielectric import Electrodes
 from origami_sim.errors import InputError
-from origami_sim.masses import Masses, Stated, positive
+from origami_sim.ground import Contact, Ground, Grounds
+from origami_sim.masses import Stated, positive
 from origami_sim.materials import MATERIALS, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
+from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, stated
+from origami_sim.statements import statement
 
 MEMBRANE_POISSON = 1.0 / 3.0
 """The only Poisson's ratio that bars along triangle edges reproduce in shear."""
 
 
-class Sheet(Masses):
+class Sheet(Grounds, Electrodes):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -41,10 +44,10 @@ class Sheet(Masses):
         self,
         pattern: Pattern,
         *,
-        thickness: float,
+        thickness: float | str,
         material: str = "pdms",
-        modulus: float | None = None,
-        density: float | None = None,
+        modulus: float | str | None = None,
+        density: float | str | None = None,
         triangulation: str = "diagonal",
         membrane: float = 1.0,
         membrane_damping: float = 0.02,
@@ -53,6 +56,13 @@ class Sheet(Masses):
         if panels not in ("elastic", "rigid"):
             raise InputError("no such panels", field="panels", value=panels, allowed="elastic, rigid")
         self.pattern, self.panels = pattern, panels
+        self.statements = []
+        self.made = {
+            "thickness": thickness, "material": material, "modulus": modulus, "density": density, "panels": panels,
+            "triangulation": triangulation, "membrane": membrane, "membrane_damping": membrane_damping,
+        }  # fmt: skip
+        thickness = converted(thickness, "m", "thickness")
+        modulus, density = converted(modulus, "Pa", "modulus"), converted(density, "kg/m^3", "density")
         self.mesh = triangulate(pattern, triangulation)
         faces = pattern.face_count
         self._names = [m or material for m in pattern.materials]
@@ -84,7 +94,8 @@ class Sheet(Masses):
         self._extra_mass = np.zeros(len(self.mesh.vertices))
         self._free = np.ones((len(self.mesh.vertices), 3))
         self._labels: dict[str, tuple[str, ...]] = {}
-        self._contacts: list[tuple[int, np.ndarray, float, np.ndarray, str]] = []
+        self._contacts: list[Contact] = []
+        self._ground: Ground | None = None
         self._settings: list[tuple[str, str, object, object]] = []
         self._effects = ["bars"]
         self._shell: Shell | None = None
@@ -102,20 +113,7 @@ class Sheet(Masses):
 
     # what a designer states ------------------------------------------------------------------------------------
 
-    def on(self, *effects: str) -> "Sheet":
-        """Switches effects on."""
-        for e in effects:
-            get(e)
-            if e not in self._effects:
-                self._effects.append(e)
-        return self
-
-    def set(self, effect: str, entities=None, **parameters) -> "Sheet":
-        """Switches an effect on and sets parameters for all entities of its family, or for some."""
-        self.on(effect)
-        self._settings += [(effect, name, value, entities) for name, value in parameters.items()]
-        return self
-
+    @statement(stiffness="N m/rad", rest_angle="rad", loss_time="s")
     def crease(
         self,
         creases=None,
@@ -150,6 +148,7 @@ class Sheet(Masses):
             self.on("crease_viscosity")
         return self
 
+    @statement(elasticity="Pa", membrane="N/m", bending="N m")
     def shell(
         self,
         *,
@@ -179,6 +178,7 @@ class Sheet(Masses):
         self._effects = [e for e in self._effects if e != "bars"]
         return self.on("shell_membrane", "shell_bending")
 
+    @statement(rigidity="N m")
     def panel(self, panels, *, rigidity: float) -> "Sheet":
         """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
         if not np.all(positive(rigidity)):
@@ -186,6 +186,7 @@ class Sheet(Masses):
         self._rigidity[self._index("panel", panels)] = rigidity
         return self
 
+    @statement(thickness="m", size="m", centre="m", remanence="T", density="kg/m^3")
     def patch(
         self,
         panel: int,
@@ -240,6 +241,7 @@ class Sheet(Masses):
             )
         return self
 
+    @statement(remanence="T", volume="m^3")
     def magnetise(self, panel: int, *, remanence: float, volume: float, poling: ArrayLike) -> "Sheet":
         """Remanence [T] of a volume of magnet [m^3] spread over a panel, along `poling` in the reference state."""
         d = np.asarray(poling, float)
@@ -261,6 +263,7 @@ class Sheet(Masses):
             )
         return self
 
+    @statement()
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
         """Holds panels or nodes along the named axes."""
         index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
@@ -270,44 +273,7 @@ class Sheet(Masses):
             self._free[index, "xyz".index(a)] = 0.0
         return self
 
-    def gravity(self, acceleration: Sequence[float] | np.ndarray = (0.0, 0.0, -9.80665)) -> "Sheet":
-        """Weight of sheet and patches; acceleration [m/s^2]."""
-        gx, gy, gz = acceleration
-        self._gravity = (gx, gy, gz)
-        return self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
-
-    def contact(
-        self,
-        panel: int,
-        point: ArrayLike,
-        *,
-        offset: float = 0.0,
-        axis: ArrayLike = (1, 0, 0),
-        name: str | None = None,
-    ) -> int:
-        """Adds a point that can touch the ground and returns its index.
-
-        Args:
-            panel: face that carries it. point: position in the reference state [m], in the panel's plane.
-            offset: height above the mid-plane along the panel's normal [m]; negative below.
-            axis: the body's forward direction in the reference state, for directional friction.
-        """
-        p, d = np.asarray(point, float), np.asarray(axis, float)
-        candidates = [(int(t), self._barycentric(t, p)) for t in self._triangles_of(panel)]
-        best, weights = max(candidates, key=lambda c: c[1].min())
-        if not weights.min() >= -1e-6:
-            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=p.tolist())
-        a, b = self._edge_weights(best, d)
-        self._contacts.append(
-            (best, weights, offset, np.array([-a - b, a, b]), name or f"contact {len(self._contacts)}")
-        )
-        return len(self._contacts) - 1
-
-    def electrode(self, group: int, *, creases=()) -> "Sheet":
-        """Assigns creases to an electrode group."""
-        self._electrodes[self._index("crease", creases)] = group
-        return self
-
+    @statement()
     def name(self, family: str, labels: Sequence[str]) -> "Sheet":
         """Labels of all entities of a family ("panel", "crease", "node"), for reports and attachments.
 
@@ -332,16 +298,17 @@ class Sheet(Masses):
                 "a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)"
             )
         if len(mesh.bends) and self._shell is None:
-            self.on("panel_bending")
+            self._switch_on("panel_bending")
         if self.membrane_damping > 0:
-            self.on("bar_viscosity")
+            self._switch_on("bar_viscosity")
         if self._gravity is not None and self._off_plane():
             gx, gy, gz = self._gravity
-            self.on("eccentric_weight")
+            self._switch_on("eccentric_weight")
             self._settings[:0] = [
                 ("eccentric_weight", f"gravity_{a}", g, None) for a, g in zip("xyz", (gx, gy, gz), strict=True)
             ]
-        tri = np.array([c[0] for c in self._contacts], int)
+        contacts, shares = self._grounded()
+        tri = np.array([c.triangle for c in contacts], int)
         model = Model(
             position=mesh.vertices,
             free=self._free,
@@ -351,12 +318,12 @@ class Sheet(Masses):
             triangles=mesh.triangles.astype(np.int32),
             triangle_panel=mesh.triangle_face.astype(np.int32),
             contacts=mesh.triangles[tri].reshape(-1, 3).astype(np.int32),
-            contact_weights=np.array([c[1] for c in self._contacts]).reshape(-1, 3),
-            contact_offsets=np.array([c[2] for c in self._contacts], float),
-            contact_axes=np.array([c[3] for c in self._contacts]).reshape(-1, 3),
+            contact_weights=np.array([c.weights for c in contacts]).reshape(-1, 3),
+            contact_offsets=np.array([c.offset for c in contacts], float),
+            contact_axes=np.array([c.axis for c in contacts]).reshape(-1, 3),
             electrodes=self._electrodes,
             effects=tuple(self._effects),
-            names={**self._labels, "contact": tuple(c[4] for c in self._contacts)},
+            names={**self._labels, "contact": tuple(c.name for c in contacts)},
         )
         p = Parameters(model)
         mass = self._node_masses()
@@ -382,9 +349,16 @@ class Sheet(Masses):
         if "eccentric_weight" in self._effects:
             for t, (weight, offset) in self._off_plane().items():
                 p.set("eccentric_weight", "mass", weight, [t]).set("eccentric_weight", "offset", offset, [t])
+        model = self._stand(model, p, shares)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
         return rigid(model, p) if self.panels == "rigid" else (model, p)
+
+    def _family_counts(self) -> dict[str, int]:
+        mesh = self.mesh
+        triangles = dict.fromkeys(("triangle", "membrane", "plate"), len(mesh.triangles))
+        hinges = {"bar": len(mesh.bars), "crease": len(mesh.creases), "bend": len(mesh.bends)}
+        return {"node": len(mesh.vertices), **triangles, **hinges}
 
     # mechanics ----------------------------------------------------------------------------------------------------
 

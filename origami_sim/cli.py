@@ -6,8 +6,6 @@ went unstable; 10 to 17 the verdict of a diagnosis; 130 interrupted, earlier res
 
 import argparse
 import functools
-import json
-import math
 import os
 import sys
 import time
@@ -18,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from origami_sim import __version__
 from origami_sim.errors import InputError
+from origami_sim.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.recording import Recording
@@ -84,7 +83,8 @@ def _parser() -> argparse.ArgumentParser:
         return p
 
     p = command("run", _run, "Simulate a device and leave its run folder", "origami-sim run box --set gap=2.54mm")
-    p.add_argument("scene", help=", ".join(import_module("origami_sim.scenes").NAMES))
+    names = ", ".join(import_module("origami_sim.scenes").NAMES)
+    p.add_argument("scene", help=f"{names}; or a device of yours: my_flap.py, package.module:build, my_flap.toml")
     p.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (SI, or with unit)"
     )
@@ -98,19 +98,40 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
 
+    p = command("show", _show, "Draw a device with its numbers, for sidecars", "origami-sim show my_flap.py")
+    p.add_argument("device", help="a scene, my_flap.py, package.module:build or my_flap.toml")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument("--out", metavar="PNG", help="the picture (default runs/show/DEVICE.png)")
+    p.add_argument("--save", metavar="TOML", help="write the whole design as a file that run and show read")
+
+    example = "origami-sim sweep my_flap.py --vary gap=1mm,2mm"
+    sweeping = command("sweep", _sweep, "Vary settings of a device and tabulate what it does", example)
+    sweeping.add_argument("device", help="a scene, my_flap.py, package.module:build or my_flap.toml")
+    what = "gap=1mm,2mm,4mm or gap=1mm:4mm:7 (seven values from 1 to 4 mm); again for further settings"
+    sweeping.add_argument("--vary", action="append", default=[], required=True, metavar="NAME=VALUES", help=what)
+    sweeping.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    sweeping.add_argument("--equilibrium", action="store_true", help="where it comes to rest, instead of its motion")
+    sweeping.add_argument("--pareto", metavar="A,B", help="draw the front of two columns: mass_g,-largest_turn_deg")
+    sweeping.add_argument("--out", metavar="FOLDER", help="table, and what resumes it (default runs/sweep_DEVICE)")
+
     p = command("replay", _replay, "Open the replay of a run, or take its picture", "origami-sim replay runs/box")
     p.add_argument("run", help="run folder or .rrd file")
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
     p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
+    from origami_sim.view import command as view
+
+    view.register(command("export", view.export, view.SUMMARY, view.EXAMPLE))
+
     p = command(
         "compare",
         _compare,
-        "Compare a recording with the scene pendulum_chain (no other can replicate one; diagnose takes any)",
+        "Compare a recording with the scene pendulum_chain or a device of yours (diagnose takes any)",
         "origami-sim compare double.csv --scene pendulum_chain --duration 5",
     )
     p.add_argument("recording", help="CSV or Parquet file")
-    p.add_argument("--scene", required=True, help="scene that models what was recorded: pendulum_chain")
+    what = "scene or device that models what was recorded: pendulum_chain, my_flap.py"
+    p.add_argument("--scene", "--model", required=True, metavar="SCENE", help=what)
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
@@ -130,7 +151,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.epilog = f"{p.epilog}\n\n{_DIAGNOSE_HELP}"
     p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
-    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, or a calibration of one (TOML)")
+    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, its calibration (TOML), or my_flap.py")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
@@ -267,10 +288,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(args) -> int:
+    from origami_sim.device import device_module
     from origami_sim.results import check_writable
-    from origami_sim.scene import scene_module, scene_settings
+    from origami_sim.scene import scene_settings
 
-    module = scene_module(args.scene)
+    module = device_module(args.scene)
+    name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
@@ -285,14 +308,20 @@ def _run(args) -> int:
                 value = f"{s.value:g}" if isinstance(s.value, float) else s.value
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
-    folder = Path(args.out or f"runs/{args.scene}")
+    folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
-    outcome = module.run(settings, progress=_Bar(args.scene))
-    _save(folder, args.scene, outcome, settings.as_dict(), args.set)
-    if hasattr(module, "draw"):
+    outcome = module.run(settings, progress=_Bar(name))
+    kept = _save(folder, name, outcome, settings.as_dict(), args.set)
+    if hasattr(module, "draw") and kept == folder:
         module.draw(settings, outcome, folder)
-    _tell(args, outcome, folder)
-    return _soundness(outcome.trajectory)
+    _tell(args, outcome, kept)
+    return _soundness(outcome.trajectory) or (OK if kept == folder else BAD_INPUT)
+
+
+def _sweep(args) -> int:
+    from origami_sim.explore import command
+
+    return command.run(args)
 
 
 def _replay(args) -> int:
@@ -316,27 +345,28 @@ def _replay(args) -> int:
 
 def _compare(args) -> int:
     from origami_sim.compare import plot_overlay
+    from origami_sim.device import device_module
     from origami_sim.recording import read_recording
     from origami_sim.results import check_writable
-    from origami_sim.scene import check_recorded_scene, scene_module, scene_settings
+    from origami_sim.scene import check_recorded_scene, scene_settings
 
-    module = scene_module(args.scene)
+    module = device_module(args.scene)
+    scene = module.__name__.rpartition(".")[2]
     if not hasattr(module, "replicate"):
-        raise InputError(
-            "this scene cannot replicate a recording", field="--scene", value=args.scene, allowed="pendulum_chain"
-        )
+        allowed = "pendulum_chain, or a device of yours"
+        raise InputError("this scene cannot replicate a recording", field="--scene", value=args.scene, allowed=allowed)
     for name in ("duration", "threshold"):
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
     settings = scene_settings(module).override(args.set, "--set")
     recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
-    check_recorded_scene(recording, args.scene, "origami-sim diagnose --model")
+    check_recorded_scene(recording, scene, "origami-sim diagnose --model")
     duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")
     check_writable(folder)
     comparison, motion, used, part = _replicate(module, settings, recording, args.start, duration, args.threshold)
-    _save_comparison(folder, args.scene, comparison, motion, used, part, args.set)
+    _save_comparison(folder, scene, comparison, motion, used, part, args.set)
     plot_overlay(comparison, folder / "overlay.png")
     if args.json:
         print(comparison.to_json())
@@ -364,7 +394,7 @@ def _calibrate(args) -> int:
 
 
 def _study(args) -> int:
-    module = import_module("origami_sim.study" if args.scene == "crawler" else "origami_sim.parameter_study")
+    module = import_module(f"origami_sim.studies.{'crawler_maps' if args.scene == 'crawler' else 'bifold_tables'}")
     report = module.run(args, functools.partial(print, file=sys.stderr if args.json else sys.stdout))
     if args.json:
         _print_json(report)
@@ -378,124 +408,54 @@ def _prove(args) -> int:
 
 
 def _effects(args) -> int:
-    from origami_sim.effects import CATALOGUE, get
+    from origami_sim import catalogue
 
-    chosen = [get(args.name)] if args.name else list(CATALOGUE.values())
-    if args.json:
-        keys = ("name", "family", "formula", "source", "matters", "confused_with", "separated_by")
-        of_parameter = ("name", "symbol", "unit", "default", "bounds", "meaning")
-        _print_json(
-            [
-                {k: getattr(e, k) for k in keys}
-                | {"parameters": [{k: getattr(p, k) for k in of_parameter} for p in e.parameters]}
-                for e in chosen
-            ]
-        )
-        return OK
-    for e in chosen:
-        print(f"{e.name}  ({e.family})\n    {e.formula}")
-        print(f"    matters: {e.matters}")
-        if e.confused_with:
-            print(f"    confused with: {e.confused_with}\n    separated by: {e.separated_by}")
-        print(f"    source: {e.source}")
-        for p in e.parameters:
-            limits = f"default {p.default:g}, {p.bounds[0]:g} to {p.bounds[1]:g}"
-            print(f"    {p.name:18s} {p.symbol:8s} [{p.unit}]  {limits}: {p.meaning}")
-        print()
+    _print_json(catalogue.entries(args.name)) if args.json else print(catalogue.text(args.name))
+    return OK
+
+
+def _show(args) -> int:
+    from origami_sim import show
+
+    found = show.run(args)
+    _print_json(found) if args.json else print(show.text(found))
     return OK
 
 
 def _stride(args) -> int:
-    from origami_sim import regression
+    from origami_sim.gait import strides
     from origami_sim.scene import scene_module, scene_settings
 
-    module = scene_module(args.scene)
+    stored, module = import_module("origami_sim.studies.strides"), scene_module(args.scene)
     if not hasattr(module, "walk"):
         raise InputError("this scene does not walk", field="scene", value=args.scene, allowed="crawler")
     settings = scene_settings(module)
     if args.cycles is not None and args.cycles < 1:
         raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
-    cycles = args.cycles or len(regression.reference(args.scene)["strides_mm"])
+    cycles = args.cycles or len(stored.reference(args.scene)["strides_mm"])
     motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
-    report = regression.check(args.scene, regression.strides(motion, settings.frequency), settings=settings)
+    report = stored.check(args.scene, strides(motion, settings.frequency), settings=settings)
     _print_json(report.to_json()) if args.json else print(report.text())
     return OK if report.passed else NO
 
 
 def _demo(args) -> int:
-    from origami_sim.recording import read_recording, stand_in_double_pendulum
-    from origami_sim.report import Section, write_report
-    from origami_sim.results import check_writable
-    from origami_sim.scene import recordings_folder, scene_module, scene_settings
+    from origami_sim import demo
 
-    began = time.perf_counter()
-    out = Path(args.out)
-    scenes = ("box", "crawler", "fold_file")
-    for name in (*scenes, "pendulum_chain"):
-        check_writable(out / name)
-    say = (lambda *_, **__: None) if args.json else print
-    sections, numbers, worst = [], {}, OK
-    for name in scenes:
-        module = scene_module(name)
-        settings = scene_settings(module)
-        say(f"== {name}", flush=True)
-        outcome = module.run(settings, progress=_Bar(name))
-        _save(out / name, name, outcome, settings.as_dict(), [])
-        if not args.json:
-            _tell(args, outcome, out / name)
-        sections.append(Section.of(name, module, outcome, out / name))
-        numbers[name] = outcome.numbers
-        worst = max(worst, _soundness(outcome.trajectory))
-
-    say("== pendulum_chain", flush=True)
-    module = scene_module("pendulum_chain")
-    folder = recordings_folder()
-    real = folder / "pendulum_chain" / "double.csv" if folder else None
-    if real is not None and real.is_file():
-        source, note = real, "real recording"
-    else:
-        note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
-        source = stand_in_double_pendulum(out / "stand_in.csv", duration=STAND_IN_SECONDS)
-    say(f"{note}: {source.name}")
-    recording = read_recording(source, _shipped_sidecar("pendulum_chain_double"))
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
-    _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
-    worst = max(worst, _soundness(motion))
-    say(comparison.table())
-    say(comparison.sentence())
-    sections.append(Section.of_comparison("pendulum_chain", module, comparison, note, out / "pendulum_chain"))
-
-    page = write_report(out / "index.html", sections)
-    say(f"\nreport: {page}\nreplays: " + ", ".join(f"origami-sim replay {out / s.name}" for s in sections))
-    say(f"done in {time.perf_counter() - began:.0f} s")
-    if args.json:
-        numbers["pendulum_chain"] = {"recording": note, **json.loads(comparison.to_json())}
-        _print_json({"report": str(page), "numbers": numbers, "wall": time.perf_counter() - began})
-    return worst
+    return demo.run(args)
 
 
 # parts ---------------------------------------------------------------------------------------------------------------
 
 
-def _print_json(value) -> None:
-    """One object on one line; what JSON lacks (infinity, nan) becomes null."""
-    print(json.dumps(_finite(value), allow_nan=False))
+def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> Path | None:
+    """Saves a run and returns where: elsewhere, or nowhere, if the disk is full."""
+    from origami_sim.rescue import save_somewhere
 
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> None:
-    from origami_sim.results import save_run
-
-    save_run(
+    return save_somewhere(
         folder,
         outcome.trajectory,
+        note=lambda sentence: print(f"origami-sim: {sentence}", file=sys.stderr),
         scene=scene,
         tables=outcome.tables,
         units=outcome.units or _units(outcome.tables),
@@ -510,7 +470,7 @@ def _units(tables: dict) -> dict[str, str]:
     return {n: n.rsplit("_", 1)[1] for n in names if "_" in n and n.rsplit("_", 1)[1] in known}
 
 
-def _tell(args, outcome: "Outcome", folder: Path) -> None:
+def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
     from origami_sim.results import format_table
     from origami_sim.solve import accuracy
 
@@ -519,7 +479,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
         _print_json(
             {
                 "numbers": outcome.numbers,
-                "folder": str(folder),
+                "folder": None if folder is None else str(folder),
                 "dt": motion.dt,
                 "energy_error": accuracy.worst(motion.energy_error),
                 "notes": motion.notes,
@@ -532,7 +492,7 @@ def _tell(args, outcome: "Outcome", folder: Path) -> None:
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
     said = [str(motion.step), accuracy.sentence(motion.energy_error), f"{motion.wall:.1f} s of computing"]
-    print(f"{'; '.join(filter(None, said))}; run folder: {folder}")
+    print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 
 
 def _soundness(motion: "Trajectory") -> int:

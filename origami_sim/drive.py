@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.quantities import ANY, converted
 
 CHANNELS = (
     "field_x",
@@ -15,8 +16,12 @@ CHANNELS = (
     *(f"gradient_{i}{j}" for i in "xyz" for j in "xyz"),
     "temperature",
     "load",
+    "origin",
 )
-"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow."""
+"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow.
+
+The origin is the age [s] of the device at the start: laws of time count from it.
+"""
 
 SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 """How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
@@ -108,17 +113,23 @@ class Signal:
         return max(sampled, *(np.size(a) for a in arrays))
 
 
-Value = float | np.ndarray | Signal
-"""What a channel is given: a number, one number per world, or a signal."""
+Value = float | str | np.ndarray | Signal
+"""What a channel is given: a number, a quantity ("50 mT"), one number per world, or a signal."""
 
 
 def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
-    """offset + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
-    return Signal(offset=offset, amplitude=amplitude, frequency=frequency, phase=phase)
+    """offset + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad].
+
+    Numbers are SI or quantities: sine("50 mT", "1 Hz").
+    """
+    level, height = (converted(v, ANY, "amplitude") for v in (offset, amplitude))
+    often, shift = converted(frequency, "Hz", "frequency"), converted(phase, "rad", "phase")
+    return Signal(offset=level, amplitude=height, frequency=often, phase=shift)
 
 
-def ramp(final, duration: float, *, start=0.0) -> Signal:
-    """From `start` linearly to `final` within `duration` [s], then constant."""
+def ramp(final, duration: float | str, *, start=0.0) -> Signal:
+    """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s")."""
+    final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
     if not duration > 0:
         raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed="> 0 s")
     return Signal(
@@ -134,18 +145,23 @@ def series(times, values, *, scale=1.0) -> Signal:
     return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
 
 
-def as_signal(value) -> Signal:
-    return value if isinstance(value, Signal) else Signal(offset=value)
+def as_signal(value, unit: str = ANY) -> Signal:
+    """The signal of a number or of a quantity, which must have that unit."""
+    return value if isinstance(value, Signal) else Signal(offset=converted(value, unit, unit))
+
+
+def _seconds(duration: float | str) -> float:
+    return converted(duration, "s", "duration")
 
 
 class Drive:
     """Named channels in time, the same object for a simulation and a recording.
 
     Args:
-        field: flux density at the origin, three numbers or signals [T].
+        field: flux density at the origin, three numbers or signals [T]; numbers may be quantities, "50 mT".
         gradient: 3 x 3 nested numbers or signals, dB_i/dx_j [T/m].
         voltage: a number or signal [V], or one for each electrode group.
-        temperature: rise above the rest state [K]. load: load factor [-].
+        temperature: rise above the rest state [K]. load: load factor [-]. origin: age of the device at the start [s].
 
     Raises:
         InputError: wrong number of components, times that do not increase, values that are not finite.
@@ -159,6 +175,7 @@ class Drive:
         voltage: Value | Sequence[Value] = 0.0,
         temperature: Value = 0.0,
         load: Value = 0.0,
+        origin: Value = 0.0,
     ):
         if len(field) != 3:
             raise InputError("a field has three components", field="field", value=len(field), allowed="3")
@@ -166,9 +183,10 @@ class Drive:
         if len(gradient) != 3 or any(len(row) != 3 for row in gradient):
             raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
-        values: list = [*field, *(g for row in gradient for g in row), temperature, load, *voltages]
+        values: list = [*field, *(g for row in gradient for g in row), temperature, load, origin, *voltages]
+        units = [*["T"] * 3, *["T/m"] * 9, "K", "1", "s", *["V"] * len(voltages)]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
-        self.signals = {n: as_signal(v) for n, v in zip(names, values, strict=True)}
+        self.signals = {n: as_signal(v, u) for n, v, u in zip(names, values, units, strict=True)}
 
     grid: np.ndarray | None = None
     """Instants at which what distorts the drive samples it [s]; None: as finely as a motion asks for."""

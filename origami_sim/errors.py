@@ -1,5 +1,14 @@
 """Errors that a user can act on: one sentence naming the file, field, value and what is allowed."""
 
+import difflib
+import errno
+from collections.abc import Iterable
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The end of a sentence that refuses a name: what it nearly is, or nothing."""
+    return "".join(f"; '{n}' is near" for n in difflib.get_close_matches(str(name), [*known], n=1))
+
 
 class InputError(ValueError):
     """Bad input from a user. The command line prints the sentence and exits with code 2.
@@ -13,13 +22,32 @@ class InputError(ValueError):
     """
 
     def __init__(self, what, *, file=None, field=None, value=None, allowed=None):
-        parts = [str(file) + ":" if file is not None else None, what.rstrip(".")]
+        parts = [_brief(file) + ":" if file is not None else None, _brief(what).rstrip(".")]
+        shown = None if value is None else _brief(repr(value))
         if field is not None:
-            parts.append(f"(field '{field}'" + (f", value {value!r}" if value is not None else "") + ")")
-        elif value is not None:
-            parts.append(f"(value {value!r})")
+            parts.append(f"(field '{_brief(field)}'" + (f", value {shown}" if shown is not None else "") + ")")
+        elif shown is not None:
+            parts.append(f"(value {shown})")
         sentence = " ".join(p for p in parts if p)
         if allowed is not None:
-            sentence += f"; allowed: {allowed}"
+            sentence += f"; allowed: {_brief(allowed, 1200)}"
         super().__init__(sentence + ".")
         self.file, self.field, self.value, self.allowed = file, field, value, allowed
+
+
+class DiskFull(InputError):
+    """There is no room left where something should be written."""
+
+
+def unwritable(error: OSError, *, file, allowed=None) -> InputError:
+    """What an operating system's refusal to write is for the user."""
+    kind = DiskFull if error.errno in (errno.ENOSPC, errno.EDQUOT) else InputError
+    return kind(f"cannot be written ({error.strerror or error})", file=file, allowed=allowed)
+
+
+def _brief(text, most=400) -> str:
+    """The text on one line, its middle left out where it is long: a damaged file may hold a word of a megabyte."""
+    text = str(text)
+    if len(text) > most:
+        text = f"{text[: most // 2]} ... {text[-most // 4 :]}"
+    return "".join(c if c.isprintable() else " " for c in text)

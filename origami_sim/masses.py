@@ -10,9 +10,11 @@ from scipy.optimize import nnls
 
 from origami_sim.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, second_moments, triangle
 from origami_sim.errors import InputError
+from origami_sim.materials import G
 from origami_sim.model import BODY
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.triangulate import Triangulation
+from origami_sim.statements import Statements, statement
 
 LEVEL = 1e-6
 """Part of a panel's size by which a mass may lie off its plane and still count as in it: rounding of stated places.
@@ -38,7 +40,7 @@ class Stated:
     through: np.ndarray | None = None
 
 
-class Masses:
+class Masses(Statements):
     """The part of `Sheet` that knows what panels weigh."""
 
     pattern: Pattern
@@ -53,9 +55,18 @@ class Masses:
     _stated: dict[int, Stated]
     _points: list[tuple[int, float, np.ndarray]]
     _extra_mass: np.ndarray
+    _gravity: tuple[float, float, float] | None
 
     # what a designer states ------------------------------------------------------------------------------------
 
+    @statement(acceleration="m/s^2")
+    def gravity(self, acceleration: Sequence[float] | np.ndarray = (0.0, 0.0, -G)) -> Self:
+        """Weight of sheet and patches; acceleration [m/s^2]."""
+        gx, gy, gz = acceleration
+        self._gravity = (gx, gy, gz)
+        return self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
+
+    @statement(mass="kg", centre="m", inertia="kg m^2", through="m")
     def body(
         self,
         panel: int,
@@ -123,6 +134,7 @@ class Masses:
         self._stated[panel] = Stated(float(mass), middle, tensor, about, point)
         return self
 
+    @statement(mass="kg")
     def mass(self, nodes, mass: float) -> Self:
         """Adds point masses [kg] at nodes."""
         if not np.all(np.asarray(mass, float) >= 0):
@@ -130,6 +142,7 @@ class Masses:
         np.add.at(self._extra_mass, self._index("node", nodes), mass)
         return self
 
+    @statement(mass="kg", at="m", offset="m")
     def point_mass(self, panel: int, mass: float, at: ArrayLike, *, offset: float = 0.0) -> Self:
         """Adds a small mass [kg] that a panel carries, such as a screw or a marker, off its mid-plane if need be.
 

@@ -11,6 +11,9 @@ MU0 = 1.25663706212e-6
 EPS0 = 8.8541878128e-12
 """Permittivity of free space [F/m]."""
 
+G = 9.80665
+"""Standard gravity [m/s^2]."""
+
 
 @dataclass(frozen=True)
 class Material:

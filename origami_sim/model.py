@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +12,14 @@ from scipy.sparse.csgraph import connected_components
 from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Numbers of a rigid body: mass, centre of mass, inertia tensor about it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
     """Topology and reference geometry, shared by all worlds.
 
@@ -56,6 +60,22 @@ class Model:
     channels: int = 1
     panels: str = "elastic"
     carriers: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+
+    def __repr__(self) -> str:
+        from origami_sim.view.summary import model_line  # only who looks pays for it
+
+        return model_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.summary import model_html
+
+        return model_html(self)
+
+    def plot(self, *, numbers: bool | None = None) -> "Figure":
+        """The plan, with numbers of panels, creases and nodes, as a Matplotlib figure (`view.plot.plot_model`)."""
+        from origami_sim.view.plot import plot_model
+
+        return plot_model(self, numbers=numbers)
 
     def count(self, family: str) -> int:
         """Number of entities of a family of effects."""
@@ -327,6 +347,22 @@ def _carry(model: Model, x: np.ndarray) -> None:
         u[:, :, 2] *= sign[:, None]
         mine = first + np.flatnonzero(model.carriers == panel)
         x[mine] = np.einsum("wab,nb->nwa", u @ vt, model.position[mine] - middle) + now
+
+
+def node_mass(model: Model, parameters: Parameters) -> np.ndarray:
+    """Mass that moves at every node [kg], [N, 1] or [N, worlds]: the stated one and what effects add to it.
+
+    Raises:
+        InputError: effects that take away all of a node's mass.
+    """
+    stated = parameters["inertia", "mass"]
+    out = stated
+    for effect in map(get, model.laws):
+        if effect.inertia is not None:
+            out = out + effect.inertia({"mass": stated, **parameters.of(effect.name)})
+    if np.any((out <= 0) & (stated > 0)):
+        raise InputError("effects take away all of a node's mass", field="mass", value=float(out.min()), allowed="> 0")
+    return out
 
 
 def magnets(model: Model, parameters: Parameters, owner: str) -> np.ndarray:

@@ -21,18 +21,21 @@ from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from origami_sim.drive import Drive, Signal
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, unwritable
 from origami_sim.model import Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMAT = 1
 """Version of the folder's layout; a reader refuses a newer one."""
@@ -63,7 +66,7 @@ _REQUIRED = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """A run on disk, read back.
 
@@ -79,6 +82,17 @@ class Run:
     trajectory: Trajectory
     tables: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        tables = f", tables {', '.join(self.tables)}" if self.tables else ""
+        return f"<Run of {self.manifest['scene']} in {self.path}: {self.trajectory!r}{tables}>"
+
+    def _repr_html_(self) -> str:
+        return self.trajectory._repr_html_()
+
+    def plot(self, *, world: int = 0) -> "Figure":
+        """Fold angles, displacement and drive over time, as a Matplotlib figure."""
+        return self.trajectory.plot(world=world)
 
     @property
     def replay(self) -> Path:
@@ -356,7 +370,7 @@ def _writing(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as e:
-        raise InputError(f"cannot be written ({e.strerror or e})", file=target, allowed="a writable folder") from None
+        raise unwritable(e, file=target, allowed="a writable folder") from None
 
 
 def _check_target(target: Path):
@@ -434,7 +448,7 @@ def _read_manifest(file: Path) -> dict[str, Any]:
         manifest = json.loads(file.read_text(encoding="utf-8"))
     except OSError as e:
         raise InputError(f"cannot be read ({e.strerror})", file=file) from None
-    except ValueError as e:  # JSON and UTF-8
+    except (ValueError, RecursionError) as e:  # JSON and UTF-8, and what is nested deeply
         raise InputError(f"is not valid JSON ({_first_line(e)})", file=file) from None
     if not isinstance(manifest, dict):
         raise InputError("a manifest is a JSON object", file=file, value=type(manifest).__name__)

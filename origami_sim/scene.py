@@ -1,11 +1,9 @@
 """Scenes: a device with its calibration, what it computes and the table that it prints."""
 
-import difflib
 import functools
 import importlib
 import os
 import re
-import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -17,9 +15,10 @@ import numpy as np
 
 from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, nearest
+from origami_sim.files import read_toml
 from origami_sim.model import Model, Parameters, State
-from origami_sim.recording.units import UNITS
+from origami_sim.quantities import parsed
 from origami_sim.solve.accuracy import check_accuracy
 from origami_sim.solve.dynamics import Trajectory, simulate
 from origami_sim.solve.quasistatic import quasistatic
@@ -37,7 +36,6 @@ _BESIDE_STATICS = {
     "mode", "frequency", "loss_time", "decay_rate", "membrane_damping", "cells", "hinges", "motion_cells",
     "motion_hinges", "twist",
 }  # fmt: skip
-_FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
 
 
 @dataclass(frozen=True)
@@ -139,9 +137,9 @@ class Settings(Mapping[str, Setting]):
         for text in assignments:
             name, equals, given = (part.strip() for part in text.partition("="))
             if not equals or name not in self._settings:
-                near = [] if name in self._settings else difflib.get_close_matches(name, self._settings, n=1)
+                near = "" if name in self._settings else nearest(name, self._settings)
                 raise InputError(
-                    "cannot apply this setting" + "".join(f"; '{n}' is near" for n in near),
+                    f"cannot apply this setting{near}",
                     file=self.file,
                     field=name,
                     value=text,
@@ -161,19 +159,7 @@ def _parse(setting: Setting, text: str, file: Path | None):
         return text.lower() == "true"
     if isinstance(setting.value, str):
         return text
-    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d.].*)?", text)
-    if not match:
-        raise InputError(
-            "not a number", file=file, field=setting.name, value=text, allowed=f"a number in {setting.unit}"
-        )
-    number, unit = float(match[1]), match[2] or ""
-    if not unit or unit == setting.unit:
-        return number
-    kind = _FACTORS.get(setting.unit, ("", 1.0))[0]
-    if unit not in _FACTORS or _FACTORS[unit][0] != kind:
-        allowed = ", ".join(UNITS.get(kind, {setting.unit: 1.0}))
-        raise InputError("wrong unit", file=file, field=setting.name, value=unit, allowed=allowed)
-    return number * _FACTORS[unit][1]
+    return float(parsed(text, setting.unit, file=file, field=setting.name))
 
 
 def _checked(s: Setting, file: Path) -> Setting:
@@ -208,14 +194,7 @@ def read_calibration(source: str | Path) -> Settings:
     path = Path(source)
     if re.fullmatch(r"\w+", str(source)):
         path = Path(str(resources.files("origami_sim.calibrations") / f"{source}.toml"))
-    try:
-        data = tomllib.loads(path.read_text())
-    except OSError as e:
-        raise InputError(
-            f"cannot be read ({e.strerror})", file=path, allowed="a TOML file or a shipped calibration"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
-        raise InputError(f"is not valid TOML ({e})", file=path) from None
+    data = read_toml(path)
     additions: Sequence[Addition] = ()
     if "effects" in data:
         from origami_sim.diagnose.patch import read_additions
@@ -234,7 +213,7 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
     Raises:
         InputError: what `read_calibration` refuses; a setting that is missing, unknown or in another unit.
     """
-    own = read_calibration(module.CALIBRATION)
+    own = own_settings(module)
     if calibration is None:
         return own
     given = read_calibration(calibration)
@@ -255,21 +234,29 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
                 value=given[name].value,
                 allowed="a word" if isinstance(own[name].value, str) else "a number",
             )
+        if isinstance(given[name].value, bool) and not isinstance(own[name].value, bool):
+            raise InputError("a switch is no number", file=given.file, field=name, value=given[name].value)
     for name in given:
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
     return given
 
 
+def own_settings(module: ModuleType) -> Settings:
+    """The settings of a scene's own calibration, or those that the `build` of a device has."""
+    own = getattr(module, "SETTINGS", None)
+    return read_calibration(module.CALIBRATION) if own is None else own
+
+
 def settings_of(module: ModuleType, given: Collection[str]) -> set[str]:
     """Names that a calibration of a scene has to state, as many parts of its series as it states."""
-    return set(read_calibration(module.CALIBRATION)) | {f"{n}_{k}" for n, k in _series(module, given)}
+    return set(own_settings(module)) | {f"{n}_{k}" for n, k in _series(module, given)}
 
 
 def _series(module: ModuleType, given: Collection[str]) -> list[tuple[str, int]]:
     """Settings of the further parts of a scene's series of which a calibration states any, by name and number."""
     names = getattr(module, "SERIES", ())
-    own = read_calibration(module.CALIBRATION)
+    own = own_settings(module)
     found = [re.fullmatch(rf"({'|'.join(names)})_([1-9]\d?)", n) for n in given] if names else []
     last = max((int(m[2]) for m in found if m), default=0)
     return [(n, k) for k in range(1, last + 1) for n in names if f"{n}_{k}" not in own]
@@ -435,7 +422,7 @@ def scene_module(name: str) -> ModuleType:
         raise InputError("there is no such scene", field="scene", value=name, allowed=", ".join(NAMES))
     module = importlib.import_module(f"origami_sim.scenes.{name}")
     if not hasattr(module.build, "__wrapped__"):
-        setattr(module, "build", _extended(module.build))  # noqa: B010  a module has no declared attributes
+        setattr(module, "build", extended(module.build))  # noqa: B010  a module has no declared attributes
     return module
 
 
@@ -452,7 +439,7 @@ def check_recorded_scene(recording: "Recording", scene: str, option: str) -> Non
         )
 
 
-def _extended(build: Callable) -> Callable:
+def extended(build: Callable) -> Callable:
     """A scene's `build` that switches on what the calibration adds."""
 
     @functools.wraps(build)

@@ -3,11 +3,9 @@
 import numpy as np
 
 from origami_sim.effects import get
+from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
 from origami_sim.recording import Gravity
-
-G = 9.80665
-"""Standard gravity [m/s^2], for models that state none."""
 
 AXES = ("gravity_x", "gravity_y", "gravity_z")
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, sine
+from origami_sim.gait import stride_table
 from origami_sim.materials import layered_rigidity, material
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.regression import stride_table
 from origami_sim.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.solve.dynamics import Trajectory
 

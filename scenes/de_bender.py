@@ -5,17 +5,7 @@
 The strip is a chain of panels; a hinge in the middle of each of the equal parts of a segment stands for that part. The
 stack lies on the tape and, getting longer under voltage, bends the strip down, away from itself.
 
-Section, per width: z from the tape's underside, tape of n layers (plane strain, E_t / (1 - nu_t^2)), stack of height H
-(Ogden, incompressible, plane strain: small-strain modulus E / (1 - nu^2) = 4 G, G = sum mu_i alpha_i / 2).
-
-- linear: D and the neutral axis z_n of the bonded layers; moment p H a with the lever a = n t_t + H/2 - z_n.
-- ogden: exact bending of an incompressible strip. The stretch lambda of a layer at height z above the tape follows from
-  constant area, lambda^2 = lambda_0^2 + 2 kappa z (Rivlin 1949), and the passive moment is dU/dkappa of the elastic
-  energy at zero axial force. The stack's capacitance eps/t int lambda^2 dz then grows linearly with kappa, so that the
-  moment of -C V^2/2 is p H a at every curvature: with thinning layers the law `maxwell_stress` is exact as it stands.
-  Without thinning (a true stress p that does not grow, as in a purely mechanical analysis) the moment is the smaller
-  p int z / lambda^2 dz; the crease table is divided by that share, as no effect carries it
-  (so a weight then meets a section that is up to 6 % too stiff).
+The section of a hinge, of layers on tape, is that of `origami_sim.dielectric`.
 """
 
 from collections.abc import Sequence
@@ -25,10 +15,9 @@ import numpy as np
 
 from origami_sim.beams import along_strip, as_beam
 from origami_sim.build import Sheet
+from origami_sim.dielectric import Stack
 from origami_sim.drive import Drive, Signal, ramp, sine
-from origami_sim.effects.crease_table import KNOTS
 from origami_sim.errors import InputError
-from origami_sim.materials import layered_rigidity
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
 from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
@@ -54,96 +43,26 @@ CURVATURE = 60.0
 """Curvatures up to this [1/m], both ways, lie in the crease tables."""
 
 
-@dataclass(frozen=True)
-class Section:
-    """Cross-section of unit width with so many layers of tape.
-
-    Attributes:
-        tape, stack: thickness [m]. rigidity: D [N m]. neutral: neutral axis above the tape's underside [m].
-        moduli: plane-strain moduli of tape and stack [Pa].
-    """
-
-    tape: float
-    stack: float
-    rigidity: float
-    neutral: float
-    moduli: tuple[float, float]
-
-    @property
-    def lever(self) -> float:
-        """Middle of the stack above the neutral axis [m]."""
-        return self.tape + self.stack / 2 - self.neutral
-
-
-def section(s: Settings, tape_layers: float) -> Section:
-    """The linear section."""
-    mu, alpha = ogden(s)
-    shear = 0.5 * float(mu @ alpha)
-    if not shear > 0:
-        raise InputError(
-            "the Ogden constants have no positive shear modulus",
-            file=s.file,
-            field="ogden_mu_1",
-            value=shear,
-            allowed="sum of mu alpha > 0",
-        )
-    tape, stack = tape_layers * s.tape_thickness, round(s.layers) * s.layer_thickness
-    moduli = (s.tape_modulus / (1 - s.tape_poisson**2), 4 * shear)
-    stiff = moduli[0] * tape, moduli[1] * stack
-    neutral = (stiff[0] * tape / 2 + stiff[1] * (tape + stack / 2)) / sum(stiff)
-    return Section(tape, stack, layered_rigidity([(tape, moduli[0]), (stack, moduli[1])]), neutral, moduli)
-
-
-def ogden(s: Settings) -> tuple[np.ndarray, np.ndarray]:
-    """mu_i [Pa] and alpha_i of W = sum mu_i / alpha_i (l1^a + l2^a + l3^a - 3)."""
-    mu = np.array([s.ogden_mu_1, s.ogden_mu_2, s.ogden_mu_3])
-    return mu, np.array([s.ogden_alpha_1, s.ogden_alpha_2, s.ogden_alpha_3])
-
-
-def passive_moment(s: Settings, at: Section, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What it takes to bend a section to some curvatures [1/m].
-
-    Returns:
-        Moment per width [N]; moment of a true stress p of constant size over p H a [-].
-    """
-    mu, alpha = (v[:, None, None] for v in ogden(s))
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    z, w = 0.5 * at.stack * (1 + nodes), 0.5 * at.stack * weights
-    y, v = 0.5 * at.tape * (1 + nodes) - at.neutral, 0.5 * at.tape * weights
-    above = at.tape - at.neutral
-    k = np.asarray(curvature, float)[:, None]
-    strain = np.zeros_like(k)  # at the neutral axis
-
-    def forces(e):
-        root = 1 + e + k * above
-        square = root**2 + 2 * k * z
-        if np.any(square <= 0):
-            raise InputError("the stack cannot bend so far", file=s.file, field="layers", value=float(np.abs(k).max()))
-        stretch = np.sqrt(square)
-        stress = (mu * (stretch**alpha - stretch**-alpha)).sum(0)  # true stress, nothing on the faces
-        film = at.moduli[0] * (e + k * y)
-        axial = (stress * root / square) @ w + film @ v
-        bending = (stress * (root * above + z) / square) @ w + (film * y) @ v
-        return axial, bending, ((root * above + z) / square) @ w
-
-    stiffness = at.moduli[0] * at.tape + at.moduli[1] * at.stack
-    for _ in range(60):
-        step = forces(strain)[0][:, None] / stiffness
-        strain = strain - step
-        if np.abs(step).max() < 1e-13:
-            break
-    _, bending, constant = forces(strain)
-    return bending, constant / (at.stack * at.lever)
+def section(s: Settings, tape_layers: float) -> Stack:
+    """The section with so many layers of tape."""
+    mu = (s.ogden_mu_1, s.ogden_mu_2, s.ogden_mu_3)
+    alpha = (s.ogden_alpha_1, s.ogden_alpha_2, s.ogden_alpha_3)
+    plane = s.tape_modulus / (1 - s.tape_poisson**2)
+    return Stack(round(s.layers), s.layer_thickness, tape_layers * s.tape_thickness, plane, mu, alpha)
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of the strip [m] with so many hinges and tape layers, under the electrode or not."""
+    """A stretch of the strip [m] with so many hinges and tape layers, under the electrode or not.
+
+    Its hinges bend as if it were `longer` by that factor.
+    """
 
     length: float
     hinges: int
     tape_layers: float
     electrode: bool
+    longer: float = 1.0
 
 
 def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, Drive]:
@@ -153,8 +72,8 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
     sections = {g.tape_layers: section(s, g.tape_layers) for g in segments}
     at = [sections[g.tape_layers] for g in owner]
     lengths = np.concatenate([[part[0] / 2], (part[1:] + part[:-1]) / 2, [part[-1] / 2]])
-    thick = np.array([a.tape + a.stack for a in at])
-    areal = np.array([s.tape_density * a.tape + s.density * a.stack + s.grease for a in at])
+    thick = np.array([a.film + a.height for a in at])
+    areal = np.array([s.tape_density * a.film + s.density * a.height + s.grease for a in at])
     halves = np.concatenate([[0.0], areal * part / 2, [0.0]])  # mass of half a part on either side of a hinge
     mass = np.concatenate([[halves[1]], halves[1:-2] + halves[2:-1], [halves[-2]]]) / lengths
 
@@ -175,56 +94,33 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
     for panel, d in enumerate(largest):
         sheet.panel(panel, rigidity=s.twist * d)
     order = np.argsort(sheet.mesh.vertices[sheet.mesh.creases[:, 1], 0], kind="stable")
-    tables = {key: _Table(s, a) for key, a in sections.items()} if s.section == "ogden" else {}
-    stiffness, rest = np.zeros(len(order)), np.zeros(len(order))
-    rest[order] = s.natural_curvature * part
     sheet.name("crease", along_strip(sheet, "hinge"))
-    stack = {
-        "permittivity": s.permittivity * s.pressure_share,
-        "layer_thickness": s.layer_thickness,
-        "layers": float(round(s.layers)),
-        "width": s.electrode_width,
-        "constraint": 1.0,
-        "side": -1.0,
-    }
-    for h, crease in enumerate(order):
-        g, a, length = owner[h], at[h], part[h]
-        stiffness[crease] = a.rigidity * s.width / length
-        if tables:
-            turn = CURVATURE * length
-            sheet.set(
-                "crease_table",
-                [crease],
-                angle_min=rest[crease] - turn,
-                angle_max=rest[crease] + turn,
-                resisting_moment=tables[g.tape_layers].moments(s.thinning)[None, None] * s.width,
-            )
-        if not g.electrode:
-            continue
-        sheet.set("maxwell_stress", [crease], lever=a.lever, **stack)
-        if s.thinning and not tables:
-            sheet.set(
-                "thickness_thinning", [crease], first=a.tape - a.neutral, neutral=0.0, hinge_length=length, **stack
-            )
-    if not tables:
-        sheet.crease(stiffness=stiffness, rest_angle=rest)
-    sheet.set("crease_viscosity", viscosity=s.loss_time * stiffness).set("mass_damping", decay_rate=s.decay_rate)
+    for g in dict.fromkeys(owner):
+        hinges = [h for h, o in enumerate(owner) if o == g]
+        sheet.electrode(
+            order[hinges],
+            layers=round(s.layers),
+            layer_thickness=s.layer_thickness,
+            ogden=(sections[g.tape_layers].mu, sections[g.tape_layers].alpha),
+            permittivity=s.permittivity * s.pressure_share,
+            film_thickness=g.tape_layers * s.tape_thickness,
+            film_modulus=s.tape_modulus,
+            film_poisson=s.tape_poisson,
+            notch=g.longer * part[hinges],
+            width=s.width,
+            electrode_width=s.electrode_width if g.electrode else 0.0,
+            thinning=s.thinning,
+            section=s.section,
+            rest_angle=g.longer * s.natural_curvature * part[hinges],
+            loss_time=s.loss_time,
+            reach=CURVATURE,
+        )
+    sheet.set("mass_damping", decay_rate=s.decay_rate)
     gx, gz = {"weightless": (0, 0), "hanging": (1, 0), "lifting": (0, 1)}[s.orientation]
     sheet.gravity((gx * s.gravity, 0, gz * s.gravity))
     model, parameters = sheet.build()
     as_beam(model, parameters, s.membrane_stiffness * s.width)
     return model, parameters, drive(s)
-
-
-class _Table:
-    """Moments per width [N] at the knots of the crease tables, with and without thinning; angle = -curvature length."""
-
-    def __init__(self, s: Settings, at: Section):
-        passive, share = passive_moment(s, at, -np.linspace(-CURVATURE, CURVATURE, KNOTS))
-        self._values = {True: -passive, False: -passive / share}
-
-    def moments(self, thinning: bool) -> np.ndarray:
-        return self._values[thinning]
 
 
 def drive(s: Settings) -> Drive:
@@ -292,7 +188,7 @@ def bend(s: Settings, voltages: Sequence[float] | np.ndarray = VOLTAGES) -> tupl
 def gravity_number(s: Settings) -> float:
     """w g L^3 / D [-]: how much the weight, if it acts in the bending plane, matters against bending."""
     at = section(s, s.tape_layers)
-    areal = s.tape_density * at.tape + s.density * at.stack + s.grease
+    areal = s.tape_density * at.film + s.density * at.height + s.grease
     return areal * s.gravity * s.length**3 / at.rigidity
 
 

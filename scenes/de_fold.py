@@ -42,7 +42,7 @@ def segments(s: Settings, hinges: float) -> list[Segment]:
     each = max(1, round(n * arm / s.notch_length))
     return [
         Segment(arm, each, s.tape_layers, True),
-        Segment(s.notch_length, n, s.notch_tape_layers, True),
+        Segment(s.notch_length, n, s.notch_tape_layers, True, effective_length(s) / s.notch_length),
         Segment(arm, each, s.tape_layers, True),
         Segment(bare, 1, s.tape_layers, False),
     ]
@@ -76,22 +76,7 @@ def effective_length(s: Settings) -> float:
 
 def build(s: Settings, *, hinges: float | None = None) -> tuple[Model, Parameters, Drive]:
     """The chain; in the notch every hinge turns by as much more as the notch is effectively longer."""
-    parts = segments(s, hinges or s.hinges)
-    model, parameters, drive = chain(s, parts)
-    longer = effective_length(s) / s.notch_length
-    if longer != 1.0:
-        order = np.argsort(model.position[model.creases[:, 1], 0], kind="stable")
-        inside = order[parts[0].hinges :][: parts[1].hinges]
-        for key, factor in (
-            (("crease", "stiffness"), 1 / longer),
-            (("crease_viscosity", "viscosity"), 1 / longer),
-            (("crease_table", "angle_min"), longer),
-            (("crease_table", "angle_max"), longer),
-            (("thickness_thinning", "hinge_length"), longer),
-        ):
-            if key in parameters:
-                parameters.set(*key, factor * parameters[key][inside, 0], inside)
-    return model, parameters, drive
+    return chain(s, segments(s, hinges or s.hinges))
 
 
 def turns(parts: Sequence[Segment], x: np.ndarray) -> np.ndarray:

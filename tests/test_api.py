@@ -13,11 +13,11 @@ SNIPPET = """\
 from math import degrees
 from origami_sim import Drive, Sheet, ramp, save_run, simulate, strip
 
-sheet = Sheet(strip([0.01, 0.02], width=0.02), thickness=1e-3, material="pdms", triangulation="center")
-sheet.patch(1, thickness=3e-3, poling=(1, 0, 0))  # magnetic elastomer on the second panel, poled away from the crease
-sheet.crease(stiffness=2e-3, loss_time=0.003).gravity().fix(panels=[0])
+sheet = Sheet(strip([0.01, 0.02], width=0.02), thickness="1 mm", material="pdms", triangulation="center")
+sheet.patch(1, thickness="3 mm", poling=(1, 0, 0))  # magnetic elastomer on the second panel, poled away from the crease
+sheet.crease(stiffness="2 mN m/rad", loss_time="3 ms").gravity().fix(panels=[0])
 model, parameters = sheet.build()
-drive = Drive(field=(0, 0, ramp(0.1, 1.0)))  # up to 0.1 T within a second
+drive = Drive(field=(0, 0, ramp("0.1 T", "1 s")))
 motion = simulate(model, parameters, drive, duration=2.0)
 print(f"folds to {degrees(motion.creases[-1, 0, 0]):.1f} deg with dt = {motion.dt * 1e6:.0f} us")
 save_run("runs/flap", motion, scene="flap")  # then: origami-sim replay runs/flap
@@ -78,7 +78,7 @@ def test_every_folder_is_installed():
     folder = root / "origami_sim"
     found = (p.parent.relative_to(folder).parts for p in folder.glob("*/**/__init__.py"))
     inside = {".".join(("origami_sim", *parts)) for parts in found}
-    assert set(listed) == {"origami_sim", "origami_sim.scenes", "origami_sim.calibrations"} | inside
+    assert set(listed) == {"origami_sim", *(f"origami_sim.{n}" for n in ("scenes", "calibrations", "studies"))} | inside
 
 
 HEAVY = ("warp", "numpy", "scipy", "rerun", "matplotlib", "pyarrow", "trimesh")

@@ -21,7 +21,10 @@ from origami_sim.scene import read_calibration, scene_module
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 
-COMMANDS = ("run", "replay", "compare", "diagnose", "study", "calibrate", "prove", "effects", "stride", "demo")
+COMMANDS = (
+    *("run", "show", "sweep", "replay", "export", "compare", "diagnose"),
+    *("study", "calibrate", "prove", "effects", "stride", "demo"),
+)
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
 
@@ -327,7 +330,7 @@ def refused(call, tmp_path, arguments, words):
         (["run", "castle"], r"no such scene.*castle.*bifold, box, crawler"),
         (["run", "box", "--set", "gapp=1mm"], r"--set: cannot apply this setting; 'gap' is near.*gapp.*gap"),
         (["run", "box", "--set", "gp=2mm"], r"--set: cannot apply this setting; 'gap' is near"),
-        (["run", "box", "--calibration", "."], r"origami-sim: \.: cannot be read \(Is a directory\)"),
+        (["run", "box", "--calibration", "."], r"origami-sim: \.: cannot be read: it is a folder"),
         (["run", "box", "--set", "gap=1m"], r"--set: out of its range.*'gap'.*0\.001 to 0\.006 m"),
         (["run", "box", "--set", "gap=1V"], r"wrong unit.*'gap'.*'V'.*m, cm, mm"),
         (["run", "box", "--set", "thickness=-1mm"], r"out of its range.*thickness"),
@@ -337,6 +340,8 @@ def refused(call, tmp_path, arguments, words):
         (["run", "fold_file", "--set", "pattern=none.fold"], r"none\.fold: no such file"),
         (["run", "fold_file", "--set", "pattern=none.step"], r"unknown pattern format.*\.step.*\.fold"),
         (["effects", "telekinesis"], r"no such effect.*telekinesis.*adhesion"),
+        (["export", "nowhere", "--to", "a.glb"], r"nowhere: there is no such run folder"),
+        (["export", "nowhere", "--to", "a.webp", "--size", "big"], r"width x height.*--size.*big.*640x400"),
         (["replay", "nowhere"], r"nowhere: there is no such replay"),
         (["stride", "box"], r"does not walk.*box.*crawler"),
         (["stride", "--cycles", "0"], r"whole cycles.*--cycles.*0"),

@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from origami_sim import replay
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
@@ -17,6 +16,7 @@ from origami_sim.recording import Channel, Recording
 from origami_sim.replay import COLOURS, TIMELINE, open_replay, read_series, screenshot, write_replay
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.timestep import TimeStep
+from origami_sim.view.film import Film
 
 FRAMES, WORLDS, SIDE = 13, 2, 0.02
 FIELD, FREQUENCY = 0.06, 2.0
@@ -220,7 +220,7 @@ def test_contact_forces_return_to_their_points(trajectory):
             given[m.contacts[k, corner], axis] = force @ (point(corners + d) - point(corners - d)) / (2 * step)
     t.contact_forces[f, :, 0] = given
     t.gaps[f, :, 0] = (-1e-6, 1e-3)
-    points, found = replay._Scene(t, 0, None, (), None, "x").contact_arrows()
+    points, found = Film(t, 0, None, (), None, "x").contact_arrows()
     assert found[f, 0] == pytest.approx(force, rel=1e-6)
     assert not found[f, 1].any()
     assert points[f, 0] == pytest.approx(point(corners))

@@ -351,7 +351,7 @@ def sheet(**options) -> Sheet:
         (lambda: sheet().fix(nodes=[77]), r"no such node.*77"),
         (lambda: sheet().fix(panels=[7]), r"no such panel.*7"),
         (lambda: sheet().fix(panels=[0], axes="q"), r"no such axis.*q.*x, y, z"),
-        (lambda: sheet().electrode(1, creases=[4]), r"no such crease.*4"),
+        (lambda: sheet().electrode([4], layers=6, notch=1e-3), r"no such crease.*4"),
         (lambda: sheet().name("hinge", ["a"]), r"no such family.*hinge.*panel, crease, node"),
         (lambda: sheet().name("panel", ["a"]), r"wrong number of labels.*panel.*1.*2"),
         (lambda: sheet().on("telekinesis"), r"no such effect.*telekinesis"),

@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 from types import ModuleType
 
+from origami_sim.device import device_module, is_device
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.keep import Keep
@@ -139,13 +140,17 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
         InputError: no such scene, a calibration of none, a sidecar that names another scene or none that exists.
     """
     stated = (data[0].metadata.get("scene") or {}).get("name")
+    if is_device(given):
+        module = device_module(given)
+        check_recorded_scene(data[0], module.__name__, "--model")
+        return module, scene_settings(module)
     if stated is not None and stated not in NAMES:
         raise InputError(
             "the sidecar's scene does not exist",
             file=data[0].metadata.get("sidecar"),
             field="scene.name",
             value=stated,
-            allowed=", ".join(NAMES),
+            allowed=f"{', '.join(NAMES)}; or a device that --model names by its file, {stated}.py",
         )
     if not given.endswith(".toml"):
         module = scene_module(given)

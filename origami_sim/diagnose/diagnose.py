@@ -37,7 +37,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
 
-ROUNDS = 3
+ROUNDS = 2
 """Times that weights follow the best explanation: what it leaves is the noise that all are judged by."""
 
 SAME = 0.1
@@ -108,7 +108,7 @@ def diagnose(
     signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("search", 0.0)
-    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
+    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 3)
     given, base, weights, posterior = settled(forward, given, base, weights, posterior, o.fits, tell)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
@@ -198,7 +198,7 @@ def settled(
             break
         given = as_given(forward, base, new)
         p = reweighted(p, forward, base, new)
-        p = extended(p, forward, progress=lambda part: tell("search", part), most=most)
+        p = extended(p, forward, progress=lambda part: tell("search", part), most=most // 2)
         weights = new
     return given, base, weights, p
 

@@ -21,7 +21,7 @@ from origami_sim.fit.least_squares import Fit, carried_on, fit
 from origami_sim.fit.linear import Linearisation, Weights
 from origami_sim.fit.predictor import Predictor
 
-UNFITTED = 0.05
+UNFITTED = 0.1
 """Posterior of a set that has not been fitted, below which the search ends."""
 
 FAR = 1.5
@@ -34,7 +34,7 @@ So far from what was recorded linear estimates say little, and all is judged by 
 FITS = 16
 """Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
 
-KEPT = 6
+KEPT = 4
 """Fitted sets that are fitted again when weights change: the leaders."""
 
 PARTNERS = 12

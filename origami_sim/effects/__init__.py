@@ -16,7 +16,7 @@ from origami_sim.effects._effect import (
     Parameter,
     scalar,
 )
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, nearest
 
 __all__ = [
     "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "SHELLS", "Effect", "Memory", "Parameter",
@@ -41,5 +41,6 @@ CATALOGUE: dict[str, Effect] = _discover()
 def get(name: str) -> Effect:
     """The effect of that name; raises InputError naming the catalogue if there is none."""
     if name not in CATALOGUE:
-        raise InputError("there is no such effect", field="effect", value=name, allowed=", ".join(CATALOGUE))
+        fault = f"there is no such effect{nearest(name, CATALOGUE)}"
+        raise InputError(fault, field="effect", value=name, allowed=", ".join(CATALOGUE))
     return CATALOGUE[name]

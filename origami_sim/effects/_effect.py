@@ -115,11 +115,14 @@ class Effect:
             what is fitted with it and has its unit); elsewhere the law is not called.
         magnet: dipole moment of a triangle [A m^2] and its place [m], for a law that asks for the stray field. That is
             multiplied by the effect's strength, the mean of both triangles', so that action equals reaction.
+        uneven: whether it often differs along a device as it was made: stretches of a beam are then suspected, too.
         conservative: True if `force` is minus the gradient of `energy` and nothing else; the energy balance then uses
             the energy, and the time-integrated work otherwise.
         stiffness: from the parameters, the largest slope of the force against its own coordinate, per entity; used to
             bound the time step. None means that the effect never limits it. A node's law also finds "mass" there.
         damping: likewise, the slope against the rate.
+        inertia: of a node's law, the mass [kg] that it adds to each node, likewise from the parameters and "mass", the
+            mass without it: what moves the node is then heavier, and the force is the weight that goes with it.
         formula, source, matters, confused_with, separated_by: prose for the catalogue.
     """
 
@@ -140,10 +143,12 @@ class Effect:
     fitted: tuple[str, ...] = ()
     stated: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    uneven: bool = False
     conservative: bool = False
     memory: tuple[Memory, ...] = ()
     stiffness: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
     damping: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
+    inertia: Callable[[Mapping[str, np.ndarray]], np.ndarray] | None = None
     arguments: tuple[str, ...] = field(init=False)
     energy_arguments: tuple[str, ...] = field(init=False)
 
@@ -169,6 +174,8 @@ class Effect:
         local = {"field", "gradient", "voltage"} & set(self.drives)
         if self.family in SHELLS and (local or self.memory):
             raise ValueError(f"effect '{self.name}': the family '{self.family}' offers no memory, field or voltage")
+        if self.inertia is not None and self.family != "node":
+            raise ValueError(f"effect '{self.name}': only nodes have a mass to add to, not the family '{self.family}'")
         if self.interacts and (self.magnet is None or not self.fitted):
             raise ValueError(f"effect '{self.name}': a law that asks for the stray field needs a magnet and a strength")
 

@@ -33,6 +33,7 @@ EFFECT = Effect(
         Parameter("rest_angle", "theta0", "rad", 0.0, (-math.pi, math.pi), "that of the crease", typical=0.0),
     ),
     fitted=("stiffness_change",),
+    uneven=True,
     stiffness=lambda p: np.abs(p["stiffness_change"]),
     formula="M = -dK (theta - theta0)",
     source="K ~ h^3: 5 % of thickness are 15 %; a layer of grease or tape doubles D; debonding lengthens the bridge",

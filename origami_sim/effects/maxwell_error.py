@@ -51,6 +51,7 @@ EFFECT = Effect(
         Parameter("maxwell_gain", "e", "-", 0.0, (-1.0, 3.0), "relative error of the moment", typical=0.1),
     ),
     fitted=("maxwell_gain",),
+    uneven=True,
     formula="M = e M_Maxwell, beside M_Maxwell of maxwell_stress",
     source="half the pressure on each face (seed paper) against p = eps_r eps0 (V/t)^2: e = -1/2; overlap 1 - d / b",
     matters="1/2 for a pressure applied by halves; 5 to 10 % for misaligned or uneven electrodes, permittivity",

@@ -21,6 +21,7 @@ EFFECT = Effect(
         Parameter("rest_angle", "phi0", "rad", 0.0, (-math.pi, math.pi), "that of the line", typical=0.0),
     ),
     fitted=("stiffness_change",),
+    uneven=True,
     stiffness=lambda p: np.abs(p["stiffness_change"]),
     formula="M = -dk (phi - phi0)",
     source="plate hinge, see panel_bending",

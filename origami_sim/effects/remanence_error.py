@@ -50,6 +50,7 @@ EFFECT = Effect(
         Parameter("remanence_gain", "e", "-", 0.0, (-1.0, 3.0), "relative error of the moment", typical=0.1),
     ),
     fitted=("remanence_gain",),
+    uneven=True,
     formula="U = -e m . B, beside -m . B of magnetic_torque",
     source="rigid moment of another size; demagnetising field: M = Mr + chi (H - N M), Joseph & Schloemann 1965",
     matters="weak magnetising field, volume fraction, demagnetising factor (-0.3 to -2 % in plane)",

@@ -66,7 +66,8 @@ def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> D
             local = np.unique(np.concatenate([local, _knots(s.times, starts, duration)]))
         values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
         changed[name] = series(local, np.tile(values, (1, repeat)))
-    return drive.replace(**changed)
+    age = np.squeeze(drive.signals["origin"](0.0))
+    return drive.replace(**changed, origin=age + np.tile(starts, repeat))
 
 
 def _knots(times: np.ndarray, starts: np.ndarray, duration: float) -> np.ndarray:

@@ -7,24 +7,18 @@ About a fit, whitened residuals are
 with nominal numbers N, the fit's own effects H, further effects G_J, *flaws* b (every suspect of the catalogue acts a
 little in every device), a *discrepancy* c that is smooth in each channel, and one in the forces, which is the variance
 of the gaps between tied segments (see `linear`). All priors are normal but those of strengths, which are mixtures of
-normals on the scale of detectability d'. So all that is unknown is summed out in closed form, in Laplace's
-approximation for strengths (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
+normals on the scale of detectability d'. So all that is unknown is summed out in closed form, with the
+leading normal of each mixture (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
-
-ROUNDS = 4
-"""Times that the mode of strengths is found, each with the prior's curvature at the last one.
-
-Without the curvature two effects that look the same would have a volume far beyond what the prior gives them.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,23 +155,23 @@ class Summed:
         a = self.gram[sets.columns[:, :, None], sets.columns[:, None, :]]
         b = np.take_along_axis(right, sets.columns, axis=1)
         norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
-        # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
-        wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
-        tight = np.where(sets.strength, norm / hyper.widest, 1.0 / wide)
-        full, inverse, value, move = a, a, sets.at, sets.at
-        for turn in range(ROUNDS):
-            if turn:  # as narrow as the normals are that a strength of this size may come from
-                tight = np.where(sets.strength, norm * _narrow(value * norm, hyper), tight)
+        shape = 1.0 / np.where(np.isfinite(sets.spread), sets.spread, 1e6)
+        slabs = np.array(hyper.slabs)
+        tight = np.where(sets.strength, norm / slabs[-1], shape)
+        for last in (False, True):
+            # of the mixture that is a strength's prior, the normal that is as wide as the strength is large
             full = a + np.eye(k) * (tight**2)[:, None, :]
             inverse = np.linalg.inv(full)
             move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
             value = sets.at + move
+            if not last:
+                size = np.abs(np.log(np.maximum(np.abs(value * norm), 1e-9)[:, :, None] / slabs))
+                tight = np.where(sets.strength, norm / slabs[np.argmin(size, axis=2)], shape)
         sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
         left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
-        out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
-        slab = _log_slab(value * norm, hyper) + np.log(norm)
-        shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
-        out += np.sum(np.where(sets.strength, slab, shape), axis=1)
+        out = self.log - 0.5 * (left + np.sum((value * tight) ** 2, axis=1))
+        out += np.sum(np.log(tight), axis=1) - 0.5 * np.linalg.slogdet(full)[1]
+        out -= np.sum(sets.strength, axis=1) * np.log(len(slabs))
         out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
         return out, value
 
@@ -196,22 +190,3 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     by = np.linalg.solve(root, cross)
     gram = p.gram[np.ix_(rows, rows)] - by.T @ by
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
-
-
-def _log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Log densities [..., s] of a strength at detectability d' under each of the normals, equally likely."""
-    widths = np.array(hyper.slabs)
-    log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
-    return log - np.log(len(widths))
-
-
-def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Log density of a strength at detectability d': a mixture of normals."""
-    return logsumexp(_log_slabs(d, hyper), axis=-1)
-
-
-def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """One over the root mean square width of the normals, each as probable as it is at detectability d'."""
-    log = _log_slabs(d, hyper)
-    share = np.exp(log - logsumexp(log, axis=-1, keepdims=True))
-    return np.sqrt(share @ (1.0 / np.square(hyper.slabs)))

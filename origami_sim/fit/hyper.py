@@ -29,11 +29,6 @@ class Hyper:
     flaws: tuple[float, ...] = (2.0, 8.0, 32.0, 128.0)
     fewer: float = 0.3
 
-    @property
-    def widest(self) -> float:
-        """Strengths beyond this detectability are not told from each other."""
-        return 10.0 * self.slabs[-1]
-
     @cached_property
     def cells(self) -> list[tuple[float, float, float]]:
         """All combinations of gaps, smooth and flaws."""

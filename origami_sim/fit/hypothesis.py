@@ -11,6 +11,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.entities import tune
 from origami_sim.model import Model, Parameters, magnets
+from origami_sim.places import across, points, stretches
 from origami_sim.recording import Recording
 from origami_sim.scene import Settings
 
@@ -56,6 +57,7 @@ class Suspect:
         entities: entities of the family; None for all. sites: of how many sites, equally likely, it is at
             one.
         more: whether the model has the effect, and more or less of it is suspected.
+        stretch: whether the site is a stretch of a beam, not one crease or panel.
     """
 
     effect: str
@@ -65,6 +67,7 @@ class Suspect:
     entities: tuple[int, ...] | None = None
     sites: int = 1
     more: bool = False
+    stretch: bool = False
 
     @property
     def label(self) -> str:
@@ -250,6 +253,9 @@ PLAUSIBLE = 10.0
 ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
 """Parameters of a node that stand for its reference position."""
 
+ACROSS = ("across_x", "across_y", "across_z")
+"""Parameters that stand for the direction across the plane in which the device folds."""
+
 
 def apply(
     parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float] | np.ndarray, model: Model
@@ -271,6 +277,9 @@ def apply(
                 continue
             if p.name in ANCHORS:  # tied where it was when it was undeformed
                 out.set(s.effect, p.name, model.position[:, ANCHORS.index(p.name)])
+                continue
+            if p.name in ACROSS:
+                out.set(s.effect, p.name, across(model)[ACROSS.index(p.name)])
                 continue
             donor = next(
                 (
@@ -332,10 +341,14 @@ def suspects(
         if effect.interacts and not (parameters and _several_magnets(model, parameters)):
             continue
         sites = _sites(model, effect.family)
-        if effect.interacts:  # of one panel with itself there is none
+        if effect.interacts or any(p.name in ACROSS for p in effect.parameters):
+            # magnets act on each other, and the field's form is one for all of them
             sites = [("all panels", "panel", None)]
         if any(p.name in ANCHORS for p in effect.parameters):
             sites += _edges(model)
+        if effect.inertia is not None:  # what was added sits at a point, what was mistaken is a panel's
+            at = [*_edges(model), *points(model)] if _in_kilograms(effect) else []
+            sites = at or [*sites, *_panels(model)]
         if effect.family == "measurement":
             sites = _channel_sites(recordings[0], effect.channels)
             if effect.on_body and len(sites) > 1:  # each marker is beside its own point
@@ -343,6 +356,10 @@ def suspects(
         for site, kind, entities in sites:
             free = tuple(_free(name, p, entities) for p in effect.fitted)
             found.append(Suspect(name, site, kind, free, entities, _among(effect.family, sites, entities)))
+        parts = stretches(model, effect.family) if effect.uneven else []
+        for site, kind, entities in parts:
+            free = tuple(_free(name, p, entities) for p in effect.fitted)
+            found.append(Suspect(name, site, kind, free, entities, len(parts) + 1, stretch=True))
     return found
 
 
@@ -446,6 +463,23 @@ def _edges(model: Model):
     return out if len(out) > 1 else []
 
 
+def _panels(model: Model):
+    """Nodes of each panel that can move, with those that stand for its mass if it is rigid."""
+    first = len(model.position) - len(model.carriers)
+    labels = named([model.name("panel", p) for p in model.triangle_panel])
+    out = []
+    for panel, triangles in labels.items():
+        nodes = np.unique(model.triangles[triangles])
+        carried = np.isin(model.carriers, model.triangle_panel[triangles])
+        if np.any(model.free[nodes]):
+            out.append((panel, "panel", (*map(int, nodes), *map(int, first + np.flatnonzero(carried)))))
+    return out if len(out) > 1 else []
+
+
+def _in_kilograms(effect) -> bool:
+    return effect.parameter(effect.fitted[0]).unit == "kg"
+
+
 def _free(effect: str, name: str, entities) -> Free:
     p = get(effect).parameter(name)
     assert p.typical is not None
@@ -469,12 +503,28 @@ SITES = 4
 
 
 def told_apart(every: Sequence[Suspect], channels: int) -> list[Suspect]:
-    """The suspects; of many more creases or panels than channels (a beam of cells), only all of them together."""
+    """The suspects; of many more creases or panels than channels (a beam of cells), only all together or in stretches.
+
+    Where single ones are told apart there are no stretches.
+    """
+    beam = False
     for kind in ("crease", "panel"):
-        sites = {s.site for s in every if s.kind == kind and s.entities is not None}
+        sites = {s.site for s in every if s.kind == kind and s.entities is not None and not s.stretch}
         if len(sites) > SITES * channels:
-            every = [s for s in every if s.kind != kind or s.entities is None]
-    return list(every)
+            every, beam = [s for s in every if s.kind != kind or s.entities is None or s.stretch], True
+    if not beam:
+        return [s for s in every if not s.stretch]
+    parts: dict[str, set[int]] = {}
+    for s in every:
+        if s.stretch:
+            parts.setdefault(s.effect, set()).update(s.entities or ())
+    return [_all_of(s, parts[s.effect]) if s.effect in parts and s.entities is None else s for s in every]
+
+
+def _all_of(s: Suspect, entities: set[int]) -> Suspect:
+    """A suspect of all entities that names them: stretches overlap, so that its signature is not the sum of theirs."""
+    mine = tuple(sorted(entities))
+    return replace(s, entities=mine, free=tuple(replace(f, entities=mine) for f in s.free))
 
 
 CONSTANTS = 4

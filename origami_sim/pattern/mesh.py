@@ -48,6 +48,8 @@ def read_mesh(path, *, unit="m", size=None, scale=None) -> Pattern:
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise InputError("no triangles in the mesh", file=path)
     vertices, triangles = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3:  # OBJ vertices of two numbers
+        raise InputError("a vertex has not three coordinates", file=path, field="v", allowed="v x y z")
     if suffix == ".stl":
         vertices, triangles = _merged(vertices, triangles)
     notes = []

@@ -15,6 +15,7 @@ from xml.parsers import expat
 import numpy as np
 
 from ..errors import InputError
+from .svg_traps import defuse
 
 SHAPES = ("line", "path", "rect", "polygon", "polyline", "circle", "ellipse")
 UNSEEN = ("marker", "mask", "metadata", "foreignObject", "linearGradient", "radialGradient", "filter", "script")
@@ -127,6 +128,7 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
         for child in [c for c in parent if _tag(c) in UNSEEN]:
             parent.remove(child)
     _refuse_explosion(root, file)
+    defuse(root, file=file)
     drawing = Drawing()
     try:
         tree = svg.SVG.parse(io.BytesIO(ElementTree.tostring(root)), reify=True, ppi=96.0, on_error="raise")

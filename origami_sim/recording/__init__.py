@@ -1,5 +1,6 @@
 """Recordings of real objects: read, lint, noise, initial states, and an independent stand-in."""
 
+from origami_sim.recording.axes import Axes, mistaken_axes
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.dataset import DataSet, read_dataset
 from origami_sim.recording.drives import applied_drive, by_component
@@ -14,6 +15,7 @@ from origami_sim.recording.stated import Gravity, Start
 
 __all__ = [
     "AngleEstimate",
+    "Axes",
     "Camera",
     "Channel",
     "DataSet",
@@ -31,6 +33,7 @@ __all__ = [
     "initial_angles",
     "lint",
     "lint_report",
+    "mistaken_axes",
     "noise_report",
     "read_dataset",
     "read_recording",

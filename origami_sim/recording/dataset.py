@@ -1,6 +1,5 @@
 """Several recordings of one object: the same channels under different drives."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_toml
 from origami_sim.recording.reader import read_recording
 from origami_sim.recording.recording import Recording
-from origami_sim.recording.table import first_line, read_bytes
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".c3d")
 
@@ -120,10 +119,7 @@ def read_dataset(source: str | Path | Sequence[str | Path], *, sidecar: str | Pa
 
 
 def _listing(path: Path) -> DataSet:
-    try:
-        tree = tomllib.loads(read_bytes(path).decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"is no valid TOML: {first_line(error)}", file=path) from error
+    tree = read_toml(path)
     _check_keys(path, "", tree, ("name", "sidecar", "recordings"))
     entries = tree.get("recordings")
     if not isinstance(entries, list) or not entries:

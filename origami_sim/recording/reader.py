@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_bytes
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.lint import Series, lint
 from origami_sim.recording.noise import noise_report
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.sidecar import Sidecar
-from origami_sim.recording.table import Table, read_bytes, read_table
+from origami_sim.recording.table import Table, read_table
 from origami_sim.recording.trackers import FORMATS, detect, read_export
 from origami_sim.recording.units import si_unit, unit_factor
 

@@ -53,7 +53,7 @@
     times = [0.0, 1.0]                  # or samples stated here [s], with values = [0.0, 5.0]
 
     [scene]
-    name = "pendulum_chain"             # the scene that simulates this object
+    name = "pendulum_chain"             # the scene that simulates this object, or the device: "my_flap.py"
     overrides = { mass_1 = 0.09 }       # settings of this object that differ; not over a calibration of its own
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
@@ -74,10 +74,10 @@
     sd = "0.01 rad"                     # how well they, or the equilibrium, are known
     rate_sd = "0.01 rad/s"              # and how well that it rests
 
-Any other key is an error. Units: see `origami_sim.recording.units`.
+Any other key is an error. Units: see `origami_sim.units`.
 """
 
-import tomllib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,11 +86,12 @@ from typing import Any
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_toml
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
 from origami_sim.recording.stated import Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
-from origami_sim.recording.table import Table, first_line, read_bytes
+from origami_sim.recording.table import Table
 from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
 
@@ -155,10 +156,7 @@ class Sidecar:
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
         """Read and check a sidecar; InputError names the first key that is wrong."""
-        try:
-            tree = tomllib.loads(read_bytes(path).decode("utf-8"))
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError(f"is no valid TOML: {first_line(error)}", file=path) from error
+        tree = read_toml(path)
         top = Section(path, "", tree, _TOP_KEYS)
         channels = top.table("channels")
         if not channels:
@@ -185,7 +183,9 @@ class Sidecar:
             channels={name: _channel_spec(path, name, table, cameras) for name, table in channels.items()},
             cameras=cameras,
             drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
-            scene={"name": scene.text("name", None), "overrides": scene.table("overrides")} if scene.values else {},
+            scene={"name": _device(scene.text("name", None)), "overrides": scene.table("overrides")}
+            if scene.values
+            else {},
             priors={name: prior_spec(top, name) for name in top.table("priors")},
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
@@ -228,6 +228,11 @@ class Sidecar:
                 field="time.rate_hz",
                 value=rate,
             )
+
+
+def _device(stated: str | None) -> str | None:
+    """The name of a scene or device; of a device's file, which nothing here opens, its stem."""
+    return stated and re.sub(r"(.*/)?(\w+)\.(py|toml)(:\w+)?", r"\2", stated)
 
 
 def _source_spec(path: Path, given: object) -> dict[str, Any]:

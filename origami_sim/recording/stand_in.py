@@ -60,3 +60,48 @@ def stand_in_double_pendulum(
 def stand_in_start(seed: int) -> np.ndarray:
     """(4,) true initial state [theta1, theta2, w1, w2] of the stand-in with this seed [rad, rad/s]."""
     return np.random.default_rng([seed, 0]).normal([2.6, 3.5, 7.8, -1.5], [0.05, 0.05, 0.3, 0.3])
+
+
+def write_stand_in_sidecar(path_csv: str | Path) -> Path:
+    """Writes the sidecar of a stand-in beside it, with what an experimenter would know; returns its path."""
+    path = Path(path_csv).with_suffix(".toml")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.write_text(_SIDECAR, encoding="utf-8")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+_SIDECAR = """\
+# Made by `origami-sim demo`: rigid arms in an independent integration, with something that the model lacks.
+name = "stand_in"
+description = "free swing of a two-hinge chain; angles are absolute, from the upright vertical (hanging still is pi)"
+source = "origami_sim.recording.stand_in"
+
+[time]
+column = "time_s"
+unit = "s"
+
+[channels.theta1]
+column = "theta1_rad"
+kind = "panel_angle"
+unit = "rad"
+panel = "arm1"
+
+[channels.theta2]
+column = "theta2_rad"
+kind = "panel_angle"
+unit = "rad"
+panel = "arm2"
+
+[scene]
+name = "pendulum_chain"
+
+[priors]  # how well the numbers of the model are known; what is not named is taken as exact
+mass_1 = "1 %"
+mass_2 = "1 %"
+viscosity_1 = "20 %"
+viscosity_2 = "20 %"
+"""

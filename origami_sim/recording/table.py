@@ -79,8 +79,7 @@ class Table:
         """Raises InputError where one of these columns is missing."""
         for name in columns:
             if name not in self.numbers:
-                known = list(self.numbers)
-                shown = ", ".join(known[:24]) + (", ..." if len(known) > 24 else "")
+                shown = _some(list(self.numbers))
                 raise InputError(f"column '{name}' is missing", file=self.file, field="column", allowed=shown)
 
     def check_numbers(self) -> "Table":
@@ -110,14 +109,6 @@ def _plain(label: object) -> object:
         return label
 
 
-def read_bytes(path: Path) -> bytes:
-    """The file as bytes; InputError where it cannot be read."""
-    try:
-        return path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
-        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}", file=path) from error
-
-
 def read_table(path: Path, data: bytes, columns: list[str], labels: list[str]) -> Table:
     """Read the needed columns of a CSV or Parquet file; every cell is finite or nan."""
     suffix = path.suffix.lower()
@@ -132,11 +123,17 @@ def read_table(path: Path, data: bytes, columns: list[str], labels: list[str]) -
     return table.check_numbers()
 
 
+def _some(names: list[str]) -> str:
+    """The first names, so that a sentence stays one: names of a damaged file may be long and many."""
+    shown = ", ".join(name[:40] for name in names[:24])
+    return shown + (f", ... ({len(names)} in all)" if len(names) > 24 else "")
+
+
 def _check_columns(path: Path, wanted: list[str], header: list[str]) -> None:
     for name in wanted:
         if header.count(name) != 1:
             fault = "is missing" if name not in header else "appears more than once"
-            raise InputError(f"column '{name}' {fault}", file=path, field="column", allowed=", ".join(header))
+            raise InputError(f"column '{name}' {fault}", file=path, field="column", allowed=_some(header))
 
 
 def _read_parquet(path: Path, data: bytes, columns: list[str], labels: list[str]) -> Table:

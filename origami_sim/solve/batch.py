@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from origami_sim.drive import Drive
+from origami_sim.drive import CHANNELS, Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State, magnets
+from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import plates
 from origami_sim.solve.compose import BITS, compose
 
@@ -89,7 +89,7 @@ class Batch:
         def constant(a, dtype):
             return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
-        groups = len(drive.signals) - 14
+        groups = len(drive.signals) - len(CHANNELS)
         if len(model.electrodes) and model.electrodes.max(initial=0) >= groups:
             raise InputError(
                 "the drive has too few electrode groups",
@@ -108,6 +108,7 @@ class Batch:
             )
         interacting = next((e.name for e in laws if e.interacts), None)
         none = np.full(len(model.triangles), -1, np.int32)
+        self._mass = node_mass(model, parameters)
         self.magnets = none if interacting is None else magnets(model, parameters, interacting)
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
@@ -149,7 +150,6 @@ class Batch:
         self._status = self._upload(state.status, wp.int32)
         self._nothing = wp.zeros((0, 1, 1), dtype=wp.vec3d, device=self.device)
         self._no_angles = wp.zeros((0, 1, 1), dtype=wp.float64, device=self.device)
-        self._mass = parameters["inertia", "mass"]
 
     def _acting(self, parameters: Parameters) -> np.ndarray:
         """[words, W] bits of the program's effects that have a strength anywhere in a world."""
@@ -171,7 +171,10 @@ class Batch:
             if owner in absent:  # one value for all of its entities
                 layout.append((default, 0, 0))
                 continue
-            a = waves[name] if owner == "drive" else parameters[owner, name]
+            if owner == "drive":
+                a = waves[name]
+            else:
+                a = self._mass if (owner, name) == ("inertia", "total") else parameters[owner, name]
             if (owner, name) == ("plane", "reach"):  # no contact law may be cut off
                 reaches = [
                     parameters[e.name, "reach"].max()

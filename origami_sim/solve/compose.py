@@ -20,11 +20,12 @@ from origami_sim.solve import articulated, plates, runge_kutta, templates
 from origami_sim.solve.compose_sheets import Sheets, Text
 from origami_sim.solve.wave import wave
 
-FIELD, GRADIENT, TEMPERATURE, LOAD, VOLTAGE = 0, 3, 12, 13, 14
+FIELD, GRADIENT, TEMPERATURE, LOAD, ORIGIN, VOLTAGE = 0, 3, 12, 13, 14, 15
 """First drive channel of each quantity; voltages of further electrode groups follow."""
 
 FIXED_SLOTS = (
     ("inertia", "mass"),
+    ("inertia", "total"),
     ("plane", "tilt"),
     ("plane", "azimuth"),
     ("plane", "height"),
@@ -188,6 +189,8 @@ class _Composer(Sheets):
                 given.append("P")
             elif name == "dt":
                 given.append("h")
+            elif name == "time":
+                given.append("age")
             else:
                 given.append(renamed.get(name, name))
         return f"{effect.name}_{which}({', '.join(given)})"
@@ -248,6 +251,8 @@ class _Composer(Sheets):
             t(f"temperature = {self.channel(str(TEMPERATURE))}")
         if "load" in self.drives:
             t(f"load = {self.channel(str(LOAD))}")
+        if "time" in self.drives:
+            t(f"age = time + {self.channel(str(ORIGIN))}")
         for e in self.effects:
             if mode in MOVING and e.exchanges_work:
                 t(f"power_{e.name} = scalar(0.0)")
@@ -542,7 +547,7 @@ class _Composer(Sheets):
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
-        mass = self.value("inertia", "mass", "n")
+        mass = self.value("inertia", "total", "n")
         return {
             "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass),
             "rigid": templates.RIGID.format(**given, body=self.body("rigid")),

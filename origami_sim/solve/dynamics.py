@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,13 +11,18 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_inside_the_ground
+from origami_sim.quantities import converted
 from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
 from origami_sim.solve.rigid import TOLERANCE as RIGID
 from origami_sim.solve.rigid import batch_of
 from origami_sim.solve.timestep import TimeStep, stable_step
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PER_STEP = 0.01
 """Error of a step of rigid panels over the accuracy asked for, to begin with: runs of tens of steps add up to it.
@@ -38,7 +44,7 @@ class Failure:
         return f"world {self.world} went unstable at t = {self.time:.6g} s at node {self.node}: {self.cause}"
 
 
-@dataclass
+@dataclass(repr=False)
 class Trajectory:
     """Frames of a run.
 
@@ -75,6 +81,22 @@ class Trajectory:
     notes: list[str] = field(default_factory=list)
     energy_error: np.ndarray | None = None
 
+    def __repr__(self) -> str:
+        from origami_sim.view.summary import trajectory_line  # only who looks pays for it
+
+        return trajectory_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.summary import trajectory_html
+
+        return trajectory_html(self)
+
+    def plot(self, *, world: int = 0) -> "Figure":
+        """Fold angles, displacement and drive over time, as a Matplotlib figure (`view.plot.plot_trajectory`)."""
+        from origami_sim.view.plot import plot_trajectory
+
+        return plot_trajectory(self, world=world)
+
     @property
     def creases(self) -> np.ndarray:
         """Fold angles of the creases [F, C, W] [rad], valley positive."""
@@ -82,7 +104,7 @@ class Trajectory:
 
     def centre_of_mass(self) -> np.ndarray:
         """[F, W, 3] [m]."""
-        m = self.parameters["inertia", "mass"][None, :, :, None]
+        m = node_mass(self.model, self.parameters)[None, :, :, None]
         return (m * self.x).sum(1) / m.sum(1)
 
     def energy_balance(self) -> np.ndarray:
@@ -102,9 +124,9 @@ def simulate(
     parameters: Parameters,
     drive: Drive | None = None,
     *,
-    duration: float,
-    rate: float = 60.0,
-    dt: float | None = None,
+    duration: float | str,
+    rate: float | str = 60.0,
+    dt: float | str | None = None,
     state: State | None = None,
     method: str = "explicit",
     spectral_radius: float = 1.0,
@@ -127,7 +149,7 @@ def simulate(
     numerical damping (see `solve.implicit`), world after world, on the CPU.
 
     Args:
-        duration: simulated time [s], rounded to whole frames. rate: frames per second.
+        duration: simulated time [s], rounded to whole frames, or a quantity ("200 ms"). rate: frames per second.
         dt: step [s]; default SAFETY times the stability limit of the stiffest element. Implicit: any length, halved
             only where Newton finds no solution; by default adapted within each frame.
         state: where to start (default: the reference state at rest); its worlds must match.
@@ -143,11 +165,13 @@ def simulate(
 
     Raises:
         InputError: duration or rate not positive, no such method, a step above the limit, a drive that ends early,
-            worlds that differ, no such accuracy; implicit: another device, spectral radius or tolerance out of bounds.
+            worlds that differ, no such accuracy, a start inside the ground; implicit: another device, spectral radius
+            or tolerance out of bounds.
     """
-    options = {
-        "duration": duration,
-        "rate": rate,
+    dt = converted(dt, "s", "dt")
+    options: dict[str, Any] = {
+        "duration": converted(duration, "s", "duration"),
+        "rate": converted(rate, "Hz", "rate"),
         "dt": dt,
         "state": state,
         "method": method,
@@ -210,6 +234,7 @@ def _simulated(
             value=duration,
             allowed=f">= {frame_time:g} s at this rate",
         )
+    rests = state is None
     if state is None:
         worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
@@ -240,6 +265,8 @@ def _simulated(
     for i in range(frames + 1):
         batch.advance(substeps if i else 0, step, speed_limit)  # no steps: only the first force evaluation
         record.append((batch.state(), batch.evaluate(batch.step * step)))
+        if i == 0 and rests and "ground" in model.laws:
+            refuse_start_inside_the_ground(model, parameters, record[0][0].x, record[0][1].energies["ground"])
         if progress:
             progress(i / frames)
     wall = clock.perf_counter() - began
@@ -273,7 +300,11 @@ def _simulated(
         step=chosen,
         state=last,
         wall=wall,
-        notes=batch.notes() if isinstance(batch, Implicit) else [],
+        notes=[
+            *idle_drives(model, parameters, drive),
+            *below_the_ground(model, parameters, last.x),
+            *(batch.notes() if isinstance(batch, Implicit) else []),
+        ],
     )
     out.energy_error = energy_error(out)
     return out

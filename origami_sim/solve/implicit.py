@@ -35,7 +35,7 @@ import warp as wp
 from origami_sim.drive import Drive
 from origami_sim.effects import DISTORTIONS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.solve import compose
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import STEP, _System
@@ -279,7 +279,7 @@ class _World:
         self.first = min(stable_step(model, parameters).dt, 1.0)  # infinite where nothing is stiff
         self.system = _System(model, parameters, drive, state)
         self.free = self.system.free
-        self.mass = np.broadcast_to(parameters["inertia", "mass"], (len(model.position), 1))
+        self.mass = np.broadcast_to(node_mass(model, parameters), (len(model.position), 1))
         self._ends = _Copies(model, parameters, drive, state, scheme, np.arange(3), 1)
         self._colours = self.system._colours
         self._steps = DIFFERENCE / STEP * self.system._steps

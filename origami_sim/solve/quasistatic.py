@@ -20,7 +20,8 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.oversights import below_the_ground, idle_drives
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.settling import Settling, levels, settling
@@ -73,7 +74,7 @@ class Jump:
         )
 
 
-@dataclass
+@dataclass(repr=False)
 class QuasiStatic(Trajectory):
     """Frames of a quasi-static motion: a `Trajectory` at rest, of which work is summed from frame to frame.
 
@@ -343,6 +344,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
         steps=march.steps,
     )
     out.notes = [f"Quasi-static: {len(times)} frames, {march.steps} equilibria.", *(f"{j}." for j in march.jumps)]
+    out.notes += [*idle_drives(model, parameters, drive), *below_the_ground(model, parameters, out.x[-1])]
     out.notes += _left_out(out, march, states)
     return out
 
@@ -356,7 +358,7 @@ def _left_out(run: QuasiStatic, march: March, states: list[State]) -> list[str]:
     largest, worst = 0.0, {}
     dt = np.diff(run.times)
     rates = np.diff(run.x, axis=0) / dt[:, None, None, None]
-    mass = np.broadcast_to(run.parameters["inertia", "mass"], (run.x.shape[1], worlds))
+    mass = np.broadcast_to(node_mass(run.model, run.parameters), (run.x.shape[1], worlds))
     for f in range(1, len(run.times)):
         if f in jumped:
             continue

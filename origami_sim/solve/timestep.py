@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from origami_sim import curvature
 from origami_sim.effects import CONTACTS, HINGES, Effect, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, node_mass
 
 SAFETY = 0.8
 """Fraction of the stability limit that is used unless a step is given."""
@@ -148,7 +148,7 @@ def stable_step(model: Model, parameters: Parameters) -> TimeStep:
                 allowed=f"1 or {worlds}",
             )
     free = model.free.max(axis=1) > 0
-    mass = np.broadcast_to(parameters["inertia", "mass"], (n, worlds))
+    mass = np.broadcast_to(node_mass(model, parameters), (n, worlds))
     laws = [e for e in map(get, model.laws) if e.family != "triangle" and model.count(e.family)]
     families: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for f in dict.fromkeys(e.family for e in laws):

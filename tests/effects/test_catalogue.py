@@ -13,7 +13,7 @@ import origami_sim.effects
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES, SHELLS
 from origami_sim.errors import InputError
-from origami_sim.model import Parameters
+from origami_sim.model import Parameters, node_mass
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import tangent
 from origami_sim.solve.timestep import stable_step
@@ -387,7 +387,7 @@ def test_forces_by_effect_add_up_to_the_force_that_moves_the_nodes():
     added = sum(report.forces.values())
     total = batch.total_force(0.0)
     batch.advance(0, 1e-4, np.inf)
-    moving = parameters["inertia", "mass"][:, :, None] * batch.state().a
+    moving = node_mass(batch.model, parameters)[:, :, None] * batch.state().a
     scale = np.abs(total).max()
     assert np.abs(total - added).max() <= 1e-12 * scale
     assert np.abs(moving - added).max() <= 1e-12 * scale
@@ -399,7 +399,7 @@ def test_forces_by_effect_add_up_after_a_step_too():
     batch = Batch(model, parameters, drive, state)
     batch.advance(1, 1e-4, np.inf)
     added = sum(batch.evaluate(1e-4).forces.values())
-    moving = parameters["inertia", "mass"][:, :, None] * batch.state().a
+    moving = node_mass(batch.model, parameters)[:, :, None] * batch.state().a
     assert np.abs(moving - added).max() <= 1e-12 * np.abs(added).max()
     assert np.abs(batch.total_force(1e-4) - added).max() <= 1e-12 * np.abs(added).max()
 

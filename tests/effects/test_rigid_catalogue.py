@@ -9,6 +9,7 @@ from effects.test_catalogue import NOW, give, responsible, the_drive
 
 from origami_sim.articulation import Articulation
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, SHELLS
+from origami_sim.model import node_mass
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.rigid import RigidBatch
@@ -52,6 +53,7 @@ def setting(name, folds):
     give(parameters, model, name, rng)
     mass = rng.uniform(0.5, 1.5, len(model.position))
     parameters.set("inertia", "mass", mass)
+    mass = node_mass(model, parameters)[:, 0]
     arm = Articulation(model)
     rest = arm.reference().angles[:, 0]
 

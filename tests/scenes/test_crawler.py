@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from origami_sim import regression
+from origami_sim.gait import strides
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import crawler
-from origami_sim.study import Store, Trial, checks, judge, run_trials
+from origami_sim.studies.crawler_maps import Store, Trial, checks, judge, run_trials
+from origami_sim.studies.strides import check
 
 REFERENCE = {0.2: (31.0, 3.0), 0.1: (27.5, 3.0), 0.05: (12.0, 1.5)}
 """Planar reference [T]: stride and tolerance [mm]."""
@@ -19,7 +20,7 @@ def walk(cycles=4, calibration="crawler", **changes):
     s = read_calibration(calibration).replace(**changes)
     motion = crawler.walk(s, cycles=cycles, rate=20.0)
     assert not motion.failures, motion.failures[0]
-    return regression.strides(motion, s.frequency) * 1e3, motion
+    return strides(motion, s.frequency) * 1e3, motion
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def test_default_gait_is_steady_and_near_the_paper(default):
 
 
 def test_regression_reference_is_reproduced(default):
-    report = regression.check("crawler", default / 1e3, settings=read_calibration("crawler"))
+    report = check("crawler", default / 1e3, settings=read_calibration("crawler"))
     assert report.same_settings
     assert report.passed, report.text()
 
@@ -84,7 +85,7 @@ def test_equal_patches_and_isotropic_feet_do_not_walk(field):
 
 
 def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
-    # -55.7 mm per cycle: the acceptance band of 1 to 50 mm is missed by 5.7 mm (docs/crawler.md)
+    # -55.7 mm per cycle: the acceptance band of 1 to 50 mm is missed by 5.7 mm (docs/paper/crawler.md)
     stride, _ = walk(8, "crawler_printed")
     assert stride[4:].std() < 0.02 * abs(stride[4:].mean())
     stiffer, _ = walk(8, "crawler_printed", ground_stiffness=2000.0)

@@ -73,7 +73,7 @@ def test_linear_section(settings):
         assert at.moduli[1] == pytest.approx(4 * 73.7e3, rel=1e-3)
         assert at.rigidity == pytest.approx(rigidity, rel=0.01)
     # the passive moment starts with that rigidity and its neutral axis
-    small, share = bender.passive_moment(settings, at, np.array([-1e-3, 1e-3]))
+    small, share = at.passive_moment(np.array([-1e-3, 1e-3]))
     np.testing.assert_allclose(small, np.array([-1e-3, 1e-3]) * at.rigidity, rtol=1e-4)
     np.testing.assert_allclose(share, 1.0, atol=1e-5)
 
@@ -130,7 +130,7 @@ def beam(settings, across: float, along: float) -> float:
     at = bender.section(settings, settings.tape_layers)
     number, active = bender.gravity_number(settings), settings.electrode_length / settings.length
     pressure = 4.7 * 8.8541878128e-12 * (4000 / 272.8e-6) ** 2
-    drive = pressure * at.stack * at.lever * settings.electrode_width / settings.width / at.rigidity * settings.length
+    drive = pressure * at.height * at.lever * settings.electrode_width / settings.width / at.rigidity * settings.length
 
     def solve(drive):
         # th' = m + drive within the electrode; m' from the weight of what lies beyond

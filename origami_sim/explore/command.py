@@ -1,0 +1,130 @@
+"""`origami-sim sweep`: a device's settings varied, and what it does at each of them as a table."""
+
+import sys
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from origami_sim.device import device_module, lasting
+from origami_sim.errors import InputError, nearest
+from origami_sim.explore.found import Device, Found, Measure, Way, at
+from origami_sim.explore.sweep import ROWS, Sweep, sweep
+from origami_sim.printing import print_json
+from origami_sim.quantities import parsed
+from origami_sim.results import check_writable, format_table
+from origami_sim.scene import Setting, Settings, scene_settings
+
+NAMED = 8
+"""Up to so many creases have a column each; half hides some of a gripper's, double makes tables wider than a page."""
+
+
+def run(args: Namespace) -> int:
+    """The command; returns the exit code."""
+    module = device_module(args.device)
+    name = module.__name__.rpartition(".")[2]
+    settings = scene_settings(module).override(args.set, "--set")
+    grid = _grid(settings, args.vary)
+
+    def build(**values):
+        return module.build(settings.replace(**values))
+
+    folder = Path(args.out or f"runs/sweep_{name}")
+    if not (folder / ROWS).is_file():  # an earlier sweep goes on
+        check_writable(folder)
+    first = at(build, {n: v[0] for n, v in grid.items()})
+    duration = None
+    if not args.equilibrium:
+        stated = float(settings["duration"].value) if "duration" in settings else 0.0
+        duration = stated or lasting(first.drive)
+    way = Way(duration=duration, rate=float(settings["rate"].value) if "rate" in settings else 60.0)
+    found = sweep(build, grid, measures(first), way=way, folder=folder, progress=_progress)
+    table = folder / "sweep.parquet"
+    pq.write_table(pa.table(found.columns), table)
+    picture = None
+    if args.pareto:
+        pair = [part.strip() for part in args.pareto.split(",")]
+        if len(pair) != 2:
+            raise InputError(
+                "a front has two measures", field="--pareto", value=args.pareto, allowed="mass_g,-moved_x_mm"
+            )
+        picture = found.draw(folder / "pareto.png", *pair)
+    _tell(args, found, {"table": str(table), **({"pareto": str(picture)} if picture else {})})
+    return 0
+
+
+def measures(d: Device) -> dict[str, Measure]:
+    """What is measured of any device: angles of its creases, the largest turn, its mass, and where it goes."""
+    names = list(dict.fromkeys(d.model.name("crease", c) for c in range(len(d.model.creases))))
+    out: dict[str, Measure] = {}
+    if len(names) <= NAMED:
+        out |= {f"{n.replace(' ', '_')}_deg": _folded(n) for n in names}
+    elif names:
+        out["largest_turn_deg"] = _largest
+    out["mass_g"] = _mass
+    if len(d.model.contacts):
+        out |= {f"moved_{a}_mm": _went(a) for a in "xy"}
+    return out
+
+
+def _folded(crease: str) -> Measure:
+    return lambda found: float(np.degrees(found.angle(crease)))
+
+
+def _largest(found: Found) -> float:
+    start = found.motion.angles[0, :, 0] if found.motion is not None else np.zeros_like(found.angles)
+    turn = (found.angles - start)[: len(found.model.creases)]
+    return float(np.degrees(turn[np.abs(turn).argmax()]))
+
+
+def _mass(found: Found) -> float:
+    return 1e3 * found.mass()
+
+
+def _went(axis: str) -> Measure:
+    return lambda found: 1e3 * found.moved(axis)
+
+
+def _grid(settings: Settings, vary: Sequence[str]) -> dict[str, list]:
+    """Values of the settings that are varied."""
+    out: dict[str, list] = {}
+    for text in vary:
+        name, equals, given = (part.strip() for part in text.partition("="))
+        if not equals or name not in settings:
+            near = "" if name in settings else nearest(name, settings)
+            fault = f"cannot vary this setting{near}"
+            raise InputError(fault, field="--vary", value=text, allowed=", ".join(settings))
+        out[name] = _values(settings[name], given)
+    return out
+
+
+def _values(setting: Setting, given: str) -> list:
+    if isinstance(setting.value, (str, bool)):
+        words = [w.strip() for w in given.split(",")]
+        return [w.lower() == "true" for w in words] if isinstance(setting.value, bool) else words
+    parts = given.split(":")
+    if len(parts) == 3 and parts[2].strip().isdecimal() and int(parts[2]) > 1:
+        low, high = (float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in parts[:2])
+        return np.linspace(low, high, int(parts[2])).tolist()
+    return [float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in given.split(",")]
+
+
+def _progress(part: float) -> None:
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r{100 * part:3.0f} %" + ("\n" if part >= 1 else ""))
+        sys.stderr.flush()
+
+
+def _tell(args: Namespace, found: Sweep, files: Mapping[str, str]) -> None:
+    columns = {n: v.tolist() for n, v in found.columns.items()}
+    if args.json:
+        print_json({"columns": columns, "failures": found.failures, "computed": found.computed, **files})
+        return
+    print(format_table(found.columns))
+    for row, why in found.failures.items():
+        print(f"row {row} is not found: {why}")
+    said = f"{len(found)} points, {found.computed} of them computed now; inputs in SI"
+    print("; ".join([said, *(f"{n}: {f}" for n, f in files.items())]))

@@ -1,0 +1,278 @@
+"""Where a device comes to rest, or how it moves, at many points of its design at once."""
+
+import hashlib
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from origami_sim.device import built, lasting, valued
+from origami_sim.drive import Drive, Signal
+from origami_sim.effects import SHELLS, get
+from origami_sim.errors import InputError, nearest
+from origami_sim.model import Model, Parameters, State
+from origami_sim.quantities import Quantity
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.solve.statics import Equilibrium, equilibrium
+from origami_sim.solve.timestep import stable_step
+
+Build = Callable[..., Any]
+Point = Mapping[str, Any]
+
+TOGETHER = 64
+"""Worlds of one batch: enough for all cores of a desk, and a sweep that is interrupted loses no more than these.
+
+Half loses less and keeps 32 cores busy, double runs as long on fewer than 64 cores.
+"""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a device is found: at rest, or in motion.
+
+    Attributes:
+        duration: of the motion from the reference state [s]; None: the equilibrium. rate: its frames per second.
+        time: instant of the drive at which the equilibrium is meant [s]; None: when the drive has come to its end.
+        follow: equilibria on the way there, along the drive; more where it could settle into another one.
+        dt: step of motions [s]; None: the stable one. threads: CPU threads; None: all cores.
+    """
+
+    duration: float | None = None
+    rate: float = 60.0
+    time: float | None = None
+    follow: int = 1
+    dt: float | None = None
+    threads: int | None = None
+
+
+@dataclass
+class Found:
+    """A device as it was found at one point.
+
+    Attributes:
+        model, parameters, drive: of one world.
+        x: [N, 3] positions [m]. angles: [C + Q] continuous hinge angles [rad], creases first: at rest, or at the end.
+        motion: its frames, or None. equilibrium: or where the search for it stopped, or None.
+        failure: why it was not found; "" if it was. time: of the drive [s]; None: at its end.
+    """
+
+    model: Model = field(repr=False)
+    parameters: Parameters = field(repr=False)
+    drive: Drive = field(repr=False)
+    x: np.ndarray = field(repr=False)
+    angles: np.ndarray
+    motion: Trajectory | None = field(default=None, repr=False)
+    equilibrium: Equilibrium | None = field(default=None, repr=False)
+    failure: str = ""
+    time: float | None = None
+
+    def angle(self, crease: int | str) -> float:
+        """Fold angle of a crease [rad] by its number or name; the mean of those that share a name.
+
+        Raises:
+            InputError: there is no such crease.
+        """
+        names = [self.model.name("crease", c) for c in range(len(self.model.creases))]
+        own = [c for c, n in enumerate(names) if crease in (c, n)]
+        if not own:
+            raise InputError(
+                f"there is no such crease{nearest(str(crease), names)}",
+                field="crease",
+                value=crease,
+                allowed=", ".join(dict.fromkeys(names)),
+            )
+        return float(np.mean(self.angles[own]))
+
+    def mass(self) -> float:
+        """Of everything [kg]."""
+        return float(self.parameters["body", "mass"].sum() or self.parameters["inertia", "mass"].sum())
+
+    def reactions(self) -> np.ndarray:
+        """[N, 3] forces that supports exert on held axes [N], of what is at rest: minus all other forces there.
+
+        Raises:
+            InputError: rigid panels, which share them.
+        """
+        if self.model.panels == "rigid":
+            raise InputError("rigid panels share their supports", field="panels", value="rigid", allowed="elastic")
+        start = State.at_rest(self.model, position=self.x)
+        start.angles = self.angles[:, None].copy()
+        batch = Batch(self.model, self.parameters, self.drive, start, threads=1)
+        force = batch.total_force(lasting(self.drive) if self.time is None else self.time)[:, 0]
+        return np.where(self.model.free > 0, 0.0, -force)
+
+    def moved(self, axis: str = "x") -> float:
+        """How far the centre of mass came along an axis, "x", "y" or "z" [m]."""
+        if axis not in ("x", "y", "z"):
+            raise InputError("there is no such axis", field="axis", value=axis, allowed="x, y, z")
+        mass = self.parameters["inertia", "mass"]
+        start = self.model.position if self.motion is None else self.motion.x[0, :, 0]
+        return float((mass * (self.x - start)).sum(axis=0)["xyz".index(axis)] / mass.sum())
+
+
+Measure = Callable[[Found], float]
+
+
+def angle(crease: int | str) -> Measure:
+    """The measure that is the fold angle of a crease [rad]."""
+    return lambda found: found.angle(crease)
+
+
+def moved(axis: str = "x") -> Measure:
+    """The measure that is the way of the centre of mass along an axis [m]."""
+    return lambda found: found.moved(axis)
+
+
+@dataclass(frozen=True)
+class Device:
+    """A device at one point, before it is found."""
+
+    model: Model
+    parameters: Parameters
+    drive: Drive
+
+
+def at(build: Build, point: Point) -> Device:
+    """The device at a point; other arguments of `build` have their defaults, quantities as numbers.
+
+    Raises:
+        InputError: an argument that `build` has not, a `build` that returns something else.
+    """
+    signature = inspect.signature(build)
+    try:
+        signature.bind(**point)
+    except TypeError as e:
+        raise InputError(f"build() does not take this point ({e})", field="unknowns", value=dict(point)) from None
+    others = {n: valued(p.default) for n, p in signature.parameters.items() if isinstance(p.default, str)}
+    given = {**{n: Quantity(v, unit) for n, (v, unit) in others.items() if isinstance(v, float)}, **point}
+    model, parameters, drive, *_ = built(build(**given), getattr(build, "__module__", None) or "build")
+    return Device(model, parameters, drive)
+
+
+def find(build: Build, points: Sequence[Point], way: Way | None = None) -> list[Found]:
+    """The device at every point, in their order. Motions of devices of the same topology are one batch of worlds.
+
+    Raises:
+        InputError: what `build`, `simulate` and `equilibrium` refuse.
+    """
+    return found([at(build, p) for p in points], way or Way())
+
+
+def found(devices: Sequence[Device], way: Way) -> list[Found]:
+    """See `find`."""
+    if way.duration is None:
+        return [_at_rest(d, way) for d in devices]
+    out: list[Found | None] = [None] * len(devices)
+    groups: dict[str, list[int]] = {}
+    for k, d in enumerate(devices):
+        groups.setdefault(_alike(d), []).append(k)
+    for group in groups.values():
+        for first in range(0, len(group), TOGETHER):
+            part = group[first : first + TOGETHER]
+            for k, one in zip(part, _moving([devices[k] for k in part], way), strict=True):
+                out[k] = one
+    return [f for f in out if f is not None]
+
+
+def _at_rest(d: Device, way: Way) -> Found:
+    end = lasting(d.drive) if way.time is None else way.time
+    state, rest = None, None
+    for time in end * np.arange(1, way.follow + 1) / way.follow:
+        rest = equilibrium(d.model, d.parameters, d.drive, time=float(time), state=state)
+        if not rest.converged:
+            break
+        state = rest.state
+    assert rest is not None
+    failure = "" if rest.converged else rest.message
+    return Found(d.model, d.parameters, d.drive, rest.x, rest.angles, equilibrium=rest, failure=failure, time=end)
+
+
+def _alike(d: Device) -> str:
+    """Digest of what worlds of one batch must share: all of the model but positions, and the instants of the drive.
+
+    Shells keep their reference shape, and magnets that act on each other their neighbours, in the model.
+    """
+    h = hashlib.sha256()
+    fixed = any(get(e).family in SHELLS or get(e).interacts for e in d.model.laws)
+    for f in fields(d.model):
+        if f.name != "position" or fixed:
+            value = getattr(d.model, f.name)
+            h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
+    for name, s in d.drive.signals.items():
+        h.update(name.encode() + (b"" if s.times is None else s.times.tobytes()))
+    return h.hexdigest()
+
+
+def _moving(devices: Sequence[Device], way: Way) -> list[Found]:
+    """Motions of devices that are alike, as worlds of one batch."""
+    model = devices[0].model
+    parameters = Parameters.join([d.parameters for d in devices])
+    drive = _joined([d.drive for d in devices])
+    state, dt = None, way.dt
+    if any(not np.array_equal(d.model.position, model.position) for d in devices):
+        state = State.join([State.at_rest(d.model) for d in devices])
+        steps = [stable_step(d.model, d.parameters).dt for d in devices]
+        if dt is None and np.isfinite(steps[0]):
+            dt = min([*steps, stable_step(model, parameters).dt])
+    elif parameters.worlds == 1 and drive.worlds == 1:
+        devices = [devices[0]] * len(devices)
+    assert way.duration is not None
+    motion = simulate(
+        model, parameters, drive, duration=way.duration, rate=way.rate, dt=dt, state=state, threads=way.threads
+    )
+    worlds = motion.x.shape[2]
+    return [_one(motion, d, w % worlds) for w, d in enumerate(devices)]
+
+
+def _joined(drives: Sequence[Drive]) -> Drive:
+    """The drives of several worlds, sampled at the same instants, as one."""
+
+    def together(values: list) -> Any:
+        same = all(np.array_equal(v, values[0]) for v in values[1:])
+        return values[0] if same else np.array([float(v) for v in values])
+
+    out = {}
+    for name, first in drives[0].signals.items():
+        signals = [d.signals[name] for d in drives]
+        waves = {n: together([getattr(s, n) for s in signals]) for n in ("offset", "amplitude", "frequency", "phase")}
+        values = first.values
+        if values is not None:
+            each = [np.asarray(s.values) for s in signals]
+            values = each[0] if all(np.array_equal(v, each[0]) for v in each[1:]) else np.stack(each, axis=1)
+        scale = together([s.scale for s in signals])
+        out[name] = Signal(**waves, times=first.times, values=values, scale=scale)
+    return drives[0].replace(**out)
+
+
+def _one(motion: Trajectory, d: Device, w: int) -> Found:
+    """One world of a motion."""
+    by_world = {n: {k: v[:, [w]] for k, v in getattr(motion, n).items()} for n in ("energies", "work")}
+    own = replace(
+        motion,
+        model=d.model,
+        parameters=d.parameters,
+        drive=d.drive,
+        x=motion.x[:, :, [w]],
+        v=motion.v[:, :, [w]],
+        angles=motion.angles[:, :, [w]],
+        gaps=motion.gaps[:, :, [w]],
+        contact_forces=motion.contact_forces[:, :, [w]],
+        failures=[replace(f, world=0) for f in motion.failures if f.world == w],
+        state=motion.state.select(np.array([w])),
+        energy_error=None if motion.energy_error is None else motion.energy_error[[w]],
+        **by_world,
+    )
+    failure = str(own.failures[0]) if own.failures else ""
+    return Found(
+        d.model,
+        d.parameters,
+        d.drive,
+        own.x[-1, :, 0],
+        own.angles[-1, :, 0],
+        motion=own,
+        failure=failure,
+        time=float(own.times[-1]),
+    )

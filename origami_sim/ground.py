@@ -1,0 +1,332 @@
+"""The ground under a sheet: which of its points can touch, how stiff it is there, and where the sheet starts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from origami_sim.errors import InputError
+from origami_sim.masses import Masses, positive
+from origami_sim.materials import G
+from origami_sim.model import Model, Parameters
+from origami_sim.statements import statement
+
+SINK = 1e-4
+"""Depth to which a sheet's weight presses the whole of it into the ground, over the sheet's longest side.
+
+Single points sink by some 1e-3 then. The stride of a magnetic strip of 48 mm on four feet (23.8 mm) gets 0.8 % longer
+with half of it and 1.4 % shorter with double, at 0.7 and 1.4 times the time step.
+"""
+
+LANDING = 0.5
+"""Damping of a landing, as a ratio of critical: what lands rebounds with 0.3 of its speed, as rubber may.
+
+That is the restitution of a dashpot that cannot pull (Schwager and Poeschel 2007, Granular Matter 9, 465,
+doi:10.1007/s10035-007-0065-z); 0.51 with half of it, 0.14 with double. Double changes the stride of that strip by 0.2 %
+and halves the time step.
+"""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A point of a sheet that can touch the ground.
+
+    Attributes:
+        triangle, weights: that carries it, and barycentric weights (3,) of its corners.
+        offset: height above the mid-plane [m], or with `below` under the panel's underside [m], patches counted.
+        axis: weights (3,) of the corners that give the body's forward direction. panel: of the triangle.
+        foot: whether it is to bear the device with the other feet alone.
+    """
+
+    triangle: int
+    weights: np.ndarray
+    offset: float
+    axis: np.ndarray
+    name: str
+    panel: int
+    below: bool = False
+    foot: bool = False
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground as it was stated, see `Grounds.ground`."""
+
+    nodes: np.ndarray | None
+    friction: float
+    both_sides: bool
+    sink: float | None
+    damping_ratio: float
+    lift: bool
+    tilt: float
+    azimuth: float
+
+
+class Grounds(Masses):
+    """The part of `Sheet` that knows the ground."""
+
+    _contacts: list[Contact]
+    _ground: Ground | None
+
+    # what a designer states ------------------------------------------------------------------------------------
+
+    @statement(point="m", offset="m")
+    def contact(
+        self,
+        panel: int,
+        point: ArrayLike,
+        *,
+        offset: float = 0.0,
+        axis: ArrayLike = (1, 0, 0),
+        name: str | None = None,
+    ) -> int:
+        """Adds a point that can touch the ground and returns its index.
+
+        Args:
+            panel: face that carries it. point: position in the reference state [m], in the panel's plane.
+            offset: height above the mid-plane along the panel's normal [m]; negative below.
+            axis: the body's forward direction in the reference state, for directional friction.
+
+        Raises:
+            InputError: no such panel, a point outside it.
+        """
+        return self._touch(panel, np.asarray(point, float), axis, offset=float(offset), name=name)
+
+    @statement(at="m", height="m", mass="kg")
+    def feet(
+        self,
+        at,
+        *,
+        height: float = 0.0,
+        friction: float = 0.5,
+        backward: float | None = None,
+        heading: ArrayLike = (1, 0, 0),
+        mass: float = 0.0,
+        name: str = "foot",
+    ) -> Self:
+        """Puts feet under a sheet, which alone can carry its weight; with `backward`, directional ones.
+
+        Args:
+            at: nodes (numbers), or places in the reference state (x, y, z) [m].
+            height: of a foot below the panel's underside, or its patch's there [m].
+            friction: coefficient for sliding forward, along `heading`, or in any direction without `backward`.
+            backward: coefficient for sliding backward.
+            heading: the body's forward direction in the reference state.
+            mass: of each foot [kg]. name: their labels are "foot 1", "foot 2", ...
+
+        Raises:
+            InputError: no such node, a place on no panel, a coefficient that is negative or smaller backward.
+        """
+        listed = list(at)
+        places = [self.mesh.vertices[self._index("node", [n])[0]] if np.ndim(n) == 0 else n for n in listed]
+        if not places:
+            raise InputError("feet need places", field="at", allowed="nodes, or places (x, y, z) [m]")
+        if not 0 <= friction <= (friction if backward is None else backward):
+            raise InputError(
+                "friction is positive, and larger backward",
+                field="friction, backward",
+                value=(friction, backward),
+                allowed="0 <= friction <= backward",
+            )
+        first = len(self._contacts)
+        earlier = sum(c.foot for c in self._contacts)
+        for k, place in enumerate(np.asarray(p, float) for p in places):
+            panel, triangle, weights = self._under(place)
+            label = f"{name} {earlier + k + 1}"
+            self._touch(panel, weights @ self.mesh.vertices[self.mesh.triangles[triangle]], heading,
+                        offset=-float(height), name=label, below=True, foot=True)  # fmt: skip
+            np.add.at(self._extra_mass, self.mesh.triangles[triangle], mass * weights)
+        own = list(range(first, len(self._contacts)))
+        self.set("coulomb", own, friction_coefficient=friction)
+        if backward is not None:
+            self.set("directional_friction", own, backward_excess=backward - friction)
+        return self
+
+    @statement(sink="m", tilt="rad", azimuth="rad")
+    def ground(
+        self,
+        *,
+        nodes: Sequence[int] | None = None,
+        friction: float = 0.5,
+        both_sides: bool = False,
+        sink: float | None = None,
+        damping_ratio: float = LANDING,
+        lift: bool = True,
+        tilt: float = 0.0,
+        azimuth: float = 0.0,
+    ) -> Self:
+        """Puts the sheet on a flat ground that it can neither pass through nor slide on freely.
+
+        Its underside touches at every node, of every panel that meets there, and at the corners of patches below. The
+        ground is so stiff that the whole sheet sinks by `sink` where all of it lies down, or the feet do where they
+        alone stand: a point's stiffness is the share that its area and its length of the outline are of the sheet's.
+        So a finer mesh stands on no stiffer ground. A sheet without `gravity` gets standard gravity.
+
+        Args:
+            nodes: only these can touch besides feet and contacts (default: all; () for feet alone).
+            friction: coefficient of all points that are no feet.
+            both_sides: let the upper side touch as well, for what turns over. Twice as many points.
+            sink: depth [m] (default: SINK times the longest side).
+            damping_ratio: of a landing.
+            lift: shift the sheet along the ground's normal until its lowest point just touches. Without it the sheet
+                starts where it is stated, and `build` refuses a start inside the ground.
+            tilt, azimuth: rise of the ground [rad], and the horizontal direction from x in which it rises [rad].
+
+        Raises:
+            InputError: no such node, a coefficient, damping or depth that is negative, a tilt of a right angle or more.
+        """
+        if not (friction >= 0 and damping_ratio >= 0 and (sink is None or positive(sink))):
+            raise InputError(
+                "the ground's numbers are positive",
+                field="friction, damping_ratio, sink",
+                value=(friction, damping_ratio, sink),
+                allowed=">= 0, >= 0, > 0 m",
+            )
+        if not abs(tilt) < np.pi / 2:
+            raise InputError("the ground is no wall", field="tilt", value=tilt, allowed="-pi/2 to pi/2 rad")
+        chosen = None if nodes is None else self._index("node", [*nodes])
+        self._ground = Ground(chosen, friction, both_sides, sink, damping_ratio, lift, tilt, azimuth)
+        if self._gravity is None:
+            self.gravity()
+        self.on("ground", "friction", "coulomb")
+        return self
+
+    # what follows from it ----------------------------------------------------------------------------------------
+
+    def _touch(self, panel: int, point: np.ndarray, axis: ArrayLike, *, name: str | None, **options) -> int:
+        """Adds a contact point and returns its index."""
+        candidates = [(int(t), self._barycentric(int(t), point)) for t in self._triangles_of(panel)]
+        best, weights = max(candidates, key=lambda c: c[1].min())
+        if not weights.min() >= -1e-6:
+            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=point.tolist())
+        a, b = self._edge_weights(best, np.asarray(axis, float))
+        forward = np.array([-a - b, a, b])
+        label = name or f"contact {len(self._contacts)}"
+        self._contacts.append(Contact(best, weights, axis=forward, name=label, panel=panel, **options))
+        return len(self._contacts) - 1
+
+    def _under(self, place: np.ndarray) -> tuple[int, int, np.ndarray]:
+        """The panel and triangle on which a place lies, and its barycentric weights there."""
+        every = [(t, self._barycentric(t, place)) for t in range(len(self.mesh.triangles))]
+        t, weights = max(every, key=lambda c: c[1].min())
+        if not weights.min() >= -1e-6:
+            raise InputError("a foot stands under no panel", field="at", value=place.tolist(), allowed="on the sheet")
+        return int(self.mesh.triangle_face[t]), t, weights
+
+    def _underside(self, panel: int, place: np.ndarray) -> float:
+        """Depth of a panel's underside at a place below its mid-plane [m], with a patch that lies there."""
+        depth, patch = 0.5 * float(self.thickness[panel]), self._patches[panel]
+        if patch and patch["side"] < 0 and np.all(np.abs(place - patch["centre"])[:2] <= 0.5 * patch["size"] + 1e-9):
+            depth += patch["thickness"]
+        return depth
+
+    def _grounded(self) -> tuple[list[Contact], np.ndarray]:
+        """All contact points, with their heights, and the share of the weight that each bears [K]."""
+        out, corners = [], self.mesh.vertices[self.mesh.triangles]
+        for c in self._contacts:
+            under = self._underside(c.panel, c.weights @ corners[c.triangle]) if c.below else 0.0
+            out.append(replace(c, offset=c.offset - under))
+        if self._ground is None:
+            return out, np.zeros(len(out))
+        feet = max(sum(c.foot for c in out) or len(out), 1)
+        shares = [1.0 / feet] * len(out)
+        for panel, node, share in self._shares():
+            if self._ground.nodes is None or node in self._ground.nodes:
+                t = int(next(t for t in self._triangles_of(panel) if node in self.mesh.triangles[t]))
+                at = (self.mesh.triangles[t] == node).astype(float)
+                for side in (-1, 1) if self._ground.both_sides else (-1,):
+                    axis = np.zeros(3)
+                    where = f"node {node}" + (", above" if side > 0 else "")
+                    out.append(Contact(t, at, side * 0.5 * float(self.thickness[panel]), axis, where, panel))
+                    shares.append(share)
+        for panel, patch in enumerate(self._patches):
+            if self._ground.nodes is not None or not patch or (patch["side"] > 0 and not self._ground.both_sides):
+                continue
+            height = patch["side"] * (0.5 * float(self.thickness[panel]) + patch["thickness"])
+            for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                place = patch["centre"] + np.array([x * patch["size"][0], y * patch["size"][1], 0.0]) / 2
+                t, weights, _ = self._carrier(panel, place)
+                if weights.min() >= -1e-6:  # a patch may hang over its panel
+                    out.append(Contact(t, weights, height, np.zeros(3), f"patch on panel {panel}", panel))
+                    shares.append(float(patch["size"].prod() / self.area.sum() / 4))
+        return out, np.array(shares)
+
+    def _shares(self) -> list[tuple[int, int, float]]:
+        """Panel, node and the share of the sheet that touches there: half by area, half by length of its outline.
+
+        By area alone the edge on which a sheet stands would grow soft as the mesh is refined.
+        """
+        mesh, total = self.mesh, float(self.area.sum())
+        share: dict[tuple[int, int], float] = {}
+        edges: dict[tuple[int, int], list[int]] = {}
+        for t, nodes in enumerate(mesh.triangles.tolist()):
+            for k in range(3):
+                key = int(mesh.triangle_face[t]), nodes[k]
+                share[key] = share.get(key, 0.0) + 0.5 * float(self.area[t]) / 3 / total
+                edge = sorted((nodes[k], nodes[(k + 1) % 3]))
+                edges.setdefault((edge[0], edge[1]), []).append(int(mesh.triangle_face[t]))
+        outline = {e: panels[0] for e, panels in edges.items() if len(panels) == 1}
+        length = {e: float(np.linalg.norm(np.diff(mesh.vertices[list(e)], axis=0))) for e in outline}
+        around = sum(length.values())
+        if not around:  # a closed surface
+            return sorted(((p, n, 2 * s) for (p, n), s in share.items()), key=lambda i: (i[1], i[0]))
+        for e, panel in outline.items():
+            for node in e:
+                share[panel, node] += 0.25 * length[e] / around
+        return [(panel, node, s) for (panel, node), s in sorted(share.items(), key=lambda i: (i[0][1], i[0][0]))]
+
+    def _stand(self, model: Model, parameters: Parameters, shares: np.ndarray) -> Model:
+        """The model where it starts; the ground's stiffness and damping go into the parameters."""
+        ground = self._ground
+        if ground is None or not len(model.contacts):
+            return model
+        mass = float(sum(self._bodies()["mass"]))
+        size = float(np.ptp(self.mesh.vertices, axis=0).max())
+        stiffness = mass * G / (ground.sink or SINK * size)
+        damping = 2 * ground.damping_ratio * np.sqrt(stiffness * mass)
+        for effect in ("ground", "friction"):
+            parameters.set(effect, "stiffness", stiffness * shares).set(effect, "damping", damping * shares)
+        parameters.set("coulomb", "friction_coefficient", ground.friction)
+        parameters.set("plane", "tilt", ground.tilt).set("plane", "azimuth", ground.azimuth)
+        gap = gaps(model, parameters, model.position[:, None])[:, 0]
+        lowest = int(gap.argmin())
+        if not ground.lift:
+            if gap[lowest] < -1e-9 * size:
+                raise InputError(
+                    f"the sheet starts {-gap[lowest] * 1e3:.3g} mm inside the ground",
+                    field=model.name("contact", lowest),
+                    value=float(gap[lowest]),
+                    allowed="lift=True, or a pattern that lies higher",
+                )
+            return model
+        shift = -gap[lowest] * upward(ground.tilt, ground.azimuth)
+        for axis, by in zip("xyz", shift, strict=True):
+            centre = parameters["body", f"centre_{axis}"]
+            parameters.set("body", f"centre_{axis}", centre[:, 0] + by)
+        return replace(model, position=model.position + shift)
+
+
+def upward(tilt: float, azimuth: float) -> np.ndarray:
+    """Normal (3,) of a ground that rises by `tilt` in the horizontal direction `azimuth` [rad]."""
+    s = np.sin(tilt)
+    return np.array([-s * np.cos(azimuth), -s * np.sin(azimuth), np.cos(tilt)])
+
+
+def heights(parameters: Parameters, x: np.ndarray) -> np.ndarray:
+    """Heights [..., W] of places x [..., W, 3] above the ground [m]."""
+    plane = [parameters["plane", n][0] for n in ("tilt", "azimuth", "height")]
+    worlds = [np.broadcast_to(p, (x.shape[-2],)) for p in plane]
+    up = np.array([upward(t, a) for t, a in zip(*worlds[:2], strict=True)])
+    return (x * up).sum(-1) - worlds[2]
+
+
+def gaps(model: Model, parameters: Parameters, x: np.ndarray) -> np.ndarray:
+    """Heights [..., K, W] of the contact points above the ground [m], at node positions x [..., N, W, 3]."""
+    corners = np.moveaxis(x[..., model.contacts, :, :], -3, 0)
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
+    weights = model.contact_weights.T[:, :, None, None]
+    at = sum(w * c for w, c in zip(weights, corners, strict=True)) + model.contact_offsets[:, None, None] * normal
+    return heights(parameters, at)

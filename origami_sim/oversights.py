@@ -1,0 +1,133 @@
+"""What a designer may have overlooked, in sentences: drives that move nothing, and what is inside the ground."""
+
+import numpy as np
+
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.errors import InputError
+from origami_sim.ground import gaps, heights
+from origami_sim.materials import G
+from origami_sim.model import Model, Parameters
+
+THROWN = 0.01
+"""Height, over the device's size, to which a ground that it starts inside may throw it before that is refused.
+
+Devices at rest on soft ground come to 1e-4 and less, those that were put too low by mistake to 0.1 and more; so half
+and double refuse the same ones.
+"""
+
+SUNK = 0.01
+"""Depth, over the device's size, to which feet may sink before a note says that the ground is soft.
+
+A sheet on `Sheet.ground` sinks by 1e-4, on single points by some 1e-3. Half notes soft mats, double lets a tenth of a
+centimetre pass on a device of five.
+"""
+
+_CHANNELS = {"field": "field_", "voltage": "voltage_", "temperature": "temperature", "load": "load"}
+
+
+def idle_drives(model: Model, parameters: Parameters, drive: Drive) -> list[str]:
+    """What the drive has and the model does not answer to."""
+    notes = []
+    for kind, prefix in _CHANNELS.items():
+        channels = [n for n, s in drive.signals.items() if n.startswith(prefix) and not s.is_zero]
+        if not channels:
+            continue
+        acting = [e for e in map(get, model.laws) if kind in e.drives and _acts(model, parameters, e.name)]
+        if not acting:
+            notes.append(_IDLE[kind])
+        elif kind == "voltage":
+            wired = set(model.electrodes[_electroded(model, parameters)].tolist())
+            idle = [n for n in channels if int(n.removeprefix(prefix)) not in wired]
+            notes += [f"The drive has {n}, and no crease is in that electrode group." for n in idle]
+    return notes
+
+
+_IDLE = {
+    "field": "The drive has a field, and nothing here is magnetic: state it with Sheet.patch(..., poling=...).",
+    "voltage": "The drive has a voltage, and nothing here has electrodes: state them with Sheet.electrode(...).",
+    "temperature": "The drive has a temperature, and nothing here depends on it: Sheet.set('crease_thermal', ...).",
+    "load": "The drive has a load factor, and nothing here is loaded: Sheet.set('load', ...) or 'crease_drive'.",
+}
+
+
+def _acts(model: Model, parameters: Parameters, effect: str) -> bool:
+    """Whether an effect that asks for the drive has anywhere what lets it act: a magnet, a stack, a strength."""
+    own = parameters.of(effect)
+    if "remanence" in own and "volume" in own:
+        return bool(np.any(own["remanence"] * own["volume"]))
+    if "layers" in own and "width" in own:
+        return bool(np.any(own["layers"] * own["width"]))
+    strong = [p.name for p in get(effect).strengths]
+    return not strong or any(np.any(own[n]) for n in strong)
+
+
+def _electroded(model: Model, parameters: Parameters) -> np.ndarray:
+    """[C + Q] hinges at which any effect feels a voltage."""
+    out = np.zeros(len(model.creases) + len(model.bends), bool)
+    for effect in (e for e in map(get, model.laws) if "voltage" in e.drives):
+        own = parameters.of(effect.name)
+        on = own["layers"] * own["width"] if "layers" in own and "width" in own else np.ones((1, 1))
+        part = slice(None, len(model.creases)) if effect.family == "crease" else slice(len(model.creases), None)
+        if effect.family in ("crease", "bend"):
+            out[part] |= np.any(on, axis=1)
+        else:
+            out[:] = True
+    return out
+
+
+def refuse_start_inside_the_ground(model: Model, parameters: Parameters, x: np.ndarray, energy: np.ndarray) -> None:
+    """Refuses a start from which the ground would throw the device up.
+
+    Args:
+        x: [N, W, 3] positions at the start [m]. energy: [W] what the ground has stored there [J].
+
+    Raises:
+        InputError: naming the deepest contact point.
+    """
+    weight = G * np.broadcast_to(parameters["inertia", "mass"].sum(axis=0), energy.shape)
+    thrown = energy / weight
+    w = int(thrown.argmax())
+    if thrown[w] > THROWN * _size(model):
+        gap = gaps(model, parameters, x)[:, w]
+        deepest = int(gap.argmin())
+        raise InputError(
+            f"the device starts {-gap[deepest] * 1e3:.3g} mm inside the ground, which would throw it "
+            f"{thrown[w] * 1e3:.3g} mm up",
+            field=model.name("contact", deepest),
+            value=float(gap[deepest]),
+            allowed="a start above the ground; Sheet.ground() lifts a sheet there",
+        )
+
+
+def below_the_ground(model: Model, parameters: Parameters, x: np.ndarray) -> list[str]:
+    """Where a motion ends inside the ground; positions x [N, W, 3] [m]."""
+    if "ground" not in model.laws or not len(model.contacts):
+        return []
+    nodes = np.unique(model.triangles)
+    size, notes = _size(model), []
+    lost = ~np.all(np.isfinite(x), axis=(0, 2))
+    if np.all(lost):
+        return []
+    x = np.where(lost[:, None], x[:, [int(np.argmin(lost))]], x)  # worlds that went unstable are like a sound one
+    touching, height = gaps(model, parameters, x), heights(parameters, x[nodes])
+    w = int(touching.min(axis=0).argmin())
+    foot = int(touching[:, w].argmin())
+    if touching[foot, w] < -SUNK * size:
+        notes.append(
+            f"{model.name('contact', foot)} ends {-touching[foot, w] * 1e3:.2g} mm deep in the ground: it is too soft "
+            f"for this weight; Sheet.ground() chooses its stiffness."
+        )
+    below = np.minimum(touching.min(axis=0), 0.0) - height  # deeper than anything that can touch
+    node, w = np.unravel_index(int(below.argmax()), below.shape)
+    if below[node, w] > 1e-6 * size:
+        where = f" in world {w}" if below.shape[1] > 1 else ""
+        notes.append(
+            f"Node {nodes[node]} ends {-height[node, w] * 1e3:.2g} mm below the ground{where}, which it passed because "
+            "it has no contact point there: Sheet.ground() gives one to every node, and both_sides=True to both sides."
+        )
+    return notes
+
+
+def _size(model: Model) -> float:
+    return float(np.ptp(model.position, axis=0).max())

@@ -1,0 +1,1 @@
+"""Seeing and sharing runs: replays for the rerun viewer, pictures without a driver, pages, exports, plots."""

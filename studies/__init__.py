@@ -1,0 +1,1 @@
+"""Batch studies of the seed paper's devices: maps of the crawler's stride, tables of the bi-fold, stored strides."""

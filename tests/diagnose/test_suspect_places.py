@@ -1,0 +1,124 @@
+"""Where effects are suspected: stretches of a beam, its ends and middle, single panels and their edges."""
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from origami_sim.bodies import rigid
+from origami_sim.effects import CATALOGUE
+from origami_sim.fit.hypothesis import Hypothesis, apply, suspects, told_apart
+from origami_sim.model import node_mass
+from origami_sim.places import across, along, points, stretches
+from origami_sim.recording import Channel, Recording
+from origami_sim.scene import scene_settings
+
+UNEVEN = {"crease_softness", "panel_softness", "remanence_error"}
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    def built(name):
+        module = import_module(f"origami_sim.scenes.{name}")
+        return module.build(scene_settings(module))[:3]
+
+    return {name: built(name) for name in ("mae_cantilever", "magnetic_arch", "pendulum_chain", "box")}
+
+
+def asked(model, parameters, drive, channels=1):
+    channel = Channel("a", "panel_angle", np.zeros(5), "rad", 1e-3, {"panel": 0})
+    every = suspects(model, [Recording("r", np.arange(5) / 10, {"a": channel})], drive, parameters)
+    return told_apart(every, channels)
+
+
+def test_a_beam_is_suspected_in_quarters_and_thirds(scenes):
+    model, *_ = scenes["mae_cantilever"]
+    every = [s for s in asked(*scenes["mae_cantilever"]) if s.stretch]
+    assert {s.effect for s in every} == UNEVEN
+    creases = {s.site: s for s in every if s.effect == "crease_softness"}
+    assert len(creases) == 7 and all(s.kind == "crease" for s in creases.values())
+    place = along(model, model.position[model.creases[:, 1]])
+    assert place is not None
+    thirds = [creases[f"the creases of the {w} third"].entities for w in ("first", "middle", "last")]
+    assert sorted(np.concatenate(thirds)) == list(range(len(model.creases)))
+    for n, mine in enumerate(thirds):
+        assert place[list(mine)].min() > n / 3 - 1e-6 and place[list(mine)].max() < (n + 1) / 3 + 1e-6
+    held = model.position[~np.any(model.free, axis=1), 0].mean()
+    first = model.position[model.creases[list(creases["the creases of the first quarter"].entities), 1], 0]
+    last = model.position[model.creases[list(creases["the creases of the last quarter"].entities), 1], 0]
+    assert abs(first.mean() - held) < abs(last.mean() - held), "counted from the clamp"
+
+
+def test_all_creases_of_a_beam_are_no_sum_of_stretches_that_overlap(scenes):
+    model, *_ = scenes["mae_cantilever"]
+    every = asked(*scenes["mae_cantilever"])
+    (whole,) = (s for s in every if s.effect == "crease_softness" and s.site == "all creases")
+    assert whole.entities == tuple(range(len(model.creases))) == whole.free[0].entities
+    (other,) = (s for s in every if s.effect == "crease_set" and s.kind == "crease")
+    assert other.entities is None
+
+
+def test_what_has_few_creases_has_no_stretches(scenes):
+    for name in ("pendulum_chain", "box"):
+        assert not [s for s in asked(*scenes[name]) if s.stretch]
+        assert not stretches(scenes[name][0], "crease")
+    assert not [s for s in asked(*scenes["mae_cantilever"], channels=40) if s.stretch], "each crease by itself"
+    assert not stretches(scenes["mae_cantilever"][0], "node")
+    assert along(scenes["box"][0], np.zeros((1, 3))) is None
+
+
+def test_masses_are_suspected_at_the_panels_and_at_their_edges(scenes):
+    model, parameters, drive = scenes["pendulum_chain"]
+    every = {s.label: s for s in asked(model, parameters, drive)}
+    assert {n for n in every if n.startswith("mass_error")} == {
+        "mass_error at the body", "mass_error at arm1", "mass_error at arm2"
+    }  # fmt: skip
+    assert {n for n in every if n.startswith("added_mass")} == {"added_mass at arm1", "added_mass at arm2"}
+    tip = every["added_mass at arm2"]
+    richer = model.with_effects("added_mass")
+    values = apply(parameters, Hypothesis((tip,)), [1e-3], richer)
+    assert values["added_mass", "gravity_z"] == pytest.approx(parameters["gravity", "gravity_z"])
+    more = node_mass(richer, values)[:, 0] - node_mass(model, parameters)[:, 0]
+    assert more[list(tip.entities or ())] == pytest.approx(1e-3) and more.sum() == pytest.approx(2e-3)
+    assert model.position[list(tip.entities or ()), 2] == pytest.approx(model.position[:, 2].min())
+
+
+def test_a_rigid_panel_that_is_heavier_is_so_by_its_mass_points(scenes):
+    model, parameters, drive = scenes["pendulum_chain"]
+    model, parameters = rigid(model, parameters)
+    assert model.panels == "rigid" and len(model.carriers)
+    (upper,) = (s for s in asked(model, parameters, drive) if s.label == "mass_error at arm1")
+    richer = model.with_effects("mass_error")
+    values = apply(parameters, Hypothesis((upper,)), [0.1], richer)
+    more = node_mass(richer, values)[:, 0] - node_mass(model, parameters)[:, 0]
+    panel = model.triangle_panel[[n == "arm1" for n in (model.name("panel", p) for p in model.triangle_panel)]][0]
+    assert more.sum() == pytest.approx(0.1 * parameters["body", "mass"][panel, 0])
+
+
+def test_a_beam_may_carry_a_mass_at_its_ends_or_in_its_middle(scenes):
+    places = [site for site, *_ in points(scenes["mae_cantilever"][0])]
+    assert places == ["the middle", "the last end"], "the clamp carries nothing"
+    model, *_ = scenes["magnetic_arch"]
+    ((site, kind, nodes),) = points(model)
+    assert (site, kind, len(nodes)) == ("the middle", "body", 2)
+    assert {"added_mass at the middle"} == {
+        s.label for s in asked(*scenes["magnetic_arch"]) if s.effect == "added_mass"
+    }
+
+
+def test_a_field_that_grows_is_one_for_all_panels_and_knows_the_plane_of_motion(scenes):
+    model, parameters, drive = scenes["box"]
+    for name in ("box", "mae_cantilever"):
+        (slope,) = (s for s in asked(*scenes[name]) if s.effect == "field_slope")
+        assert slope.entities is None
+    assert np.abs(across(scenes["mae_cantilever"][0])) == pytest.approx([0, 1, 0])
+    model, parameters, drive = scenes["mae_cantilever"]
+    (slope,) = (s for s in asked(model, parameters, drive) if s.effect == "field_slope")
+    values = apply(parameters, Hypothesis((slope,)), [0.5, 0.0, 0.0, 0.5], model.with_effects("field_slope"))
+    assert np.abs(values["field_slope", "across_y"]) == pytest.approx(1.0)
+    assert values["field_slope", "volume"] == pytest.approx(parameters["magnetic_torque", "volume"])
+
+
+def test_uneven_effects_are_those_of_families_with_stretches():
+    uneven = {n for n, e in CATALOGUE.items() if e.uneven}
+    assert uneven >= UNEVEN and all(CATALOGUE[n].family in ("crease", "bend", "triangle") for n in uneven)

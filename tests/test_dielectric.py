@@ -1,0 +1,88 @@
+"""Dielectric hinges: the section against closed forms, both sides alike, and what the builder refuses."""
+
+import numpy as np
+import pytest
+
+from origami_sim.build import Sheet
+from origami_sim.dielectric import Stack
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.materials import EPS0, layered_rigidity
+from origami_sim.pattern import strip
+from origami_sim.solve.statics import equilibrium
+
+SIZE = {"layers": 6, "notch": "5 mm"}
+
+
+def hinge(**options) -> Sheet:
+    sheet = Sheet(strip([0.02, 0.03], 0.019), thickness=5e-4, triangulation="center").fix(panels=[0])
+    return sheet.electrode(**{**SIZE, **options})
+
+
+def turn(sheet: Sheet, voltage: float) -> float:
+    found = equilibrium(*sheet.build(), Drive(voltage=[0.0] * 0 + [voltage]))
+    assert found.converged
+    return float(found.angles[0])
+
+
+def test_a_stack_has_the_rigidity_and_neutral_axis_of_bonded_layers():
+    stack = Stack(6, 272.8e-6, 62e-6, 1.6e9 / (1 - 0.3**2), (0.19e6 / 3,), (2.0,))
+    assert stack.shear_modulus == pytest.approx(0.19e6 / 3)
+    soft = 4 * 0.19e6 / 3
+    assert stack.rigidity == pytest.approx(layered_rigidity([(62e-6, 1.6e9 / 0.91), (6 * 272.8e-6, soft)]))
+    bends, share = stack.passive_moment(np.array([-1e-3, 1e-3]))
+    np.testing.assert_allclose(bends, np.array([-1e-3, 1e-3]) * stack.rigidity, rtol=1e-4)
+    np.testing.assert_allclose(share, 1.0, atol=1e-5)
+
+
+def test_a_linear_hinge_turns_by_moment_over_stiffness():
+    sheet = hinge(section="linear", thinning=False)
+    stack = Stack(6, 272.8e-6, 62e-6, 1.6e9 / (1 - 0.3**2), (0.19e6 / 3,), (2.0,))
+    moment = 4.7 * EPS0 * (2000 / 272.8e-6) ** 2 * 6 * 272.8e-6 * stack.lever * 0.019
+    assert turn(sheet, 2000.0) == pytest.approx(-moment / (stack.rigidity * 0.019 / 5e-3), rel=1e-6)
+
+
+@pytest.mark.parametrize("section", ["ogden", "linear"])
+def test_a_stack_below_bends_the_other_way_by_as_much(section):
+    above, below = (turn(hinge(section=section, side=side), 3000.0) for side in (1, -1))
+    assert above < -0.02
+    assert below == pytest.approx(-above, rel=1e-6)
+
+
+def test_thinning_bends_further_and_sections_agree_at_small_voltages():
+    assert turn(hinge(), 4000.0) < turn(hinge(thinning=False), 4000.0)
+    assert turn(hinge(), 300.0) == pytest.approx(turn(hinge(section="linear"), 300.0), rel=2e-3)
+
+
+def test_a_notch_bends_in_proportion_to_its_length_and_groups_are_apart():
+    sheet = Sheet(strip([0.02, 0.02, 0.02], 0.019), thickness=5e-4, triangulation="center").fix(panels=[0])
+    sheet.electrode([0], **{**SIZE, "notch": "4 mm"}).electrode([1], **{**SIZE, "notch": "8 mm", "group": 1})
+    model, parameters = sheet.build()
+    both = equilibrium(model, parameters, Drive(voltage=[1000.0, 1000.0])).angles[:2]
+    assert both[1] / both[0] == pytest.approx(2.0, rel=1e-3)
+    second = equilibrium(model, parameters, Drive(voltage=[0.0, 1000.0])).angles[:2]
+    assert second == pytest.approx([0.0, both[1]], abs=1e-6)
+
+
+def test_a_bare_stack_only_resists():
+    assert abs(turn(hinge(electrode_width=0.0), 4000.0)) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"side": 0}, "one side"),
+        ({"section": "cubic"}, "no such section"),
+        ({"notch": 0.0}, "along some length"),
+        ({"layers": 0}, "positive"),
+        ({"film": "tap"}, "unknown material"),
+        ({"notch": "5 mT"}, "wrong unit"),
+        ({"group": -1}, "counted from 0"),
+        ({"ogden": ([1e4], [-2.0])}, "no positive shear modulus"),
+        ({"ogden": ([1e4, 2e4], [2.0])}, "come in pairs"),
+        ({"creases": [5]}, "no such crease"),
+    ],
+)
+def test_refusals(options, said):
+    with pytest.raises(InputError, match=said):
+        hinge(**options)
