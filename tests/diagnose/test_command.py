@@ -18,6 +18,8 @@ from origami_sim.diagnose.report import read_report
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
+from origami_sim.fit import cache
+from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.subject import spreads
 from origami_sim.recording import read_recording
 from origami_sim.replay import read_series
@@ -108,7 +110,8 @@ def test_the_missing_friction_is_found_and_all_files_are_there(diagnosed):
     assert out.index("noise") < out.index("MECHANISM: ")  # the lint comes first
     assert "crease_friction at hinge1" in out
     stages = re.findall(r"^ *\d+ s  (\w+)", err, re.M)
-    assert stages.index("screen") < stages.index("refit") < stages.index("baselines") < stages.index("replay")
+    order = [stages.index(n) for n in ("nominal", "screen", "search", "verdict", "baselines", "replay")]
+    assert order == sorted(order)
     names = {"report.html", "diagnosis.json", "patched.toml", "replay.rrd"}
     assert {p.name for p in folder.iterdir()} == names
     data = json.loads((folder / "diagnosis.json").read_text())
@@ -166,13 +169,14 @@ def test_the_replay_shows_the_recorded_object_over_both_simulations(diagnosed):
 
 def test_films_are_what_was_fitted(recorded, monkeypatch):
     """The drawn simulation has the channels of the fit, and the drawn recording those that were measured."""
-    from origami_sim.diagnose.forward import Forward
+    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis
-    from origami_sim.fit.least_squares import Weights, fit
+    from origami_sim.fit.least_squares import fit
+    from origami_sim.fit.linear import Weights
     from origami_sim.observe import panel_angle
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
-    forward = Forward(subject, [recording], segment=0.4)
+    forward = BarRollouts(subject, [recording], segment=0.4)
     given = fit(forward, Hypothesis(), Weights(forward.blocks[0].noise), fixed=True)
     monkeypatch.setattr(overlay, "RATE", np.inf)  # every frame
     shown = overlay.film(forward, {"before": given, "after": given}, 0)
@@ -194,12 +198,13 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
 
 
 def test_an_error_of_one_channel_moves_no_node(recorded):
-    from origami_sim.diagnose.forward import Forward
+    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
-    from origami_sim.fit.least_squares import Weights, fit
+    from origami_sim.fit.least_squares import fit
+    from origami_sim.fit.linear import Weights
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
-    forward = Forward(subject, [recording], segment=0.4)
+    forward = BarRollouts(subject, [recording], segment=0.4)
     late = Free("clock_delay", "clock_delay", "s", 0.0, 0.01, entities=(1,))
     one = Hypothesis((Suspect("clock_delay", "channel theta2", "measurement", (late,), (1,)),))
     weights = Weights(forward.blocks[0].noise)
@@ -215,7 +220,7 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
 
     def interrupted(self, stage, part):
         shown(self, stage, part)
-        if stage == "combine":
+        if stage == "verdict":
             raise KeyboardInterrupt
 
     arguments = ("diagnose", recorded, "--model", "pendulum_chain", "--out", tmp_path / "out", *QUICK)
@@ -229,7 +234,7 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
     kept = []
     monkeypatch.setattr(command, "Keep", lambda folder: kept.append(Keep(folder)) or kept[0])
     assert main(*arguments, "--json") == EXIT["MECHANISM"]
-    assert kept[0].found >= len(stored)
+    assert kept[0].cache.found >= len(stored)
     assert not (tmp_path / "out" / ".resume").exists()
     one, other = (json.loads((f / "diagnosis.json").read_text()) for f in (diagnosed[3], tmp_path / "out"))
     assert one.pop("seconds").keys() == other.pop("seconds").keys()
@@ -240,16 +245,17 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
     assert Path(printed["files"]["report"]).is_file()
 
 
-def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded):
+def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeypatch):
     """Another start, number, site or recording never finds a stored prediction; a damaged file is computed again."""
-    from origami_sim.diagnose.forward import Forward
+    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis, suspects
 
+    monkeypatch.setattr(cache, "WORTH", 0.0)  # however quick they are
     module, s = single()
     recording = read_recording(recorded).window(0.0, 1.0)
     subject = Subject.from_scene(module, s, spreads={"viscosity_1": 5e-5})
-    plain, keep = Forward(subject, [recording], segment=0.5), Keep(tmp_path)
-    remembered = Forward(subject, [recording], segment=0.5)
+    plain, keep = BarRollouts(subject, [recording], segment=0.5), Keep(tmp_path)
+    remembered = BarRollouts(subject, [recording], segment=0.5)
     keep.follow(remembered)
     theta, local = np.array([[2e-4]]), np.zeros((1, len(plain.blocks), plain.local))
     friction = next(
@@ -261,33 +267,29 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded):
         (Hypothesis(), theta, local + 1e-3),
         (Hypothesis((friction,)), np.array([[2e-4, 1e-3, 0.01]]), local),
     ]
-    import origami_sim.diagnose.keep as module_
-
-    worth, module_.WORTH = module_.WORTH, 0.0
-    try:
-        for again in range(2):
-            for one in asked:
-                for a, b in zip(plain.predict(*one), remembered.predict(*one), strict=True):
-                    np.testing.assert_array_equal(a, b)
-            assert (keep.found, keep.computed) == (len(asked) * again, len(asked))
-        for file in tmp_path.iterdir():
-            file.write_bytes(file.read_bytes()[:100])
-        remembered.predict(*asked[0])
-        assert keep.computed == len(asked) + 1
-        brief = Forward(subject, [recording], segment=0.5, calm=0.01)
-        keep.follow(brief)
-        brief.predict(*asked[0])
-        assert keep.computed == len(asked) + 2
-    finally:
-        module_.WORTH = worth
+    for again in range(2):
+        for one in asked:
+            for a, b in zip(plain.predict(*one), remembered.predict(*one), strict=True):
+                np.testing.assert_array_equal(a, b)
+        assert (keep.cache.found, keep.cache.computed) == (len(asked) * again, len(asked))
+    for file in tmp_path.iterdir():
+        file.write_bytes(file.read_bytes()[:100])
+    remembered.predict(*asked[0])
+    assert keep.cache.computed == len(asked) + 1
+    other = BarRollouts(subject, [recording], segment=0.5)
+    other.calm = 0.01
+    keep.follow(other)
+    other.predict(*asked[0])
+    assert keep.cache.computed == len(asked) + 2
 
 
 def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypatch):
     import warp as wp
 
-    from origami_sim.diagnose.forward import Forward
+    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis, suspects
-    from origami_sim.fit.least_squares import Weights, fit
+    from origami_sim.fit.least_squares import fit
+    from origami_sim.fit.linear import Weights
 
     @wp.func
     def moment(angle: scalar, runaway: scalar):
@@ -309,7 +311,7 @@ def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypat
     found = diagnose((module, s), recording, catalogue=["runaway"])
     (row,) = found.screening
     assert (row.label, row.status) == ("runaway at hinge1", "its simulation goes unstable")
-    forward = Forward(Subject.from_scene(module, s), [recording], segment=0.5)
+    forward = BarRollouts(Subject.from_scene(module, s), [recording], segment=0.5)
     every = suspects(forward.model, [recording], forward.drive, forward.parameters)
     suspect = next(x for x in every if x.effect == "runaway")
     failed = fit(forward, Hypothesis((suspect,)), Weights(forward.blocks[0].noise), theta=np.array([1.0]))
@@ -332,8 +334,8 @@ def test_missing_values_that_are_allowed_do_not_change_the_answer(recorded, tmp_
 
 def test_a_drive_on_its_own_clock_reaches_the_model():
     """Samples between the frames are kept, also where the recording is thinned and starts later than the drive."""
-    from origami_sim.diagnose.forward import drive_of
     from origami_sim.diagnose.prepare import thinned
+    from origami_sim.fit.drives import drive_of
     from origami_sim.recording import Channel, DriveChannel, Recording
 
     times = 2.0 + np.arange(40) / 20.0
@@ -343,13 +345,6 @@ def test_a_drive_on_its_own_clock_reaches_the_model():
     for one in (recording, thinned(recording, 4)):
         signal = drive_of(one, Drive())["field_z"]
         np.testing.assert_allclose(np.squeeze(signal(clock[50:-70] - 2.0)), np.sin(20.0 * clock[50:-70]), atol=1e-9)
-
-
-def test_the_first_value_that_is_not_missing_tells_the_turn():
-    from origami_sim.diagnose.forward import seen_first
-
-    values = np.array([[np.nan, 1.0, np.nan], [5.0, 2.0, np.nan], [6.0, 3.0, np.nan]])
-    np.testing.assert_array_equal(seen_first(values), [5.0, 1.0, np.nan])
 
 
 def recorded_drive(name: str, values, unit: str = "T", *, constant: bool = False):
@@ -374,7 +369,7 @@ def recorded_drive(name: str, values, unit: str = "T", *, constant: bool = False
     ],
 )
 def test_drives_that_cannot_be_are_refused(name, values, unit, said):
-    from origami_sim.diagnose.forward import drive_of
+    from origami_sim.fit.drives import drive_of
 
     recording = recorded_drive(name, values, unit)
     recording.metadata["sidecar"] = "r.toml"
@@ -384,7 +379,7 @@ def test_drives_that_cannot_be_are_refused(name, values, unit, said):
 
 
 def test_drives_of_several_components_reach_their_channels():
-    from origami_sim.diagnose.forward import drive_of
+    from origami_sim.fit.drives import drive_of
 
     gradient = drive_of(recorded_drive("gradient", np.arange(9.0), "T/m", constant=True), Drive())
     assert [float(gradient[f"gradient_{i}{j}"](0.3)) for i in "xyz" for j in "xyz"] == list(range(9))
@@ -476,19 +471,18 @@ def test_the_worked_sidecar_of_the_manual_works(reached, tmp_path, capfd):
 
 
 def test_a_full_disk_costs_only_what_would_have_been_kept(tmp_path, monkeypatch):
-    from origami_sim.diagnose import keep
-
     def full(file, **_):
         file.write(b"half")
         raise OSError(28, "No space left on device")
 
+    one = Prediction([np.zeros((1, 3, 1))], [None])
     with monkeypatch.context() as m:
-        m.setattr(keep.np, "savez", full)
-        keep._write(tmp_path / "one.npz", [np.zeros(3)])
+        m.setattr(cache.np, "savez", full)
+        cache._write(tmp_path / "one.npz", one)
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "taken").write_text("")
-    keep._write(tmp_path / "taken" / "one.npz", [np.zeros(3)])
-    assert keep._read(tmp_path / "taken" / "one.npz", 1) is None
+    cache._write(tmp_path / "taken" / "one.npz", one)
+    assert cache._read(tmp_path / "taken" / "one.npz", 1) is None
 
 
 # what it refuses -------------------------------------------------------------------------------------------------
@@ -631,7 +625,7 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
         (("--model", "pendulum_chain", "--set", "gravity=0"), "--set: out of its range"),
         (("--model", "pendulum_chain", "--set", "weight=1"), "--set: cannot apply"),
         (("--model", "pendulum_chain", "--segment", "0"), "must be positive"),
-        (("--model", "pendulum_chain", "--seed", "-1"), "must not be negative"),
+        (("--model", "pendulum_chain", "--panels", "soft"), "invalid choice: 'soft'"),
         (("--model", "pendulum_chain", "--out", "taken"), "is a file"),
         (("--model", "pendulum_chain", "--out", "/proc/x"), "/proc/x: cannot be written"),
         (("--model", "pendulum_chain", "--out", 300 * "x"), "cannot be written"),
@@ -869,7 +863,7 @@ def test_a_patch_reads_back_as_it_was_written(diagnosed, tmp_path):
 
 
 def test_the_start_can_be_chosen_but_not_rest_for_segments():
-    chosen = {"segment": None, "seed": 0, "thorough": False, "start_at": "fit"}
+    chosen = {"segment": None, "panels": "auto", "thorough": False, "start_at": "fit"}
     assert command._options(SimpleNamespace(**chosen)).start == "fit"  # type: ignore[arg-type]
     assert command._options(SimpleNamespace(**chosen | {"start_at": None, "segment": 1.0})).start is None  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"starts of their own.*--start-at.*no --segment"):

@@ -9,13 +9,15 @@ from scipy.spatial.transform import Rotation
 from origami_sim.articulation import Articulation
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines
-from origami_sim.diagnose.compare import score
-from origami_sim.diagnose.forward import drive_of
+from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.locate import locate, motion, motions_of, touching
-from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared, starting
+from origami_sim.diagnose.nominal import nominal_fits
+from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
+from origami_sim.fit.drives import drive_of
 from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
 from origami_sim.fit.track import placed, track
 from origami_sim.materials import MU0
@@ -52,7 +54,7 @@ def toss(duration: float, push=0.0, **changes):
 def fitted(recording: Recording, **changes):
     """The forward model of a cube with these numbers, and its nominal fit: one segment."""
     subject = Subject.from_scene(cube_toss, settings(**changes))
-    forward = arranged(subject, prepared([recording], RATE), Options(segment=10.0, start="fit"))
+    forward, _ = arranged(subject, prepared([recording], RATE), Options(segment=10.0, start="fit"))
     return forward, nominal_fits(forward)[1]
 
 
@@ -140,12 +142,12 @@ def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
     }
     subject = Subject.from_model(model, parameters, signals, [])
     o = Options(segment=0.12, start="fit")
-    forward = arranged(subject, prepared([Recording("free", times, channels, drive)], 240.0), o)
+    forward, _ = arranged(subject, prepared([Recording("free", times, channels, drive)], 240.0), o)
     _, base, weights = nominal_fits(forward)
     angle, rate, missing = _samples(forward, motions_of(forward, base), 0, [0])
     assert np.ptp(angle) == pytest.approx(np.ptp(made.angles[:, 0, 0]), rel=0.1)
     assert np.polyfit(rate, missing, 1)[0] == pytest.approx(-9.8e-5, rel=0.1)
-    refitted, *others = baselines(forward, base, weights, score(forward, base, weights))
+    refitted, *others = baselines(forward, base, weights, held_out(forward, base, weights).rms)
     assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(refitted.rms) for b in others)
 
 
@@ -252,7 +254,7 @@ def test_what_is_seen_from_the_side_does_not_roll_to_explain_a_wrong_length(shor
     channels = {n: replace(c, values=(1.0 - shorter) * c.values) for n, c in recording.channels.items()}
     recording = replace(recording, channels=channels)
     subject = Subject.from_model(model, parameters, Drive(), [])
-    forward = arranged(subject, [recording], Options(segment=0.1, start="fit"))
+    forward, _ = arranged(subject, [recording], Options(segment=0.1, start="fit"))
     followed = track(forward, recording)
     poses = [*(b.pose for b in forward.blocks), followed.pose]
     turns = np.concatenate([Rotation.from_matrix(p.rotation).as_rotvec() for p in poses])

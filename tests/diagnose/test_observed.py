@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Subject
-from origami_sim.diagnose.forward import Forward
 from origami_sim.diagnose.observed import channel_tangents, check_recording, unobserved
 from origami_sim.errors import InputError
+from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.curves import Static
 from origami_sim.fit.prescribed import curves
 from origami_sim.recording import Channel, Recording
@@ -21,10 +21,10 @@ SWING = record(duration=0.5, panels=4, rate=100)
 TIP = int(np.argmin(MODEL.position[:, 2]))
 
 
-def seen_by(*channels: Channel | str) -> Forward:
+def seen_by(*channels: Channel | str) -> BarRollouts:
     every = [SWING.channels[c] if isinstance(c, str) else c for c in channels]
     recording = replace(SWING, channels={c.name: c for c in every})
-    return Forward(Subject.from_model(MODEL, PARAMETERS), [recording], segment=0.2)
+    return BarRollouts(Subject.from_model(MODEL, PARAMETERS), [recording], segment=0.2)
 
 
 def attached(name: str, kind: str, width: int = 1, **to) -> Channel:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose.patch import additions, read_additions, switched_on, write_patch
-from origami_sim.diagnose.verdict import _say
+from origami_sim.diagnose.words import say
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
@@ -77,13 +77,13 @@ def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
     f = SimpleNamespace(
         hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], deviations=lambda: np.array([1e-9])
     )
-    said = _say(f)  # type: ignore[arg-type]
+    said = say(f)  # type: ignore[arg-type]
     assert said.startswith(words) and "than stated at crease 1" in said
     low, high = said.partition("95 %: ")[2].rstrip(")").split(" to ")
     assert low != high, "an interval has two ends"
     lacking = replace(lower, more=False)
     other = SimpleNamespace(**{**vars(f), "hypothesis": Hypothesis((lacking,))})
-    assert "stated" not in _say(other)  # type: ignore[arg-type]
+    assert "stated" not in say(other)  # type: ignore[arg-type]
 
 
 def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_model(tmp_path):

@@ -7,9 +7,9 @@ import pytest
 
 from origami_sim.articulation import Articulation
 from origami_sim.diagnose import diagnose
-from origami_sim.diagnose.forward import Forward
 from origami_sim.drive import Drive
 from origami_sim.effects import get
+from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.model import State
 from origami_sim.observe import body_point, observe
@@ -42,7 +42,7 @@ def swing(*, distance: float = np.inf, duration: float = 3.0, noise: float = NOI
     return Recording("picture", motion.times, channels), motion
 
 
-def near(forward: Forward) -> Hypothesis:
+def near(forward: BarRollouts) -> Hypothesis:
     every = suspects(forward.model, forward.recordings, forward.drive)
     return Hypothesis((next(s for s in every if s.label == "perspective at the measurement"),))
 
@@ -51,7 +51,7 @@ def near(forward: Forward) -> Hypothesis:
 def test_pictures_are_what_a_pinhole_camera_sees_of_the_markers(distance):
     """To rounding, beside the same motion read as markers in space."""
     recording, _ = swing(distance=distance, duration=0.4, noise=1e-7)
-    forward = Forward(subject(3), [recording], start="fit")
+    forward = BarRollouts(subject(3), [recording], start="fit")
     nominal = [f.start for f in forward.subject.nominals]
     theta = np.array([*nominal, 1 / distance, 0.01, -0.02])
     (seen,) = forward.predict(near(forward), theta[None])
@@ -59,7 +59,7 @@ def test_pictures_are_what_a_pinhole_camera_sees_of_the_markers(distance):
         n: replace(c, kind="marker", camera=None, values=np.zeros((len(recording.times), 3)))
         for n, c in recording.channels.items()
     }
-    beside = Forward(subject(3), [replace(recording, channels=spatial)], start="fit")
+    beside = BarRollouts(subject(3), [replace(recording, channels=spatial)], start="fit")
     beside.blocks[0] = replace(beside.blocks[0], pose=forward.blocks[0].pose, rates=forward.blocks[0].rates)
     (whole,) = beside.predict(Hypothesis(), np.array([nominal]))
     x, y, z = np.moveaxis(whole[0].reshape(len(recording.times), 4, 3) - SIDE.origin, 2, 0)
@@ -80,7 +80,7 @@ def test_a_run_is_observed_through_a_near_camera():
 
 def test_perspective_is_suspected_of_pictures_only():
     recording, _ = swing(duration=0.4)
-    forward = Forward(subject(3), [recording], start="fit")
+    forward = BarRollouts(subject(3), [recording], start="fit")
     sites = [s.site for s in suspects(forward.model, [recording], forward.drive) if s.effect == "perspective"]
     assert sites == ["the measurement", *(f"channel m{n}" for n in range(4))]
     assert get("perspective").channels == ("marker_2d",)

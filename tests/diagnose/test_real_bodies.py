@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose import Options, Subject, diagnose
-from origami_sim.diagnose.forward import Forward
 from origami_sim.errors import InputError
+from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
-from origami_sim.fit.least_squares import Fit, Weights, fit
+from origami_sim.fit.least_squares import Fit, fit
+from origami_sim.fit.linear import Weights
 from origami_sim.model import State
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.scene import read_calibration, recordings_folder
@@ -92,7 +93,7 @@ def test_start_of_a_cube_is_found_however_far_it_has_turned():
         for n in cube_toss.NODES["impact"]
     }
     subject = Subject.from_model(model, parameters)
-    forward = Forward(subject, [Recording("toss", motion.times, channels)], start="fit")
+    forward = BarRollouts(subject, [Recording("toss", motion.times, channels)], start="fit")
     pose = forward.blocks[0].pose
     assert np.abs(forward.articulation.positions(pose)[:, 0] - start.x[:, 0]).max() < 1e-4
     np.testing.assert_allclose(forward.blocks[0].rates, [0.5, -0.7, 1.0, 4.0, -3.0, 5.0], atol=0.05)
@@ -158,7 +159,7 @@ def drops(tmp_path_factory):
 
 def crossed(subject: Subject, recordings: list[Recording], effect: str | None = None) -> list[tuple[Fit, float]]:
     """Fits to one drop with errors on the other [m], both ways; 0.1 m of error, a quarter of the frames count."""
-    forward = Forward(subject, recordings, start="fit")
+    forward = BarRollouts(subject, recordings, start="fit")
     found = suspects(forward.model, recordings, forward.drive, forward.parameters)
     added: tuple[Suspect, ...] = tuple(s for s in found if s.effect == effect)
     weights, out = Weights(np.array([0.1]), 0.25), []
@@ -318,7 +319,7 @@ def test_inertia_fitted_to_some_blows_predicts_others_better(tosses, tmp_path):
     published = np.array([f.start for f in subject.nominals])
     # 0.914 where the rates of the starts are held to the recorded ones; 0.884 where they may make up for what is wrong
     for held, most in ((False, 0.9), (True, 0.92)):
-        fitted, others = (Forward(subject, r, start="fit") for r in (train, test))
+        fitted, others = (BarRollouts(subject, r, start="fit") for r in (train, test))
         for forward in () if held else (fitted, others):
             forward.blocks = [replace(b, known=np.full_like(b.known, np.inf)) for b in forward.blocks]
         theta = fit(fitted, Hypothesis(), weights, most=10).theta

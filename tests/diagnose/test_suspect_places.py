@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from origami_sim.bodies import rigid
-from origami_sim.diagnose.hypothesis import Hypothesis, apply, suspects, told_apart
 from origami_sim.effects import CATALOGUE
+from origami_sim.fit.hypothesis import Hypothesis, apply, suspects, told_apart
 from origami_sim.model import node_mass
 from origami_sim.places import across, along, points, stretches
 from origami_sim.recording import Channel, Recording

@@ -1,117 +1,28 @@
-"""Sentences of the verdict, on explanations and places made by hand."""
-
-from types import SimpleNamespace
+"""What a verdict is made of: sets of explanations, and words for what is left."""
 
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import compare, verdict
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
-from origami_sim.diagnose.verdict import _named, _tied
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.recording import DriveChannel, Recording
+from origami_sim.diagnose.verdict import credible
+from origami_sim.diagnose.words import joined, said, title
 
 
-def explanation(site: str, strength: float):
-    free = (Free("crease_viscosity", "viscosity", "N m s/rad", 0.0, 1e-6),)
-    suspect = Suspect("crease_viscosity", site, "crease", free, more=True)
-    return SimpleNamespace(
-        hypothesis=Hypothesis((suspect,)), free=free, theta=np.array([strength]), deviations=lambda: np.array([1e-7])
-    )
+def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():
+    none, a, b, ab = frozenset(), frozenset("a"), frozenset("b"), frozenset("ab")
+    assert credible({a: 0.97, none: 0.03}) == ([a], 0.97)
+    assert credible({a: 0.6, b: 0.3, none: 0.1}) == ([a, b, none], pytest.approx(1.0))
+    named, total = credible({a: 0.7, ab: 0.2, b: 0.06, none: 0.04})
+    assert named == [a, b] and total == pytest.approx(0.96)
+    assert credible({ab: 0.6, a: 0.4})[0] == [ab, a], "of the two the simpler one is another explanation"
+    assert credible({none: 0.6, a: 0.4})[0] == [none, a]
 
 
-def sentence(*p: float) -> str:
-    """What is said of more viscosity at one crease, and less at another, that have these probabilities."""
-    rows = [explanation("fold1", 2e-6), explanation("fold2", -2e-6)][: len(p)]
-    weighed = SimpleNamespace(
-        gain=100.0, best=rows[0], base=None, kept=rows, total=sum(p), small=False, rows=rows, fall="the error falls",
-        probability=lambda f: p[rows.index(f)],
-    )  # fmt: skip
-    said = _named(weighed)  # type: ignore[arg-type]
-    assert said.verdict == "MECHANISM" and said.chosen == ["crease_viscosity at fold1"]
-    return said.sentence
-
-
-def test_the_sentence_says_where_else_the_same_effect_may_act():
-    assert ") (these recordings do not tell that from less at fold2), p = " in sentence(0.6, 0.4)
-    for sure in (sentence(1.0), sentence(0.95, 0.05)):
-        assert "these recordings" not in sure and "), p = " in sure
-
-
-def test_a_tie_says_what_all_of_its_explanations_contain():
-    def hypothesis(*pairs):
-        suspects = tuple(Suspect(effect, site, "crease", ()) for effect, site in pairs)
-        return SimpleNamespace(hypothesis=Hypothesis(suspects))
-
-    one, two, tilt = ("angle_offset", "channel 1"), ("angle_offset", "channel 2"), ("gravity_tilt", "the body")
-    p = (0.7, 0.3)
-    assert _tied([hypothesis(one, two), hypothesis(one, tilt)], p).endswith(
-        "; all of them contain angle_offset at channel 1"
-    )
-    assert _tied([hypothesis(one), hypothesis(two)], p).endswith("contain angle_offset at one place or another")
-    assert "contain" not in _tied([hypothesis(one), hypothesis(tilt)], p)
-
-
-def test_that_nothing_is_missing_is_never_surer_than_it_was_before():
-    assert verdict.chance_of_null(1.0) == verdict.chance_of_null(0.5) == 0.8
-    assert 0.0 < verdict.chance_of_null(0.001) < 0.1 < verdict.chance_of_null(0.05) < 0.8
-
-
-@pytest.mark.parametrize(
-    ("shows", "does", "unknown"),
-    [(9.0, 0.1, True), (9.0, 0.9, False), (2.3, 0.1, False), (verdict.STRUCTURED, 0.1, True)],
-)
-def test_two_that_cancel_are_refuted_where_something_shows_without_them(monkeypatch, shows, does, unknown):
-    monkeypatch.setattr(verdict, "together", lambda f: does)
-    monkeypatch.setattr(verdict, "_say", lambda f: "one and the other")
-    best = SimpleNamespace(
-        free=(), theta=(), hypothesis=SimpleNamespace(free=(), suspects=("one", "other"), label="one + other")
-    )
-    left = {"share": 0.0, "after": SimpleNamespace(repeated=0.0), "leaves": False, "fall": "it falls", "kept": []}
-    error = {"over": 2.0, "left": 1.0}
-    found = verdict._refuted(SimpleNamespace(best=best, before=SimpleNamespace(score=shows), **left, **error))  # type: ignore[arg-type]
-    assert (found is not None) == unknown
-    if found is not None:
-        assert found.verdict == "UNKNOWN" and "mostly cancel" in found.sentence
-
-
-@pytest.mark.parametrize(("over", "left", "unknown"), [(6.5, 433.0, True), (6.5, 1.0, False), (0.5, 1.2, False)])
-def test_what_predicts_held_out_data_much_worse_than_nothing_is_not_named(monkeypatch, over, left, unknown):
-    """An ageing friction of the proof was called static friction, with 433 instead of 6.5 times the noise held out."""
-    monkeypatch.setattr(verdict, "_say", lambda f: "one")
-    best = SimpleNamespace(
-        free=(), theta=(), hypothesis=SimpleNamespace(free=(), suspects=("one",), label="one at a crease")
-    )
-    same = {"share": 0.0, "after": SimpleNamespace(repeated=0.0), "leaves": False, "fall": "it falls", "kept": []}
-    found = verdict._refuted(
-        SimpleNamespace(best=best, before=SimpleNamespace(score=9.0), over=over, left=left, **same)  # type: ignore[arg-type]
-    )
-    assert (found is not None) == unknown
-    assert found is None or (found.verdict == "UNKNOWN" and "much worse" in found.sentence)
-
-
-@pytest.mark.parametrize(
-    ("levels", "folds"),
-    [
-        ((1.0, 2.0, 1.01, 2.0), [[0, 1, 4, 5], [2, 3, 6, 7]]),  # repeats tell what they are to predict
-        ((1.0, 1.0, 1.0, 1.0), [[0, 1], [2, 3], [4, 5], [6, 7]]),
-        ((None, None, None, None), [[0, 1], [2, 3], [4, 5], [6, 7]]),
-        ((None, 1.0, 1.0, None), [[0, 1], [2, 3, 4, 5], [6, 7]]),
-    ],
-)
-def test_recordings_of_one_drive_level_are_held_out_together(levels, folds):
-    def recorded(level):
-        t = np.linspace(0.0, 1.0, 11)
-        values = np.stack([0.0 * t, -(level or 0.0) * np.sin(7.0 * t)], axis=1)
-        drive = {} if level is None else {"field": DriveChannel("field", values, "T", False)}
-        return Recording("a", t, {}, drive)
-
-    forward = SimpleNamespace(
-        recordings=[recorded(level) for level in levels],
-        blocks=[SimpleNamespace(recording=n // 2) for n in range(8)],
-    )
-    assert compare.folds(forward, range(8)) == folds
+def test_words_are_those_of_a_physicist():
+    assert joined(["a", "b", "c"]) == "a, b and c" and joined(["a"]) == "a"
+    assert said(1.03, "-") == "1.03" and said(0.0123, "rad").endswith("rad")
+    assert title("air_drag")[0].islower() and "_" not in title("air_drag")
 
 
 def place(law, *, memory=0.0, share=0.9) -> Place:

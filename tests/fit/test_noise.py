@@ -6,8 +6,8 @@ from scipy.signal import butter, lfilter, sosfilt
 from scipy.stats import chi2
 
 from origami_sim.errors import InputError
-from origami_sim.fit import Burst, Noise, infer, noise_of, portmanteau
 from origami_sim.fit.colour import MEDIAN, all_colours
+from origami_sim.fit.noise import Burst, Noise, infer, noise_of, portmanteau
 from origami_sim.recording import Camera, Channel, Recording, noise_report
 
 RATE = 240.0

@@ -1,0 +1,129 @@
+"""What is compared: frames that are thinned or left out, segments, suspects that are asked for, bad data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from origami_sim.diagnose import Options, diagnose
+from origami_sim.diagnose.arrange import arranged
+from origami_sim.diagnose.prepare import among, prepared
+from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import suspects
+from origami_sim.recording import Channel, NoiseReport, Recording
+from tests.diagnose.strips import hanging, record, subject
+
+SMALL = {"duration": 4.0, "panels": 3, "rate": 100}
+
+
+def test_frames_are_thinned_but_not_below_what_a_comparison_needs():
+    swing = record(**SMALL)
+    (same,) = prepared([replace(swing, times=swing.times / 100)], 200.0)
+    assert len(same.times) == len(swing.times), "40 ms at 10 kHz are few frames, not many"
+    long = record(panels=3, duration=5.0, rate=400)
+    (half,) = prepared([long], 200.0)
+    assert len(half.times) == pytest.approx(len(long.times) / 2, abs=1)
+
+
+def test_thinned_frames_are_means_that_follow_a_bend():
+    """Noise falls with the root of the frames, the motion stays, and what cannot be averaged stays as it was read."""
+    t, rng = np.arange(4001) / 1000.0, np.random.default_rng(2)
+    swing = 0.7 * np.sin(2 * np.pi * 6.0 * t)
+
+    def thin(values, times=t, quantum=0.0):
+        noise = 0.01
+        known = NoiseReport(noise, noise, quantum, 0.0, noise, np.nan, np.nan, 0)
+        channel = Channel("a", "crease_angle", values, "rad", noise, noise_report=known)
+        (out,) = prepared([Recording("r", times, {"a": channel})], 200.0)
+        return out
+
+    exact = thin(swing)
+    assert np.array_equal(exact.times, t[::5])
+    assert exact.channels["a"].values == pytest.approx(swing[::5], abs=5e-6)  # a plain mean is off by 1e-3
+    noisy = thin(swing + rng.normal(0.0, 0.01, 4001)).channels["a"]
+    left = (noisy.values - swing[::5])[1:-1]
+    assert np.std(left) == pytest.approx(noisy.noise, rel=0.08) and noisy.noise < 0.52 * 0.01
+    assert abs(np.mean(left[1:] * left[:-1])) < 0.15 * np.var(left)
+    assert noisy.noise_report.level == noisy.noise
+    smooth = np.convolve(rng.normal(0.0, 0.02, 4005), np.ones(5) / 5.0, "valid")  # frames that are alike
+    alike = thin(swing + smooth).channels["a"]
+    assert 0.75 < alike.noise / np.std((alike.values - swing[::5])[1:-1]) < 1.1 and alike.noise > 1.2 * noisy.noise
+    counted = thin(0.03 * np.round(0.1 * swing / 0.03), quantum=0.03).channels["a"]  # steps are no noise that averages
+    assert counted.noise == pytest.approx(0.03 / np.sqrt(12.0))
+    gap = np.where(t > 2.0, t + 0.5, t)
+    assert thin(swing, gap).channels["a"].values == pytest.approx(swing[::5], abs=5e-6)
+    holes = np.where(rng.random(4001) < 0.02, np.nan, 0.0)
+    assert thin(swing + holes).channels["a"].values == pytest.approx(swing[::5], abs=2e-4, nan_ok=True)
+    holed = thin(swing + holes + rng.normal(0.0, 0.01, 4001)).channels["a"]
+    assert np.nanstd((holed.values - swing[::5])[1:-1]) == pytest.approx(holed.noise, rel=0.08)
+    assert np.isnan(holed.values).sum() <= 2
+
+
+@pytest.mark.parametrize(("rate", "every"), [(400, 2), (500, 2), (700, 3), (800, 4)])
+def test_no_frame_is_thrown_away_where_frames_are_thinned(rate, every):
+    t, rng = np.arange(10 * rate) / rate, np.random.default_rng(3)
+    swing = 0.7 * np.sin(2 * np.pi * 4.0 * t)
+
+    def thin(values):
+        made = Recording("r", t, {"a": Channel("a", "crease_angle", values, "rad", 0.01)})
+        return prepared([made], 200.0)[0]
+
+    assert np.array_equal(thin(swing).times, t[::every])
+    assert thin(swing).channels["a"].values == pytest.approx(swing[::every], abs=2e-5)
+    noisy = thin(swing + rng.normal(0.0, 0.01, len(t))).channels["a"]
+    left = (noisy.values - swing[::every])[1:-1]
+    assert np.std(left) == pytest.approx(noisy.noise, rel=0.08)
+    assert noisy.noise < 1.25 * 0.01 / np.sqrt(every)  # a mean without its bend has 1 / root
+
+
+def test_wild_frames_are_left_out_and_told():
+    t = np.arange(800) / 120.0
+    values = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)], axis=1)
+    values[[100, 300]] += 0.5
+    made = Recording("r", t, {"m": Channel("m", "marker_2d", values, "m", 1e-3)}, metadata={"notes": ["known."]})
+    (found,) = prepared([made], 200.0)
+    assert np.flatnonzero(np.isnan(found.channels["m"].values).all(axis=1)).tolist() == [100, 300]
+    assert found.metadata["notes"] == [
+        "known.", "r: 2 wild frames of channel 'm' are left out, the first at t = 0.833333 s."
+    ]  # fmt: skip
+    curve = replace(made, metadata={"time_base": "step"})
+    assert prepared([curve], 200.0)[0].channels["m"].values is values
+
+
+def test_a_segment_that_is_asked_for_has_a_start_of_its_own():
+    at_rest = record(**SMALL, size=0.0)
+    assert arranged(subject(3), [at_rest], Options(panels="elastic"))[0].start == "rest"
+    cut, _ = arranged(subject(3), [at_rest], Options(segment=0.5))
+    assert cut.start == "fit" and len(cut.blocks) > 1
+    for length in (0.0, 1e-9, np.inf, np.nan):
+        with pytest.raises(InputError, match=r"segment.*allowed: >= 0\.08 s"):
+            arranged(subject(3), [at_rest], Options(segment=length))
+
+
+def test_all_frames_of_rigid_panels_are_compared_and_that_they_are_rigid_is_said():
+    swing = record(**SMALL)
+    forward, notes = arranged(subject(3), prepared([swing], 200.0), Options())
+    assert forward.panels == "rigid" and len(forward.blocks) > 4
+    assert sum(b.seen().sum() for b in forward.blocks) == 2 * len(swing.times)
+    assert len(notes) == 1 and notes[0].startswith("Panels are taken as rigid")
+    bars, notes = arranged(subject(3), prepared([swing], 200.0), Options(panels="elastic"))
+    assert bars.panels == "elastic" and not notes
+
+
+def test_effects_that_cannot_act_are_not_left_out_without_a_word():
+    swing = record(**SMALL)
+    model, _ = hanging(3)
+    every = suspects(model, [swing], subject(3).build({})[2])
+    assert {s.effect for s in among(every, ["crease_friction", "adhesion"])} == {"crease_friction"}
+    with pytest.raises(InputError, match=r"none of these can act.*adhesion.*air_drag.*crease_friction"):
+        among(every, ["adhesion"])
+    with pytest.raises(InputError, match="no such effect"):
+        among(every, ["crease_frictn"])
+
+
+def test_bad_data_are_named():
+    with pytest.raises(InputError, match="nothing to diagnose"):
+        diagnose(subject(), [])
+    short = record(duration=0.05, rate=100)
+    with pytest.raises(InputError, match="too short"):
+        diagnose(subject(), [short])

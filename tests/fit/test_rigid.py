@@ -1,0 +1,161 @@
+"""Predictions by rigid panels: tied segments of noise-free swings, devices that float, and bars that become stiff."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from origami_sim.articulation import Articulation
+from origami_sim.bodies import rigid
+from origami_sim.build import Sheet
+from origami_sim.diagnose import Subject
+from origami_sim.drive import Drive
+from origami_sim.fit.bars import BarRollouts
+from origami_sim.fit.hypothesis import Hypothesis, suspects
+from origami_sim.fit.least_squares import fit
+from origami_sim.fit.linear import Weights
+from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.model import State
+from origami_sim.pattern import strip
+from origami_sim.recording import Channel, Recording
+from origami_sim.solve.dynamics import simulate
+from tests.diagnose.strips import hanging, subject
+
+NOISE, RATE = 1e-3, 100.0
+
+
+def swung(model, parameters, *, duration=1.5, push=None) -> Recording:
+    """Fold angles of a swing of rigid panels, without noise."""
+    model, parameters = rigid(model, parameters)
+    arm = Articulation(model)
+    start = np.resize([0.9, -0.7, 0.8], arm.size)[:, None]
+    state = State.at_rest(model, position=arm.positions(arm.moved(arm.reference(), start))[:, 0])
+    made = simulate(model, parameters, push or Drive(), duration=duration, rate=RATE, state=state, tolerance=1e-10)
+    channels = {
+        f"fold{c}": Channel(f"fold{c}", "crease_angle", made.creases[:, c, 0], "rad", NOISE, {"crease": c})
+        for c in range(made.creases.shape[1])
+    }
+    return Recording("swing", made.times, channels)
+
+
+SHARP = 1e-6
+"""What exact data are weighed by, in the channels' units and as a part of usual rates: far below the noise."""
+
+
+def fitted(forward, **options):
+    deviation = np.full(len(forward.components), SHARP)
+    return fit(forward, Hypothesis(), Weights(deviation, 1.0, SHARP), most=20, done=0.0, **options)
+
+
+def gap_of(f) -> float:
+    """The largest gap between segments, as a part of what coordinates and rates usually change by."""
+    return SHARP * max(
+        np.abs(r[w.data + w.start :]).max(initial=0.0) for w, r in zip(f.linear.rows, f.linear.residual, strict=True)
+    )
+
+
+@pytest.fixture(scope="module")
+def tied() -> RigidRollouts:
+    return RigidRollouts(subject(3), [swung(*hanging(3))], segment=0.3)
+
+
+def test_all_frames_are_compared_and_each_segment_begins_where_the_one_before_ends(tied):
+    (recording,) = tied.recordings
+    firsts = [b.first for b in tied.blocks]
+    assert len(firsts) == 5 and firsts == list(np.cumsum([0, *(len(b.times) for b in tied.blocks)])[:-1])
+    assert sum(b.seen().sum() for b in tied.blocks) == 2 * len(recording.times)
+    assert [b.reach is not None for b in tied.blocks] == [True] * 4 + [False]
+    for b, after in pairwise(tied.blocks):
+        assert b.lasting == pytest.approx(recording.times[after.first] - recording.times[b.first])
+
+
+def test_a_fit_of_what_is_exact_leaves_rounding(tied):
+    f = fitted(tied, fixed=True)
+    assert not f.failed
+    assert max(np.abs(r).max() for r in f.residuals) < 1e-7
+    assert gap_of(f) < 1e-7
+    (ends,) = tied.shoot(Hypothesis(), f.theta[None], f.local[None], [1]).ends
+    assert ends[0] == pytest.approx(f.local[2], abs=1e-5)
+
+
+def test_ends_tell_where_the_next_segment_starts_whatever_its_own_start_is(tied):
+    """The shift of a start by as much as a motion missed it makes both meet."""
+    starts = np.zeros((1, len(tied.blocks), tied.local))
+    starts[0, 0] = [0.02, -0.01, 0.3, 0.2]
+    first = tied.shoot(Hypothesis(), [np.ones(3)], starts)
+    starts[0, 1] = first.ends[0][0]
+    whole = RigidRollouts(subject(3), tied.recordings)
+    own = starts[:, :1].copy()
+    long = whole.shoot(Hypothesis(), [np.ones(3)], own).values[0][0]
+    second = tied.shoot(Hypothesis(), [np.ones(3)], starts, [1]).values[0][0]
+    n = tied.blocks[1].first
+    assert np.abs(long[n : n + len(second)] - second).max() < 1e-6
+
+
+def test_numbers_are_found_to_rounding_and_better_where_segments_are_tied():
+    model, parameters = hanging(3)
+    parameters.set("crease", "stiffness", 1.03 * parameters["crease", "stiffness"])
+    recording = swung(model, parameters)
+    known = subject(3)
+    known = replace(known, nominals=known.nominals[:1])
+    found = {}
+    for tied in (True, False):
+        forward = RigidRollouts(known, [recording], segment=0.3, tied=tied)
+        f = fitted(forward)
+        assert f.theta[0] == pytest.approx(1.03, abs=0.1 * f.deviations()[0])
+        found[tied] = f.deviations()[0]
+    assert found[True] < 0.7 * found[False]  # 0.62
+
+
+def test_a_segment_with_an_effect_meets_the_next_one_too(tied):
+    """Friction slows each segment down: what is predicted with it, tied and in one piece, is the same."""
+    every = suspects(tied.model, tied.recordings, tied.drive, tied.parameters)
+    one = next(s for s in every if s.effect == "air_drag" and s.entities is None)
+    theta = np.array([1.0, 1.0, 1.0, 0.8])
+    hypothesis = Hypothesis((one,))
+    starts = np.zeros((1, len(tied.blocks), tied.local))
+    for b in range(len(tied.blocks) - 1):
+        starts[0, b + 1] = tied.shoot(hypothesis, [theta], starts, [b]).ends[0][0]
+    pieces = np.concatenate([v[0] for v in tied.predict(hypothesis, [theta], starts)])
+    whole = RigidRollouts(tied.subject, tied.recordings).predict(hypothesis, [theta])[0][0]
+    assert np.abs(pieces - whole).max() < 1e-5
+    assert np.abs(whole - tied.recordings[0].channels["fold0"].values[:, None]).max() > 0.05
+
+
+def test_a_floating_device_is_followed_through_its_turns():
+    """Two panels that are tossed, by markers: six coordinates of the root and a fold, tied as well."""
+    sheet = Sheet(strip([0.03, 0.02], 0.02), thickness=1.5e-3, modulus=1.5e6, triangulation="center")
+    sheet.crease(stiffness=2e-4).set("crease_viscosity", viscosity=1e-6)
+    sheet.gravity((0.0, 0.0, -9.81))
+    model, parameters = rigid(*sheet.build())
+    state = State.at_rest(model, position=model.position)
+    centre = model.position.mean(axis=0)
+    spin, throw = np.array([3.0, -8.0, 5.0]), np.array([0.1, 0.2, 2.0])
+    state.v[:, 0] = np.cross(spin, model.position - centre) + throw
+    made = simulate(model, parameters, duration=0.6, rate=200.0, state=state, tolerance=1e-10)
+    channels = {f"m{n}": Channel(f"m{n}", "marker", made.x[:, n, 0], "m", 1e-4, {"node": n}) for n in range(6)}
+    forward = RigidRollouts(
+        Subject.from_model(*sheet.build(), Drive()), [Recording("toss", made.times, channels)], segment=0.15
+    )
+    assert forward.articulation.floating and forward.local == 14 and len(forward.blocks) == 4
+    assert all(b.reach is not None for b in forward.blocks[:-1])
+    f = fitted(forward, fixed=True)
+    assert max(np.abs(r).max() for r in f.residuals) < 1e-8
+    assert gap_of(f) < 1e-6
+
+
+def test_bars_become_rigid_panels_as_they_stiffen():
+    """With the masses at the same nodes, what panels yield falls as one over their stiffness."""
+    recording, apart = swung(*hanging(3), duration=0.3), []
+    model, parameters = hanging(3)
+    parameters.set("body", "mass", 0.0)  # masses stay at the nodes, where those of bars are
+    stiff = RigidRollouts(Subject.from_model(model, parameters), [recording])
+    seen = stiff.predict(Hypothesis(), [np.zeros(0)])[0][0]
+    for factor in (1.0, 10.0):
+        harder = parameters.copy()
+        for key in (("bars", "stiffness"), ("panel_bending", "stiffness")):
+            harder.set(*key, factor * parameters[key])
+        bars = BarRollouts(Subject.from_model(model, harder), [recording])
+        apart.append(np.abs(bars.predict(Hypothesis(), [np.zeros(0)])[0][0] - seen).max())
+    assert apart[1] < 0.2 * apart[0] and apart[0] < 3 * NOISE
