@@ -43,6 +43,9 @@ BENDING = 0.3
 JOINTS = 16
 """Creases of rigid panels beyond which their dense equations are slower than bars."""
 
+WINDOW = 10
+"""Frames about whose parabola the scatter of a recording is taken."""
+
 PROBED = 0.3
 """Time over which bending is looked for, in a few places [s]."""
 
@@ -165,6 +168,8 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
         now, _ = channel_tangent(model, arm, recording, arm.reference(), values[0])
         # a start on the ground is better guessed than fitted: where feet touch turns on micrometres
         standing = arm.floating and len(model.contacts) and len(set(units_of(recording))) == 1
+        if standing and len(values) >= 4 * WINDOW:  # a tracker that smooths hides its noise from the next frames
+            noise = np.maximum(noise, np.sqrt(np.nan_to_num(np.nanmedian(scatter(values), axis=0))))
         with np.errstate(invalid="ignore"):
             begun = np.nanmedian(values[head], axis=0)
             away = begun - now
@@ -177,6 +182,14 @@ def starting(subject: Subject, recordings: list[Recording]) -> str:
         if not still and not _just_begun(recording.times, values, noise, now, near):
             return "fit" if arm.size else "rest"
     return "rest"
+
+
+def scatter(values: np.ndarray) -> np.ndarray:
+    """(K, D) variance of values (n, D) about a parabola over each window; nan where a frame of it is missing."""
+    parts = values[: len(values) // WINDOW * WINDOW].reshape(-1, WINDOW, values.shape[1])
+    q, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, WINDOW), 3))
+    fast = parts - np.einsum("ij,kj,nkd->nid", q, q, parts)
+    return np.sum(fast**2, axis=1) / (WINDOW - 3)
 
 
 def _just_begun(times: np.ndarray, values: np.ndarray, noise: np.ndarray, reference: np.ndarray, near) -> bool:

@@ -51,7 +51,9 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
         nan = [float("nan")] * len(forward.components)
         return [*out, Baseline("sparse regression (STLSQ)", nan, why), Baseline("Gaussian process", nan, why)]
 
-    motions = [motion(forward, base, r) for r in range(len(forward.recordings))] if forward.start == "fit" else [None]
+    motions: list = [None]
+    if forward.start == "fit":
+        motions = [motion(forward, base, r) for r in range(len(forward.recordings))]  # type: ignore[arg-type]
     if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
     halves = _halves(forward)

@@ -38,7 +38,7 @@ from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
 
 ROUNDS = 3
-"""Times that weights follow the best explanation: what it leaves is the noise that all are judged by."""
+"""Times that weights follow the explanation that leaves least: that is the noise that all are judged by."""
 
 SAME = 0.1
 """Relative change of deviations below which weights have settled."""
@@ -132,7 +132,12 @@ def diagnose(
     experiments = attempt(
         noted,
         "The next experiment",
-        lambda: propose(forward, judged, weights, progress=lambda part: tell("next experiment", part)),
+        lambda: propose(
+            forward,  # type: ignore[arg-type]
+            judged,
+            weights,
+            progress=lambda part: tell("next experiment", part),
+        ),
         [],
     )
     lap("next experiment")
@@ -176,7 +181,7 @@ def diagnose(
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
-        impulses=attempt(noted, "Impulses", lambda: impulses(forward, base), []),
+        impulses=attempt(noted, "Impulses", lambda: impulses(forward, base), []),  # type: ignore[arg-type]
         acting=actions,
     )
     tell("done", 1.0)
@@ -188,8 +193,7 @@ def settled(
 ) -> tuple[Fit, Fit, Weights, Posterior]:
     """All judged by what the best explanation leaves, as given and refitted as well, and searched again."""
     for _ in range(ROUNDS):
-        chance = p.probabilities()
-        best = max(p.nodes, key=lambda k: chance.get(k, 0.0))
+        best = min(p.nodes, key=lambda k: p.nodes[k].fit.cost)
         new = weights_from(forward, p.nodes[best].fit)
         if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
             break

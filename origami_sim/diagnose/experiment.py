@@ -110,7 +110,7 @@ def _menu(forward: Rollouts) -> list[tuple[str, Rollouts]]:
         for size in (0.1, 0.3, 2.0):
             out.append((f"start from {size:g} times the displacement and rate", _variant(forward, size=size)))
         out.append(("let it run three times as long", _variant(forward, stretch=3.0)))
-    varying = [n for d in forward._drives for n, s in d.signals.items() if not s.is_zero]
+    varying = [n for d in forward.drives for n, s in d.signals.items() if not s.is_zero]
     if varying:
         names = ", ".join(sorted({n.split("_")[0] for n in varying}))
         for gain in (0.3, 0.6, 1.5):
@@ -175,10 +175,10 @@ def _variant(
         values = np.zeros((len(times), b.values.shape[1]))
         out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=values, reach=None, lasting=0.0))
     if gain != 1.0 or speed != 1.0:
-        out._drives = [_changed(d, gain, speed) for d in forward._drives]
+        out.drives = [_changed(d, gain, speed) for d in forward.drives]
     if held:
         spans = [float(r.times[-1] - r.times[0]) for r in forward.recordings]
-        out._drives = [_held(d, span) for d, span in zip(forward._drives, spans, strict=True)]
+        out.drives = [_held(d, span) for d, span in zip(forward.drives, spans, strict=True)]
     if tilt or load != 1.0 or clamped is not None:
         build = forward.subject.build
 

@@ -41,7 +41,7 @@ def _blows(forward: Rollouts, fit: Fit, block, recording, tracks: list[Track]) -
     given = parameters.for_model(free)
     step, count = float(np.median(np.diff(block.times))), len(block.times)
     start = float(recording.times[block.first] - recording.times[0])
-    drive = distorted(model, parameters, forward._drives[block.recording], start + float(block.times[-1]))
+    drive = distorted(model, parameters, forward.drives[block.recording], start + float(block.times[-1]))
     held = drive.held(start + float(block.times[count // 2]))
     found = []
     for t in tracks:

@@ -105,7 +105,7 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     model, parameters = forward.world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
     without, parameters = loose(model, parameters)
     pose = followed.at(grid + recording.times[0], smooth)
-    drive = distorted(without, parameters, forward._drives[index], float(grid[-1]))
+    drive = distorted(without, parameters, forward.drives[index], float(grid[-1]))
     frozen = drive.replace(**{n: Signal(offset=_at(s, grid)) for n, s in drive.signals.items()})
     inertia, free, gaps = dynamics(forward, without, parameters, frozen, pose, rate)
     keep = np.ones(len(grid), bool)

@@ -146,10 +146,10 @@ def _signatures(forward: Predictor, group: Sequence[Suspect], base: Fit, weights
     parts = _changes(forward, group, size, base, weights)
     norm = np.array([np.linalg.norm(np.concatenate(p)) for p in parts])
     ratio = np.where(~np.isfinite(norm), 0.01, np.where(norm > 0, goal / np.maximum(norm, 1e-30), 100.0))
-    redo = np.flatnonzero((ratio < 0.1) | (ratio > 10.0))
+    redo: list[int] = np.flatnonzero((ratio < 0.1) | (ratio > 10.0)).tolist()
     for k in redo:
         size[k] = _affordable(forward, base, group[k], size[k] * np.clip(ratio[k], 1e-4, 1e4), least)
-    if len(redo):
+    if redo:
         again = _changes(forward, [group[k] for k in redo], size[redo], base, weights)
         for k, new in zip(redo, again, strict=True):
             parts[k] = new

@@ -196,8 +196,9 @@ def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndar
     for n, s in enumerate(signatures):
         kinds.setdefault(s.suspect.effect, []).append(n)
     out = np.zeros(len(signatures))
-    for mine in kinds.values():
-        out[mine] = -np.log(len(kinds)) - np.log(len(mine))
+    for mine in kinds.values():  # a recorder as a whole is as likely to be wrong as all of its channels alone
+        share = np.array([1.0 / signatures[n].suspect.sites for n in mine])
+        out[mine] = np.log(share / share.sum()) - np.log(len(kinds))
     return out + np.log(hyper.effects)
 
 

@@ -156,7 +156,7 @@ def correlations(forward: Predictor, base: Fit, best: Fit) -> list[Correlation]:
 def varying_drive(forward: Predictor):
     """Name of the drive channel that varies most; None: nothing varies."""
     spans: dict[str, float] = {}
-    for drive, r in zip(forward._drives, forward.recordings, strict=True):
+    for drive, r in zip(forward.drives, forward.recordings, strict=True):
         for name, signal in drive.signals.items():
             values = np.squeeze(signal(r.times - r.times[0]))
             spans[name] = max(spans.get(name, 0.0), float(np.ptp(values)) if values.ndim else 0.0)
@@ -174,7 +174,7 @@ def _against(forward: Predictor, f: Fit, d: int, drive: str | None) -> list[np.n
             start = (
                 forward.recordings[block.recording].times[block.first] - forward.recordings[block.recording].times[0]
             )
-            out.append(np.squeeze(forward._drives[block.recording][drive](start + block.times)))
+            out.append(np.squeeze(forward.drives[block.recording][drive](start + block.times)))
     return out
 
 

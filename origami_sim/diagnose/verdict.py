@@ -23,6 +23,12 @@ ALONE = 0.8
 MOSTLY = 0.5
 """Share of the mismatch that has to be named, or else what is left is the news."""
 
+FAR = 2.0
+"""Error over the noise from which a model that is refitted is not adequate, whatever is more probable.
+
+A tracker that smooths over several frames hides up to half of its noise from neighbouring frames, where it is read.
+"""
+
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
 
@@ -105,7 +111,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, weights: Weig
 def _nothing_named(forward, given, base, p, shares, rest, discrepancy, chance, compared) -> Judgement:
     """Where no effect is more probable than none: adequate, a number, or real and not in the catalogue."""
     over = pooled(_rms(base) / forward.blocks[0].noise)
-    if discrepancy > MOSTLY and rest > MOSTLY:
+    if over > FAR or (discrepancy > MOSTLY and rest > MOSTLY):
         text = f"The refitted model misses the recordings by {over:.2f} times the noise, and nothing in the catalogue "
         return Judgement("UNKNOWN", f"{text}explains it.", np.nan, [], base)
     if compared < COMPARED:

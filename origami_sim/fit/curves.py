@@ -86,7 +86,7 @@ class Curves(Worlds, ABC):
                     "curves do not tell how panels turn under a marker", field=e, allowed="recordings of a motion"
                 )
         silent = self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
-        self._drives = [drive_of(self._driven(r), silent) for r in self.recordings]
+        self.drives = [drive_of(self._driven(r), silent) for r in self.recordings]
         self._rested: dict[int, list[Drive]] = {}
         pose, rates = self.articulation.reference(), np.zeros(self.articulation.size)
         for index, r in enumerate(self.recordings):
@@ -167,7 +167,7 @@ class Curves(Worlds, ABC):
     def _resting(self, r: int, model: Model, parameters: Parameters) -> list[Drive]:
         """The drive of each load step as it reaches the device, held; what distorts it may remember earlier steps."""
         steps = len(self.recordings[r].times)
-        commanded = self._drives[r]
+        commanded = self.drives[r]
         drive = distorted(model, parameters, commanded, float(steps - 1))
         if drive is not commanded:
             return [drive.held(float(k)) for k in range(steps)]
@@ -183,11 +183,11 @@ class Curves(Worlds, ABC):
     def menu(self) -> list[tuple[str, "Curves"]]:
         """Experiments like those recorded that a user could make: what, and its predictions."""
         out: list[tuple[str, Curves]] = [("repeat the same curve", self._other())]
-        if any(not s.is_zero for d in self._drives for s in d.signals.values()):
-            names = sorted({n.split("_")[0] for d in self._drives for n, s in d.signals.items() if not s.is_zero})
+        if any(not s.is_zero for d in self.drives for s in d.signals.values()):
+            names = sorted({n.split("_")[0] for d in self.drives for n, s in d.signals.items() if not s.is_zero})
             for gain, words in ((0.3, "at 0.3 times the level"), (2.0, "at twice the level"), (-1.0, "reversed")):
                 other = self._other()
-                other._drives = [_gained(d, gain) for d in self._drives]
+                other.drives = [_gained(d, gain) for d in self.drives]
                 out.append((f"{' and '.join(names)} {words}", other))
         return out
 
@@ -264,7 +264,7 @@ class Static(Curves):
     def _system(self, model: Model, worlds) -> _System:
         """Couplings and colours of a model, which depend on its effects only."""
         if model.effects not in self._systems:
-            groups = np.zeros(len(self._drives[0].signals) - len(CHANNELS))
+            groups = np.zeros(len(self.drives[0].signals) - len(CHANNELS))
             drive = Drive(voltage=list(groups))
             self._systems[model.effects] = _System(model, worlds[0][1], drive, State.at_rest(model))
         return self._systems[model.effects]

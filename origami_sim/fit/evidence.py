@@ -7,8 +7,8 @@ About a fit, whitened residuals are
 with nominal numbers N, the fit's own effects H, further effects G_J, *flaws* b (every suspect of the catalogue acts a
 little in every device), a *discrepancy* c that is smooth in each channel, and one in the forces, which is the variance
 of the gaps between tied segments (see `linear`). All priors are normal but those of strengths, which are mixtures of
-normals on the scale of detectability d'. So all that is unknown is summed out in closed form, with the
-leading normals of each mixture (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
+normals on the scale of detectability d'. So all that is unknown is summed out in closed form, in Laplace's
+approximation for strengths (MacKay 1992; Kennedy & O'Hagan 2001; George & McCulloch 1997).
 """
 
 from collections.abc import Sequence
@@ -19,6 +19,12 @@ from scipy.special import log_ndtr, logsumexp
 
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
+
+ROUNDS = 4
+"""Times that the mode of strengths is found, each with the prior's curvature at the last one.
+
+Without the curvature two effects that look the same would have a volume far beyond what the prior gives them.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +124,7 @@ class Sets:
         for k in range(own):
             g = groups[k]
             lacks = np.array([k not in row for row in sets])
-            back[np.ix_(lacks, g.columns[: g.strengths])] = g.at[: g.strengths]
+            back[np.ix_(lacks, np.array(g.columns[: g.strengths], int))] = g.at[: g.strengths]
         return cls(
             each(lambda g: g.columns, int),
             each(lambda g: g.at),
@@ -155,34 +161,25 @@ class Summed:
         a = self.gram[sets.columns[:, :, None], sets.columns[:, None, :]]
         b = np.take_along_axis(right, sets.columns, axis=1)
         norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
-        shape = 1.0 / np.where(np.isfinite(sets.spread), sets.spread, 1e6)
-        slabs = np.array(hyper.slabs)
-        tight, nearest = np.where(sets.strength, norm / slabs[-1], shape), np.zeros((n, k), int)
-        logs: list[np.ndarray] = []
-        values: list[np.ndarray] = []
-        for near in (None, -1, 0, 1):
-            # of the mixture that is a strength's prior: normals about as wide as the strength is large
-            if near is not None:
-                chosen = np.clip(nearest + near, 0, len(slabs) - 1)
-                tight = np.where(sets.strength, norm / slabs[chosen], shape)
+        # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
+        wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
+        tight = np.where(sets.strength, norm / hyper.slabs[-1], 1.0 / wide)
+        full, inverse, value, move = a, a, sets.at, sets.at
+        for turn in range(ROUNDS):
+            if turn:  # as narrow as the normals are that a strength of this size may come from
+                tight = np.where(sets.strength, norm * _narrow(value * norm, hyper), tight)
             full = a + np.eye(k) * (tight**2)[:, None, :]
             inverse = np.linalg.inv(full)
             move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
             value = sets.at + move
-            if near is None:
-                size = np.abs(np.log(np.maximum(np.abs(value * norm), 1e-9)[:, :, None] / slabs))
-                nearest = np.argmin(size, axis=2)
-                continue
-            sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
-            left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
-            log = self.log - 0.5 * (left + np.sum((value * tight) ** 2, axis=1))
-            log += np.sum(np.log(tight), axis=1) - 0.5 * np.linalg.slogdet(full)[1]
-            log -= np.sum(sets.strength, axis=1) * np.log(len(slabs))
-            log += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
-            apart = np.any(chosen != nearest + near, axis=1) & (near != 0)  # the same normal again, at an end
-            logs.append(np.where(apart, -np.inf, log))
-            values.append(value)
-        return logsumexp(logs, axis=0), values[1]
+        sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
+        left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
+        out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
+        slab = _log_slab(value * norm, hyper) + np.log(norm)
+        shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
+        out += np.sum(np.where(sets.strength, slab, shape), axis=1)
+        out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
+        return out, value
 
 
 def summed(p: Problem, smooth: float, flaws: float) -> Summed:
@@ -199,3 +196,22 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     by = np.linalg.solve(root, cross)
     gram = p.gram[np.ix_(rows, rows)] - by.T @ by
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
+
+
+def _log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log densities [..., s] of a strength at detectability d' under each of the normals, equally likely."""
+    widths = np.array(hyper.slabs)
+    log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
+    return log - np.log(len(widths))
+
+
+def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log density of a strength at detectability d': a mixture of normals."""
+    return logsumexp(_log_slabs(d, hyper), axis=-1)
+
+
+def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """One over the root mean square width of the normals, each as probable as it is at detectability d'."""
+    log = _log_slabs(d, hyper)
+    share = np.exp(log - logsumexp(log, axis=-1, keepdims=True))
+    return np.sqrt(share @ (1.0 / np.square(hyper.slabs)))

@@ -137,6 +137,19 @@ def linearise(
     rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
     if len(thetas) > 1:
         changes = changed(forward, forward.shoot(hypothesis, thetas, locals_, blocks), weights, blocks)
+        lost = np.any([np.any(~np.isfinite(c[:fresh]), axis=1) for c in changes], axis=0)
+        if np.any(lost):  # numbers of which no model can be built: the other way there may be one
+            back = np.array([kept + k for k in np.flatnonzero(lost)])
+            mirrored = np.repeat(theta[None], 1 + len(back), axis=0)
+            mirrored[1 + np.arange(len(back)), back] -= steps[back]
+            mirrored = np.clip(mirrored, [f.lower for f in free], [f.upper for f in free])
+            same = np.repeat(local[None], 1 + len(back), axis=0)
+            for c, new in zip(
+                changes,
+                changed(forward, forward.shoot(hypothesis, mirrored, same, blocks), weights, blocks),
+                strict=True,
+            ):
+                c[np.flatnonzero(lost)] = -new
     else:  # nothing to derive by
         changes = [np.zeros((0, r.count)) for r in rows]
     scale = np.array([f.scale for f in free[kept:count]]) / steps[kept:]

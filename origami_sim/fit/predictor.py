@@ -66,7 +66,8 @@ class Predictor(Protocol):
     """Predicts recordings of one object under hypotheses; whoever asks does not know by which kind of simulation.
 
     Attributes:
-        subject: how the model is built. recordings: of one object. model, parameters, drive: as given.
+        subject: how the model is built. recordings: of one object. drives: of each of them.
+        model, parameters, drive: as given.
         articulation: coordinates of rigid panels. components: names of the D components.
         blocks: the segments. local: L, numbers of each segment's start (coordinates, then rates); 0 if none is fitted.
         start: "fit" or "rest". panels: "elastic", "rigid" or "" (of curves). separate: whether a segment is predicted
@@ -78,6 +79,7 @@ class Predictor(Protocol):
 
     subject: Subject
     recordings: list[Recording]
+    drives: list[Drive]
     model: Model
     parameters: Parameters
     drive: Drive

@@ -80,7 +80,7 @@ class Prescribed(Curves):
         x, jacobian = self._along(worlds, q)
         times = recording.times - recording.times[0]
         rate = np.zeros_like(q) if recording.by_step else np.gradient(q, times, axis=1)
-        drive = distorted(model, parameters, self._drives[r], float(times[-1]))
+        drive = distorted(model, parameters, self.drives[r], float(times[-1]))
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
         batch = Batch(still, parameters, drive, state, threads=self.threads, among=self.shared)

@@ -86,7 +86,7 @@ class Rollouts(Worlds, ABC):
     ):
         super().__init__(subject, recordings, threads)
         self.start = start
-        self._drives = [drive_of(r, self.drive) for r in self.recordings]
+        self.drives = [drive_of(r, self.drive) for r in self.recordings]
         self._paths: dict[int, np.ndarray | None] = {}
         self._usual: dict[int, np.ndarray] = {}
         self.local = 2 * self.articulation.size if start == "fit" else 0
@@ -234,7 +234,7 @@ class Rollouts(Worlds, ABC):
         """The drive that reaches every rollout."""
         recording, span = self.recordings[shots.recording], shots.frames * shots.step
         begins = recording.times[[b.first for b in shots.blocks]] - recording.times[0]
-        given = self._drives[shots.recording]
+        given = self.drives[shots.recording]
         if np.any(shots.late):
             drive = shifted(given, (begins + shots.late).ravel(), span, 1)
         else:
@@ -292,11 +292,11 @@ class Rollouts(Worlds, ABC):
         def rested(frame: int) -> Batch:
             """The worlds held as they were at a frame, where they have rested, driven as from there on."""
             span = float(times[-1] - times[frame]) + step
-            drive = distorted(model, parameters, shifted(self._drives[r], times[[frame]], span, len(worlds)), span)
+            drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
             state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
             batch = self._batch(held, parameters, drive.held(0.0), state)
             batch.carry(path[[frame, frame], :, None], LEAD * step)
-            return self._batch(held, parameters, drive, replace(state, memory=batch.memory()))
+            return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()))
 
         out: dict[int, np.ndarray] = {}
         last, batch = -LEAD - 1, None
@@ -306,7 +306,7 @@ class Rollouts(Worlds, ABC):
                 batch = rested(last)
             if first > last:
                 batch.carry(path[last : first + 1, :, None], step)
-            last, out[first] = first, batch.memory()
+            last, out[first] = first, batch.remembered()
         return out
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:

@@ -44,7 +44,7 @@ class Worlds(ABC):
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
         self.blocks: list[Block] = []
-        self._drives: list[Drive] = []
+        self.drives: list[Drive] = []
 
     def _program(self) -> tuple[str, ...]:
         """The effects of the program that all hypotheses share: compiling one for each took longer than running."""
@@ -88,7 +88,7 @@ class Worlds(ABC):
 
     def inputs(self) -> Iterator[np.ndarray | bytes | None]:
         """All of the recordings that a prediction depends on, for a digest."""
-        for recording, drive in zip(self.recordings, self._drives, strict=True):
+        for recording, drive in zip(self.recordings, self.drives, strict=True):
             yield recording.times
             yield repr((recording.gravity, recording.start)).encode()
             for c in recording.channels.values():

@@ -344,7 +344,7 @@ class Batch:
         m = self.model
         return self._download(self._x, len(m.position)), self._download(self._angles, len(m.creases) + len(m.bends))
 
-    def memory(self) -> np.ndarray:
+    def remembered(self) -> np.ndarray:
         """[M, W] what laws remember."""
         m = self.model
         rows = sum(d.size * m.count(get(e).family) for e in m.laws for d in get(e).memory)

@@ -134,7 +134,7 @@ def test_prescribed_relaxation_is_exact():
 def suspected(forward):
     from origami_sim.fit.hypothesis import suspects
 
-    return suspects(forward.model, forward.recordings, forward._drives[0])
+    return suspects(forward.model, forward.recordings, forward.drives[0])
 
 
 def test_what_distorts_the_drive_remembers_earlier_steps():

@@ -179,7 +179,7 @@ def test_a_drive_seen_from_several_starts_keeps_its_bends():
 def test_experiments_hold_a_drive_and_turn_the_set_up_upside_down():
     forward = driven("rest")
     menu = dict(_menu(forward))
-    held = menu["a step of field to its highest level, held"]._drives[0]["field_z"]
+    held = menu["a step of field to its highest level, held"].drives[0]["field_z"]
     assert np.abs(held(np.array([0.0, 1.3]))) == pytest.approx(0.02, rel=1e-4) and held(0.0) == held(1.3)
     turned = menu["the set-up upside down"].subject.build({})[1]
     given = forward.parameters["gravity", "gravity_z"]
