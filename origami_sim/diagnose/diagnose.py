@@ -108,7 +108,7 @@ def diagnose(
     signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("search", 0.0)
-    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 3)
+    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
     given, base, weights, posterior = settled(forward, given, base, weights, posterior, o.fits, tell)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)

@@ -147,7 +147,9 @@ def extended(
         far = best in out.nodes and missed(forward, out.nodes[best].fit) > FAR
         if not far and sum(p[k] for k in open_sets) < UNFITTED:
             break
-        key = max(open_sets, key=lambda k: p[k])
+        single = [k for k in open_sets if len(k) == 1]
+        # far from the data a single effect may do what several were expected to
+        key = max(single if far and n % 2 and single else open_sets, key=lambda k: p[k])
         if not far and p[key] < UNFITTED / 5 and best in out.nodes:
             break
         fitted = _fitted(out, forward, key)

@@ -18,7 +18,7 @@ class Hyper:
         gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
         smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
-            A precise recording shows more of them.
+            Where each is as large as an effect that stands out by itself, nothing would be named.
         fewer: probability of each size over that of the next smaller one: of gaps, of smooth, and of flaws.
     """
 
@@ -27,7 +27,7 @@ class Hyper:
     most: int = 5
     gaps: tuple[float, ...] = (1e-5, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
     smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)
-    flaws: tuple[float, ...] = (2.0, 8.0, 32.0, 128.0)
+    flaws: tuple[float, ...] = (2.0, 8.0)
     fewer: float = 0.3
 
     @cached_property

@@ -48,7 +48,7 @@ def read_start(model: Model, arm: Articulation, recording: Recording, values, no
         now, tangent = channel_tangent(model, arm, recording, pose, level)
         gap = np.where(np.isfinite(level), level - now, 0.0)
         by = arm.inverse(tangent * weight[:, None], sought, 1e-8) @ (gap * weight)
-        size = np.abs(by).max(initial=0.0)
+        size = np.abs(by[3 * arm.floating :]).max(initial=0.0)  # shifts are linear, however long
         pose = arm.moved(pose, (by * min(1.0, 1.0 / (size + 1e-12)))[:, None])
         if size < 1e-10:
             break
