@@ -292,6 +292,13 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
         InputError: nodes of which no axis is held, a ground without contact effects; in a run, an effect with memory
             that acts there, because a trajectory keeps no memory.
     """
+    if poses.model.panels == "rigid":
+        raise InputError(
+            "the force of a support is not told by rigid panels",
+            field=f"channels.{channel.name}",
+            value="force",
+            allowed="panels = 'elastic'",
+        )
     model = poses.model
     field = f"channels.{channel.name}"
     ground = bool(channel.attachment.get("ground", False))

@@ -158,7 +158,7 @@ def test_the_support_of_a_swinging_chain_carries_weight_and_momentum(motion):
     """Newton: the impulse of support and weight is the change of momentum, which the run has in its velocities."""
     model, mass = motion.model, motion.parameters["inertia", "mass"][:, 0]
     held = np.flatnonzero((model.free == 0).all(axis=1)).tolist()
-    s = read_calibration(pendulum_chain.CALIBRATION).replace(duration=0.1)
+    s = read_calibration(pendulum_chain.CALIBRATION).replace(duration=0.1).with_panels("elastic")
     fine = pendulum_chain.swing(s, rate=20_000.0)
     given = channel("force", np.zeros((2, 3)), unit="N", nodes=held)
     force = channel_frames(fine, given)

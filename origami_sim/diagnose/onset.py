@@ -5,8 +5,11 @@ import numpy as np
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 
-LASTING = 3
-"""Segments in a row that have to depart: a mishap of the recorder shows in one."""
+LASTING = 2
+"""Segments in a row that have to depart, or else one by `ALONE`: a mishap of the recorder shows in one, and little."""
+
+ALONE = 20.0
+"""Standard deviations from which a segment departs alone, as in a push."""
 
 FAR = 4.0
 """Standard deviations of noise from which a segment's squares, or a frame, depart."""
@@ -28,7 +31,8 @@ def onset(forward: Predictor, f: Fit, recording: int = 0) -> float:
         count = max(forward.blocks[f.blocks[n]].seen().sum() - line.slopes[n].shape[1], 1)
         excess.append((float(left[n] @ left[n]) - count) / np.sqrt(2.0 * count))
     far = np.array(excess) > FAR
-    runs = [k for k in range(len(far) - LASTING + 1) if np.all(far[k : k + LASTING])]
+    alone = np.array(excess) > ALONE
+    runs = [k for k in range(len(far)) if alone[k] or (k + LASTING <= len(far) and np.all(far[k : k + LASTING]))]
     if not runs or runs[0] == 0:
         return float("nan")
     block = forward.blocks[f.blocks[mine[runs[0]]]]

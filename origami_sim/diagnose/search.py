@@ -86,6 +86,8 @@ class Posterior:
     Attributes:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
+        ranked: single effects by what they promise the model without any.
+        tried: sets that were fitted, with any weights.
         weights: of the fits.
     """
 
@@ -96,6 +98,8 @@ class Posterior:
     log: dict[Key, np.ndarray] = field(default_factory=dict)
     estimates: dict[Key, Estimate] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
+    ranked: list[Key] = field(default_factory=list)
+    tried: set[Key] = field(default_factory=set)
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -147,9 +151,11 @@ def extended(
         far = best in out.nodes and missed(forward, out.nodes[best].fit) > FAR
         if not far and sum(p[k] for k in open_sets) < UNFITTED:
             break
-        single = [k for k in open_sets if len(k) == 1]
-        # far from the data a single effect may do what several were expected to
-        key = max(single if far and n % 2 and single else open_sets, key=lambda k: p[k])
+        key = max(open_sets, key=lambda k: p[k])
+        single = next((k for k in out.ranked if k in open_sets and k not in out.tried), None)
+        if far and n % 2 and single is not None:  # far from the data one effect may do what several were expected to
+            key = single
+        out.tried.add(key)
         if not far and p[key] < UNFITTED / 5 and best in out.nodes:
             break
         fitted = _fitted(out, forward, key)
@@ -180,7 +186,7 @@ def reweighted(out: Posterior, forward: Predictor, base: Fit, new: Weights) -> P
         replace(s, parts=[k * p for k, p in zip(scales, s.parts, strict=True)] if s.parts else [])
         for s in out.signatures
     ]
-    again = Posterior(rated(moved, base), new, out.hyper)
+    again = Posterior(rated(moved, base), new, out.hyper, tried=set(out.tried))
     prior = log_priors(again.signatures)
     _add(again, forward, frozenset(), base, prior)
     chance = out.probabilities()
@@ -233,6 +239,8 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
     more = joined(own)
     singles = _judge(out, node, more, prior, cells)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
+    if not key:
+        out.ranked = [frozenset((node.others[n],)) for n in ranked]
     pairs = []
     for a, one in enumerate(ranked[:PARTNERS]):
         first = frozenset((node.others[one - len(own)],))

@@ -125,7 +125,7 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
     assert varying_drive(forward) == (None, "rate")
     driven = Drive(field=(0, 0, sine(0.01, 1.0)))
     for drives in ([driven, Drive()], [Drive(), driven]):  # whichever recording has it
-        turned = SimpleNamespace(_drives=drives, recordings=2 * forward.recordings)
+        turned = SimpleNamespace(drives=drives, recordings=2 * forward.recordings)
         assert varying_drive(turned) == ("field_z", "drive field_z")
 
 

@@ -19,7 +19,7 @@ from origami_sim.scenes import pendulum_chain
 
 @pytest.fixture(scope="module")
 def settings():
-    return read_calibration(pendulum_chain.CALIBRATION).replace(duration=2.0)
+    return read_calibration(pendulum_chain.CALIBRATION).replace(duration=2.0).with_panels("elastic")
 
 
 def error(s, **options) -> float:
