@@ -292,16 +292,13 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
         InputError: nodes of which no axis is held, a ground without contact effects; in a run, an effect with memory
             that acts there, because a trajectory keeps no memory.
     """
-    if poses.model.panels == "rigid":
-        raise InputError(
-            "the force of a support is not told by rigid panels",
-            field=f"channels.{channel.name}",
-            value="force",
-            allowed="panels = 'elastic'",
-        )
     model = poses.model
     field = f"channels.{channel.name}"
     ground = bool(channel.attachment.get("ground", False))
+    if model.panels == "rigid" and not ground:
+        raise InputError(
+            "rigid panels do not tell the force of a support", field=field, value="force", allowed="panels = 'elastic'"
+        )
     many = channel.attachment.get("nodes")
     names = [channel.attachment.get("node")] if many is None else many
     nodes = [] if ground else [_find(model, channel, "node", one, len(model.position)) for one in names]

@@ -13,8 +13,8 @@ import origami_sim
 from origami_sim import cli
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
 from origami_sim.diagnose.observed import assumed
-from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.page import read_report
+from origami_sim.diagnose.patch import Addition, additions, read_additions, switched_on, write_patch
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError

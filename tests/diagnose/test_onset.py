@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim.articulation import Articulation
-from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.onset import onset
@@ -12,8 +12,6 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
 from origami_sim.model import State
 from origami_sim.recording import Channel, Recording
-from origami_sim.recording.recording import DriveChannel
-from origami_sim.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, record, subject
 

@@ -1,0 +1,68 @@
+"""Starts that an experimenter states: they reach the prediction, and are checked against the data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from origami_sim.errors import InputError
+from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.recording import Recording, Start
+from tests.diagnose.strips import record, subject
+
+RELEASED = record(panels=3, duration=1.0, rate=100, noise=1e-3)
+
+
+def first_block(recording: Recording):
+    return RigidRollouts(subject(3), [recording], segment=0.3).blocks[0]
+
+
+def stating(**start) -> Recording:
+    return replace(RELEASED, start=Start(**start))
+
+
+def test_what_is_released_has_no_rates_and_stated_angles():
+    read = first_block(RELEASED).pose.angles[0, 0]
+    block = first_block(stating(state="released", angles={"0": read + 1e-3}, sd=5e-3))
+    m = len(block.rates)
+    assert not np.any(block.rates) and block.pose.angles[0, 0] == pytest.approx(read + 1e-3)
+    assert block.known[0] == 5e-3 and block.known[1] == 1.0  # nothing is stated of the second
+    assert np.all(block.known[m:] < 0.01 * first_block(RELEASED).known[m:])
+
+
+def test_a_stated_rate_is_as_well_known_as_it_says():
+    block = first_block(stating(state="released", rate_sd=0.02))
+    np.testing.assert_allclose(block.known[len(block.rates) :], 0.02)
+
+
+def test_what_is_moving_is_read():
+    moving, plain = first_block(stating(state="moving")), first_block(RELEASED)
+    np.testing.assert_array_equal(moving.rates, plain.rates)
+    np.testing.assert_array_equal(moving.known, plain.known)
+
+
+def test_an_equilibrium_is_the_models_and_not_the_flat_sheet():
+    hung = record(panels=3, duration=1.0, rate=100, noise=1e-3, size=0.0)
+    block = first_block(replace(hung, start=Start("equilibrium")))
+    assert not np.any(block.rates)
+    np.testing.assert_allclose(block.pose.angles, 0.0, atol=1e-6)  # a strip that hangs straight rests so
+    assert np.all(block.known[: len(block.rates)] < 0.05)
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ({"state": "released", "angles": {"0": 0.2}, "sd": 1e-3}, "contradict the stated start"),
+        ({"state": "released", "angles": {"lid": 0.2}, "sd": 1e-3}, "no such crease"),
+        ({"state": "equilibrium"}, "contradict the stated start"),
+    ],
+)
+def test_a_start_that_cannot_be_is_one_sentence(start, said):
+    with pytest.raises(InputError, match=said):
+        first_block(stating(**start))
+
+
+def test_a_start_at_rest_of_what_moves_is_refused():
+    late = record(panels=3, duration=1.0, rate=100, noise=1e-3).only(slice(20, None))
+    with pytest.raises(InputError, match="contradict a start at rest"):
+        first_block(replace(late, start=Start("released")))
