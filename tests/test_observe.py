@@ -16,7 +16,7 @@ from origami_sim.scenes import pendulum_chain
 
 @pytest.fixture(scope="module")
 def motion():
-    s = read_calibration(pendulum_chain.CALIBRATION).replace(duration=0.5)
+    s = read_calibration(pendulum_chain.CALIBRATION).with_panels("elastic").replace(duration=0.5)
     return pendulum_chain.swing(s, rate=200.0)
 
 

@@ -163,7 +163,7 @@ def diagnose(
         budget=judged.budget,
         marginals=marginals(posterior),
         compared=compared,
-        onset=attempt(noted, "The onset", lambda: onset(forward, base), float("nan")),
+        onset=attempt(noted, "The onset", lambda: onset(forward, base, weights), float("nan")),
         traces=traces(forward, given, base, best, weights, noise),
         correlations=correlations(forward, base, best),
         experiments=experiments,

@@ -3,6 +3,7 @@
 import numpy as np
 
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 
 LASTING = 2
@@ -15,12 +16,13 @@ FAR = 4.0
 """Standard deviations of noise from which a segment's squares, or a frame, depart."""
 
 
-def onset(forward: Predictor, f: Fit, recording: int = 0) -> float:
+def onset(forward: Predictor, f: Fit, weights: Weights, recording: int = 0) -> float:
     """Time at which a fit first departs lastingly from a recording [s]; nan: never, or from the start.
 
-    Innovations of each segment are what no start explains, given all before it.
+    Innovations of each segment are what no start explains, given all before it; they are compared with the noise.
+    `weights` are those of the fit.
     """
-    line = f.linear
+    line = f.reweighted(weights, Weights(forward.blocks[0].noise, 1.0, weights.gap)).linear
     assert line is not None
     mine = [n for n, b in enumerate(f.blocks) if forward.blocks[b].recording == recording]
     if len(mine) < 2 * LASTING:
