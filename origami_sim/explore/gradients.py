@@ -18,7 +18,8 @@ from origami_sim.errors import InputError
 from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, found
 from origami_sim.model import State
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import NULL_SHIFT, STENCIL, WEIGHTS, tangent
+from origami_sim.solve.statics import tangent
+from origami_sim.solve.system import NULL_SHIFT, STENCIL, WEIGHTS
 from origami_sim.solve.timestep import stable_step
 
 STEP = 1e-3

@@ -25,7 +25,8 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import Poses, read_channel
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
+from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
 
 PASSIVE = ("bars", "bar_viscosity", "panel_bending", "ogden_bars")
 """Effects that keep panels stiff; rigid panels do not need them."""
@@ -210,7 +211,7 @@ class Static(Curves):
         self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
     ):
         super().__init__(subject, recordings, pieces=pieces, threads=threads)
-        self._systems: dict[tuple[str, ...], _System] = {}
+        self._systems: dict[tuple[str, ...], System] = {}
         self._nominal: dict[int, np.ndarray] = {}
 
     def _other(self) -> Curves:
@@ -261,12 +262,12 @@ class Static(Curves):
             found.append(alive)
         return np.stack(xs), np.stack(all_angles), np.stack(found)
 
-    def _system(self, model: Model, worlds) -> _System:
+    def _system(self, model: Model, worlds) -> System:
         """Couplings and colours of a model, which depend on its effects only."""
         if model.effects not in self._systems:
             groups = np.zeros(len(self.drives[0].signals) - len(CHANNELS))
             drive = Drive(voltage=list(groups))
-            self._systems[model.effects] = _System(model, worlds[0][1], drive, State.at_rest(model))
+            self._systems[model.effects] = System(model, worlds[0][1], drive, State.at_rest(model))
         return self._systems[model.effects]
 
     # --- equation error
@@ -311,7 +312,7 @@ class _Search:
             all begin.
     """
 
-    def __init__(self, forward: Static, system: _System, worlds, drive: Drive, state: State):
+    def __init__(self, forward: Static, system: System, worlds, drive: Drive, state: State):
         self.system, self.worlds, self.threads, self.shared = system, worlds, forward.threads, forward.shared
         self.model = worlds[0][0]
         self.remembers = any(get(e).memory for e in self.model.laws)
@@ -421,10 +422,10 @@ class _Search:
         out[self.free] = s
         return np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
 
-    def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[_Cholesky | _Factor | None], np.ndarray]:
+    def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[Cholesky | Factor | None], np.ndarray]:
         """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
         y = self.system
-        out: list[_Cholesky | _Factor | None] = [None] * x.shape[1]
+        out: list[Cholesky | Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(alive):
             batch, copies = self._copies(int(w)), np.full(y.moves.shape[1], w)

@@ -13,14 +13,13 @@ Nothing is damped: modes with periods below the step, once excited, ring on from
 damps just these (generalised-alpha, Chung & Hulbert 1993; the two points then draw together about its instant of
 balance). Contact and friction are not smooth: a step over their onset is of first order, and may gain or lose energy.
 
-Newton's tangent comes from coloured central differences of the averaged force (see `statics`). A difference moves the
+Newton's tangent comes from coloured central differences of the averaged force (see `system`). A difference moves the
 end of the step, and with it velocity, turn and slip, so stiffness, damping and memory are in it together. It is kept
 from iteration to iteration and from step to step for as long as it converges well.
 
 Every evaluation begins with the memory of the beginning of the step; memory advances once, when a step is accepted.
 """
 
-import functools
 import itertools
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -33,12 +32,11 @@ import scipy.sparse.linalg as spla
 import warp as wp
 
 from origami_sim.drive import Drive
-from origami_sim.effects import DISTORTIONS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
-from origami_sim.solve import compose
+from origami_sim.solve.averaging import kernel
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import STEP, _System
+from origami_sim.solve.system import STEP, System
 from origami_sim.solve.timestep import stable_step
 
 TOLERANCE = 1e-5
@@ -61,72 +59,6 @@ TURN = 1.0
 
 START, SHORTEST = 1e-2, 1e-3
 """Adapted steps begin with the first, and steps are halved down to the second share of the explicit solver's step."""
-
-_HEAD = """
-@wp.kernel(enable_backward=False)
-def average({arguments}
-    A: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
-    power: wp.array2d(dtype=scalar), X0: wp.array(dtype=vec3), X1: wp.array2d(dtype=vec3),
-    fractions: wp.array(dtype=scalar), others: wp.array(dtype=scalar), begin: wp.array(dtype=scalar), first_world: int,
-):
-    w = (first_world + wp.tid()) & NATURAL
-    fraction = fractions[w]
-    other = others[w]
-    h = fraction * begin[1]
-    time = begin[0] + h
-    half = scalar(1.0)
-{hoist}
-    if h > scalar(0.0):
-        for row in range(mask.shape[0]):
-            n = row & NATURAL
-            X[n, w] = X0[n] + fraction * (X1[n, w] - X0[n])
-            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-{body}
-"""
-"""The rollout's force evaluation alone, at a fraction of the step from X0 to X1, which begins at begin[0] and lasts
-begin[1]; `others` is the other point of the average. Memory and angles are those of its beginning, and advance. The
-slip since then is (V - A) h."""
-
-
-class _Averager(compose._Composer):
-    """Within a step, lengths and angles go evenly from their first to their last value.
-
-    So stiff bars do not feel that the straight path of a node cuts the corner of its turn.
-    """
-
-    def _span(self, t: compose.Text):
-        t("before = X0[q] - X0[p]")
-        t("after = X1[q, w] - X1[p, w]")
-        t("length = wp.length(before) + fraction * (wp.length(after) - wp.length(before))")
-        # the mean of the gradient along the path: times the change of the span it is the change of the length
-        t("along = (before + after) * (scalar(1.0) / (wp.length(before) + wp.length(after)))")
-
-    def _strain(self, t: compose.Text):
-        ends = [f"X0[n{i}]" for i in (1, 2, 3)], [f"X1[n{i}, w]" for i in (1, 2, 3)]
-        for i, (a, b) in enumerate(zip(*ends, strict=True), 1):
-            t(f"y{i} = scalar(0.5) * ({a} + {b})")
-        t(f"before_strain = shells.strain({', '.join(ends[0])}, shape)")
-        t(f"strain = before_strain + fraction * (shells.strain({', '.join(ends[1])}, shape) - before_strain)")
-
-    def _fold(self, t: compose.Text):
-        t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
-        t("last = kinematics.dihedral(X1[i, w], X1[j, w], X1[k, w], X1[l, w])")
-        # likewise the mean of the gradient, at both points
-        for n in "ijkl":
-            t(f"x_{n} = X0[{n}] + other * (X1[{n}, w] - X0[{n}])")
-        t("g_other = kinematics.dihedral(x_i, x_j, x_k, x_l)")
-        for n in "ijkl":
-            t(f"g.g{n} = scalar(0.5) * (g.g{n} + g_other.g{n})")
-        t("angle = angles[r, w] + fraction * (kinematics.unwrap(last.angle, angles[r, w]) - angles[r, w])")
-
-
-@functools.cache
-def _kernel(names: tuple[str, ...]) -> wp.Kernel:
-    """The kernel of the averaged force for a set of effects."""
-    effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
-    composer = _Averager(effects)
-    source = _HEAD.format(arguments=composer.arguments(), hoist=composer.hoist(), body=composer.body("rollout"))
-    return compose.written(source, "average", effects)
 
 
 @dataclass(frozen=True)
@@ -194,13 +126,13 @@ class _Copies(Batch):
         self.x0, self._begin = own[0].numpy(), own[4].numpy()
         self.angles, self.memory = view(self._angles, hinges), view(self._memory, len(state.memory))
         self.power = view(self._power, len(state.power))
-        kernel = _kernel(model.effects)
-        wp.load_module(kernel.module, device=self.device)
+        averaged = kernel(model.effects)
+        wp.load_module(averaged.module, device=self.device)
         arrays = [*self._constants, self._x, self._v, self._angles, self._memory, self._a, self._f, self._work]
         arrays += [self._power, *own]
         cuts = np.linspace(0, self.worlds, self.threads + 1).astype(int)
         self._commands: list[Any] = [
-            wp.launch(kernel, dim=int(hi - lo), inputs=[*arrays, int(lo)], device=self.device, record_cmd=True)
+            wp.launch(averaged, dim=int(hi - lo), inputs=[*arrays, int(lo)], device=self.device, record_cmd=True)
             for lo, hi in itertools.pairwise(cuts)
         ]
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
@@ -277,7 +209,7 @@ class _World:
     ):
         self.model, self.scheme, self.tolerance = model, scheme, tolerance
         self.first = min(stable_step(model, parameters).dt, 1.0)  # infinite where nothing is stiff
-        self.system = _System(model, parameters, drive, state)
+        self.system = System(model, parameters, drive, state)
         self.free = self.system.free
         self.mass = np.broadcast_to(node_mass(model, parameters), (len(model.position), 1))
         self._ends = _Copies(model, parameters, drive, state, scheme, np.arange(3), 1)

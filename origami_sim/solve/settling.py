@@ -21,7 +21,8 @@ from origami_sim.solve.batch import Batch, Evaluation
 from origami_sim.solve.rigid import Topology
 from origami_sim.solve.rigid_statics import NEUTRAL, closed, loops_kept
 from origami_sim.solve.rigid_statics import STEP as TURN
-from origami_sim.solve.statics import NULL_SHIFT, THREADED, _Cholesky, _Factor, _System, equilibrium
+from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
 
 CLOSE = 1e-10
 """A Newton step shorter than this part of the device ends the search for an equilibrium."""
@@ -235,7 +236,7 @@ class Settling(ABC):
 class SettlingBars(Settling):
     """Equilibria of bars: the coordinates are the free axes of the nodes."""
 
-    def __init__(self, worlds, drive: Drive, state: State, *, system: _System | None = None, **options):
+    def __init__(self, worlds, drive: Drive, state: State, *, system: System | None = None, **options):
         super().__init__(worlds, drive, state, **options)
         self.system = system or coupled(self.model, worlds[0][1], drive)
         self.free = self.system.free
@@ -256,7 +257,7 @@ class SettlingBars(Settling):
     def _factors(self, x, wanted):
         y = self.system
         count = y.moves.shape[1]
-        out: list[_Cholesky | _Factor | None] = [None] * x.shape[1]
+        out: list[Cholesky | Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(wanted):
             start = self.start.select(np.full(count, w))
@@ -343,10 +344,10 @@ def settling(worlds, drive: Drive, state: State, **options) -> Settling:
     return SettlingBars(worlds, drive, state, **options)
 
 
-def coupled(model: Model, parameters: Parameters, drive: Drive) -> _System:
+def coupled(model: Model, parameters: Parameters, drive: Drive) -> System:
     """Couplings and colours of a model, which depend on its effects only."""
     one = parameters.world(0) if parameters.worlds > 1 else parameters
-    return _System(model, one, per_world(drive, levels(drive, 0.0, 1)), State.at_rest(model))
+    return System(model, one, per_world(drive, levels(drive, 0.0, 1)), State.at_rest(model))
 
 
 def levels(drive: Drive, time: float, worlds: int) -> np.ndarray:

@@ -11,7 +11,7 @@ from structures import flap, kresling, strip, tent, truss
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import State
-from origami_sim.solve import statics
+from origami_sim.solve import system
 from origami_sim.solve.batch import forces
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import continuation, equilibrium, tangent
@@ -176,7 +176,7 @@ def test_damped_steps_find_the_same_equilibrium():
 def test_sparse_spectrum_equals_the_dense_one(monkeypatch):
     model, parameters = kresling()
     dense = equilibrium(model, parameters, Drive(load=0.2))
-    monkeypatch.setattr(statics, "DENSE", 0)
+    monkeypatch.setattr(system, "DENSE", 0)
     sparse = equilibrium(model, parameters, Drive(load=0.2))
     assert np.allclose(sparse.eigenvalues, dense.eigenvalues, rtol=1e-8)
     crossed = continuation(model, parameters, Drive(load=1.0), max_points=13)
@@ -368,10 +368,10 @@ def test_small_tangents_are_factored_densely_with_the_same_outcome(monkeypatch, 
     q, _ = np.linalg.qr(rng.normal(size=(40, 40)))
     k = q @ np.diag(np.linspace(lowest, 5.0, 40)) @ q.T
     k, right, out = sp.csc_array(0.5 * (k + k.T)), rng.normal(size=40), []
-    for most in (0, statics.COMPACT):
-        monkeypatch.setattr(statics, "COMPACT", most)
-        factor, shift = statics._System.definite(k, 5.0, 0.0)
-        assert isinstance(factor, statics._Cholesky) == (most > 0)
+    for most in (0, system.COMPACT):
+        monkeypatch.setattr(system, "COMPACT", most)
+        factor, shift = system.System.definite(k, 5.0, 0.0)
+        assert isinstance(factor, system.Cholesky) == (most > 0)
         out.append((shift, factor.solve(right)))
     assert out[0][0] == out[1][0] and (out[0][0] > 0.3) == (lowest < 0)
     assert out[1][1] == pytest.approx(out[0][1], rel=2e-6 if lowest == 0 else 5e-14)
