@@ -3,6 +3,7 @@
 import copy
 import functools
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
@@ -58,7 +59,7 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
     return wrap
 
 
-class Statements:
+class Statements(ABC):
     """The part of `Sheet` that remembers what was stated, and knows the effects that are switched on."""
 
     statements: list[tuple[str, dict[str, Any]]]
@@ -116,6 +117,6 @@ class Statements:
                 f"the sheet has no such {family}", field=effect, value=int(bad[0]), allowed=f"0 to {(count or 0) - 1}"
             )
 
+    @abstractmethod
     def _family_counts(self) -> dict[str, int]:
         """Number of entities by family of effects, as far as the sheet is stated."""
-        raise NotImplementedError

@@ -17,7 +17,7 @@ from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.nominal import as_given, nominal_fits, weights_from
+from origami_sim.diagnose.nominal import as_given, nominal_fits, unchanged, weights_from
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
@@ -39,9 +39,6 @@ from origami_sim.recording import Recording, read_dataset
 
 ROUNDS = 3
 """Times that weights follow the explanation that leaves least: that is the noise that all are judged by."""
-
-SAME = 0.1
-"""Relative change of deviations below which weights have settled."""
 
 
 def diagnose(
@@ -195,7 +192,7 @@ def settled(
     for _ in range(ROUNDS):
         best = min(p.nodes, key=lambda k: p.nodes[k].fit.cost)
         new = weights_from(forward, p.nodes[best].fit)
-        if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
+        if unchanged(weights, new):
             break
         base = carried_on(forward, base.reweighted(weights, new), new)
         if base.failed:

@@ -74,12 +74,17 @@ def nominal_fits(forward: Predictor) -> tuple[Fit, Fit, Weights]:
     base = _checked(fit(forward, Hypothesis(), weights, most=3, done=0.01))
     for _ in range(ROUNDS):
         new = weights_from(forward, base)
-        if np.all(np.abs(np.log(new.deviation / weights.deviation)) < SAME):
+        if unchanged(weights, new):
             break
         base = _checked(carried_on(forward, base.reweighted(weights, new), new, most=4))
         weights = new
     base = _checked(carried_on(forward, base, weights))
     return as_given(forward, base, weights), base, weights
+
+
+def unchanged(old: Weights, new: Weights) -> bool:
+    """Whether weights have settled."""
+    return bool(np.all(np.abs(np.log(new.deviation / old.deviation)) < SAME))
 
 
 def as_given(forward: Predictor, base: Fit, weights: Weights) -> Fit:
