@@ -30,6 +30,7 @@ from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
 from origami_sim.drive import CHANNELS, Drive, Signal, ramp, series, sine
 from origami_sim.errors import InputError, nearest
+from origami_sim.files import write_text
 from origami_sim.model import Model, Parameters
 from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
@@ -156,12 +157,7 @@ def write_design(
     for name, table in tables.items():
         lines += ["", f"[{name}]", *(line for n, v in table.items() for line in _rows(n, v))]
     lines.append("")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text("\n".join(lines), encoding="utf-8")
-    part.replace(path)
-    return path
+    return write_text(path, "\n".join(lines))
 
 
 # reading --------------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Reading files that anybody may have made: regular files only, of a sane size, TOML that is not a trap."""
+"""Files: reading what anybody may have made (regular, of a sane size, TOML that is no trap), and writing as a whole."""
 
 import os
 import stat
@@ -72,6 +72,23 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         elif isinstance(value, int) and abs(value) >= 2**63:  # Python has larger ones, which are no float
             raise InputError("holds an integer beyond 64 bits", file=file, value=str(value))
     return tree
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Writes a text file as a whole or not at all, in a folder that is made if need be.
+
+    Raises:
+        OSError: it cannot be written; what stood there before is still there.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
 
 
 def _keys(data: bytes):

@@ -60,6 +60,9 @@ def si_unit(unit: str) -> str:
 
 def with_prefix(value: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which `value` (SI) reads between 1 and 1000, e.g. (1e3, 'mrad') for 0.0081 rad."""
+    if unit == "kg" and 0.0 < abs(value) < 1.0:
+        factor, prefixed = with_prefix(1e3 * value, "g")
+        return 1e3 * factor, prefixed
     first = unit.split("/")[0].split(" ")[0]
     if first in ("1", "K", "kg") or "^" in first or not np.isfinite(value) or value == 0.0:
         return 1.0, unit  # nothing that takes a prefix, or a power of it

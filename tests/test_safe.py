@@ -2,13 +2,14 @@
 
 import errno
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from origami_sim import cli, rescue
 from origami_sim.errors import DiskFull, InputError, unwritable
-from origami_sim.files import LARGEST_TOML, read_bytes, read_toml
+from origami_sim.files import LARGEST_TOML, read_bytes, read_toml, write_text
 from origami_sim.pattern import read_mesh, read_svg
 from origami_sim.recording import read_recording
 from origami_sim.recording.dataset import read_dataset
@@ -157,3 +158,16 @@ def test_what_was_computed_is_printed_before_the_disk_is_told_to_be_full(tmp_pat
         )
     out, err = capsys.readouterr()
     assert e.value.code == 2 and "run folder: none" in out and "No space left" in err
+
+
+def test_a_text_is_written_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = write_text(tmp_path / "new" / "a.toml", "one")
+
+    def full(self, target):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(OSError, match="no space"):
+        write_text(path, "two")
+    assert path.read_text() == "one"
+    assert [p.name for p in path.parent.iterdir()] == ["a.toml"]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.budget import Share
+from origami_sim.files import write_text
 
 VERDICTS = ("ADEQUATE", "PARAMETER", "MEASUREMENT", "MECHANISM", "TIE", "SEVERAL", "UNKNOWN", "UNTESTABLE")
 
@@ -272,12 +273,7 @@ class Diagnosis:
 
     def save_json(self, path: str | Path) -> Path:
         """Writes everything as JSON."""
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False))
-        part.replace(path)
-        return path
+        return write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
 
 
 def _plain(value):

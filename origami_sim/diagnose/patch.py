@@ -26,6 +26,7 @@ from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.entities import WAYS, located
 from origami_sim.errors import InputError
+from origami_sim.files import write_text
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.model import Model, Parameters
 from origami_sim.scene import Settings
@@ -280,12 +281,7 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
             p = get(a.effect).parameter(name)
             lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")
         lines.append("")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text("\n".join(lines), encoding="utf-8")
-    part.replace(path)
-    return path
+    return write_text(path, "\n".join(lines))
 
 
 def _toml(value) -> str:

@@ -13,6 +13,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.page import geometry_of, write_report
 from origami_sim.drive import Drive
+from origami_sim.files import write_text
 from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import read_recording
@@ -143,6 +144,4 @@ def guard(event: str, arguments: tuple) -> None:
 
 
 def write_json(path: Path, value) -> None:
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(value, indent=1))
-    part.replace(path)
+    write_text(path, json.dumps(value, indent=1))

@@ -63,6 +63,9 @@ def test_a_noiseless_signal_has_rounding_noise_only():
         (0.0, "N", "0 N"),
         (0.52, "1/s", "0.52 1/s"),
         (8.1e-4, "kg m^2", "0.00081 kg m^2"),
+        (9.7e-6, "kg", "9.7 mg"),
+        (0.094, "kg", "94 g"),
+        (2.5, "kg", "2.5 kg"),
         (3e-4, "N m/rad", "300 µN m/rad"),
     ],
 )

@@ -3,7 +3,6 @@
 import base64
 import gzip
 import json
-import os
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -28,6 +27,7 @@ from origami_sim.diagnose.page.laws import laws
 from origami_sim.diagnose.page.markup import Html, element, join
 from origami_sim.diagnose.page.measures import multiples
 from origami_sim.errors import InputError
+from origami_sim.files import write_text
 
 _DATA = re.compile(r'href="data:application/gzip;base64,([^"]+)"')
 
@@ -43,13 +43,7 @@ def write_report(diagnosis: Diagnosis, path: str | Path, *, geometry: dict | Non
     Raises:
         InputError: the geometry lacks a part or names nodes or triangles that it does not have.
     """
-    path = Path(path)
-    text = page(diagnosis, geometry)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
-    return path
+    return write_text(path, page(diagnosis, geometry))
 
 
 def read_report(path: str | Path) -> dict:

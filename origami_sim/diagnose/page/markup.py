@@ -54,8 +54,7 @@ def scaled_unit(value: float, unit: str) -> tuple[float, str]:
     """Factor and readable unit for a size [SI]; no prefix where it would mislead (m^2, 1/s, kg m^2, kilometres)."""
     base = re.split(r"[ /]", unit, maxsplit=1)[0]
     if unit == "kg":
-        factor, name = with_prefix(1e3 * value, "g")
-        return 1e3 * factor, name
+        return with_prefix(value, unit)
     if not re.fullmatch(r"[A-Za-z]+", base) or base in ("kg", "K", "deg"):
         return 1.0, pretty(unit)
     factor, name = with_prefix(value, base)
