@@ -11,12 +11,12 @@ from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.least_squares import linearise
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.prescribed import curves
 from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.rollouts import Rollouts
 from origami_sim.fit.starts import channel_tangent, local_line, spans
+from origami_sim.fit.weights import Weights
 from origami_sim.recording import Recording
 
 GROWTH = 3.0
@@ -129,7 +129,8 @@ def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
     for n, (one, other) in enumerate(
         zip(bars.predict(Hypothesis(), theta[None]), rigid.predict(Hypothesis(), theta[None]), strict=True)
     ):
-        change = weights.whitened(np.where(bars.blocks[n].seen(), one[0] - other[0], 0.0))
+        seen = bars.blocks[n].seen()
+        change = weights.whitened(np.where(seen, one[0] - other[0], 0.0), line.rows[n])
         gaps.append(line.padded(n, change))
     if not all(np.all(np.isfinite(g)) for g in gaps):
         return np.inf

@@ -8,8 +8,9 @@ import numpy as np
 
 from origami_sim.diagnose.nominal import GAP
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import Linearisation, Weights
+from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 
 
 @dataclass
@@ -26,17 +27,17 @@ class Share:
     share: float
 
 
-def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weights) -> list[Share]:
+def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> list[Share]:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
     What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
     all numbers refitted. Before is the better of the model as given and refitted.
     """
-    noise = Weights(forward.blocks[0].noise, 1.0, GAP)
+    noise = Weights(forward.blocks[0].noise, gap=GAP)
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
     def missed(f: Fit) -> float:
-        line = f.reweighted(weights, noise).linear
+        line = f.reweighted(noise).linear
         assert line is not None
         return sum(float(r @ r) for r in line.cleared(line.residual)) + f.penalty
 
@@ -47,16 +48,16 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weight
         return []
     out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
     suspects = best.hypothesis.suspects
-    parts = _parts(best, weights, noise) if len(suspects) > 1 else np.ones(len(suspects))
+    parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
     for s, part in zip(suspects, parts, strict=True):
         out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", gain * part / total))
     out.append(Share("not named", "rest", rest / total))
     return [Share(s.name, s.kind, float(s.share)) for s in out]
 
 
-def _parts(f: Fit, old: Weights, new: Weights) -> np.ndarray:
+def _parts(f: Fit, noise: Weights) -> np.ndarray:
     """Of what several effects explain together, the part of each, linearised at the fit."""
-    line = f.reweighted(old, new).linear
+    line = f.reweighted(noise).linear
     assert line is not None
     own = len(f.free) - len(f.hypothesis.free)
     ends = np.cumsum([own, *(len(s.free) for s in f.hypothesis.suspects)])

@@ -17,13 +17,13 @@ from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
-from origami_sim.diagnose.nominal import as_given, nominal_fits, unchanged, weights_from
+from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.screen import Signature, screen
-from origami_sim.diagnose.search import Posterior, extended, marginals, reweighted, search
+from origami_sim.diagnose.search import Posterior, extended, marginals, polished, search
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
 from origami_sim.diagnose.verdict import judge
 from origami_sim.diagnose.where import located
@@ -31,14 +31,10 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import suspects
-from origami_sim.fit.least_squares import Fit, carried_on
-from origami_sim.fit.linear import Weights
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.recording import Recording, read_dataset
-
-ROUNDS = 3
-"""Times that weights follow the explanation that leaves least: that is the noise that all are judged by."""
 
 
 def diagnose(
@@ -106,13 +102,14 @@ def diagnose(
     lap("screen")
     tell("search", 0.0)
     posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
-    given, base, weights, posterior = settled(forward, given, base, weights, posterior, o.fits, tell)
+    polished(posterior, forward)
+    extended(posterior, forward, progress=lambda part: tell("search", part), most=o.fits // 2)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:
         noted.append(f"Not tested, because these recordings do not tell: {', '.join(lost)}.")
     tell("verdict", 0.0)
-    judged = judge(forward, given, base, posterior, weights, compared)
+    judged = judge(forward, given, base, posterior, compared)
     if loop is not None:
         judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
@@ -139,7 +136,7 @@ def diagnose(
     )
     lap("next experiment")
     tell("baselines", 0.0)
-    errors = {key: held_out(forward, node.fit, weights).rms for key, node in posterior.nodes.items()}
+    errors = {key: held_out(forward, node.fit).rms for key, node in posterior.nodes.items()}
     refitted = errors[frozenset()]
     beside = attempt(noted, "Baselines", lambda: baselines(forward, base, weights, refitted), [])
     lap("baselines")
@@ -160,8 +157,8 @@ def diagnose(
         budget=judged.budget,
         marginals=marginals(posterior),
         compared=compared,
-        onset=attempt(noted, "The onset", lambda: onset(forward, base, weights), float("nan")),
-        traces=traces(forward, given, base, best, weights, noise),
+        onset=attempt(noted, "The onset", lambda: onset(forward, base), float("nan")),
+        traces=traces(forward, given, base, best, noise),
         correlations=correlations(forward, base, best),
         experiments=experiments,
         baselines=beside,
@@ -183,25 +180,6 @@ def diagnose(
     )
     tell("done", 1.0)
     return out
-
-
-def settled(
-    forward: Predictor, given: Fit, base: Fit, weights: Weights, p: Posterior, most: int, tell: Report
-) -> tuple[Fit, Fit, Weights, Posterior]:
-    """All judged by what the best explanation leaves, as given and refitted as well, and searched again."""
-    for _ in range(ROUNDS):
-        best = min(p.nodes, key=lambda k: p.nodes[k].fit.cost)
-        new = weights_from(forward, p.nodes[best].fit)
-        if unchanged(weights, new):
-            break
-        base = carried_on(forward, base.reweighted(weights, new), new)
-        if base.failed:
-            break
-        given = as_given(forward, base, new)
-        p = reweighted(p, forward, base, new)
-        p = extended(p, forward, progress=lambda part: tell("search", part), most=most // 2)
-        weights = new
-    return given, base, weights, p
 
 
 def share_compared(forward: Predictor) -> float:

@@ -9,8 +9,9 @@ import numpy as np
 from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.drive import Drive, Signal
 from origami_sim.fit.least_squares import Fit, linearise
-from origami_sim.fit.linear import Linearisation, Weights
+from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.rollouts import Rollouts
+from origami_sim.fit.weights import Weights
 from origami_sim.model import Parameters
 
 WANTED = 5.0

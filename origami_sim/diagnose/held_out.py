@@ -7,7 +7,6 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 from origami_sim.recording import Recording
 
@@ -30,10 +29,10 @@ class HeldOut:
     folds: np.ndarray
 
 
-def held_out(forward: Predictor, f: Fit, weights: Weights) -> HeldOut:
+def held_out(forward: Predictor, f: Fit) -> HeldOut:
     """Errors with numbers from all other folds, by one Gauss-Newton step from the full fit; starts are adapted."""
-    line = f.linear
-    assert line is not None
+    line, weights = f.linear, f.weights
+    assert line is not None and weights is not None
     dims = len(weights.deviation)
     width = line.tangent[0].shape[1]
     cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
@@ -57,7 +56,7 @@ def held_out(forward: Predictor, f: Fit, weights: Weights) -> HeldOut:
         own, count = np.zeros(dims), np.zeros(dims)
         for n in part:
             block = forward.blocks[f.blocks[n]]
-            r = left[n][line.data(n)].reshape(-1, dims) * weights.deviation / np.sqrt(weights.part)
+            r = weights.restored(left[n][line.data(n)], line.rows[n])
             own += np.sum(np.where(block.seen(), r, 0.0) ** 2, axis=0)
             count += block.seen().sum(axis=0)
         folds_.append(float(np.mean(own / np.maximum(count, 1) / forward.blocks[0].noise ** 2)))

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from origami_sim.diagnose.nominal import GAP
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 
 LASTING = 2
 """Segments in a row that have to depart, or else one by `ALONE`: a mishap of the recorder shows in one, and little."""
@@ -16,13 +17,11 @@ FAR = 4.0
 """Standard deviations of noise from which a segment's squares, or a frame, depart."""
 
 
-def onset(forward: Predictor, f: Fit, weights: Weights, recording: int = 0) -> float:
+def onset(forward: Predictor, f: Fit, recording: int = 0) -> float:
     """Time at which a fit first departs lastingly from a recording [s]; nan: never, or from the start.
 
-    Innovations of each segment are what no start explains, given all before it; they are compared with the noise.
-    `weights` are those of the fit.
-    """
-    line = f.reweighted(weights, Weights(forward.blocks[0].noise, 1.0, weights.gap)).linear
+    Innovations of each segment are what no start explains, given all before it; they are compared with the noise."""
+    line = f.reweighted(Weights(forward.blocks[0].noise, gap=GAP)).linear
     assert line is not None
     mine = [n for n, b in enumerate(f.blocks) if forward.blocks[b].recording == recording]
     if len(mine) < 2 * LASTING:

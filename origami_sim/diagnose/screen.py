@@ -8,8 +8,8 @@ import numpy as np
 from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Suspect, scaled
 from origami_sim.fit.least_squares import SLOWEST, Fit, changed
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 
 SILENT = 0.3
 """Norm of a signature [standard deviations] below which a suspect at its largest admissible strength is not excited.

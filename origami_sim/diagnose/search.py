@@ -12,14 +12,17 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from origami_sim.diagnose.screen import Signature, rated
+from origami_sim.diagnose.implied import own_columns, regapped, with_own_noise
+from origami_sim.diagnose.nominal import level
+from origami_sim.diagnose.screen import Signature
 from origami_sim.effects import get
 from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit
-from origami_sim.fit.linear import Linearisation, Weights
+from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights, recast
 
 UNFITTED = 0.1
 """Posterior of a set that has not been fitted, below which the search ends."""
@@ -34,8 +37,8 @@ So far from what was recorded linear estimates say little, and all is judged by 
 FITS = 16
 """Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
 
-KEPT = 4
-"""Fitted sets that are fitted again when weights change: the leaders."""
+KEPT, POLISHED = 4, 1e-3
+"""Leading fits that are fitted on by their own noise, and their posterior at least."""
 
 PARTNERS = 12
 """Leading effects of which pairs are formed with all others."""
@@ -49,6 +52,12 @@ MANY = 200
 SMOOTH = 40
 """Cosines of a channel's discrepancy in one recording, at most: slower than noise, faster than an offset."""
 
+TIGHT = 1e-3
+"""Gaps between segments, as a part of usual rates, that fits allow at least: no recorder tells less from none.
+
+With a third of it the steps of a fit of swings begin to be shortened; three times as much are told in ten seconds.
+"""
+
 Key = frozenset[int]
 
 
@@ -59,7 +68,8 @@ class Node:
     Attributes:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell.
+        grid: the summed problems by cell. white: of a fit that leaves coloured noise, the problem in which it is white,
+            and the log evidence of the fit's own set in it: what is missing explains some of the colour.
     """
 
     key: Key
@@ -68,6 +78,7 @@ class Node:
     groups: list[Group]
     others: list[int]
     grid: list[Summed | None]
+    white: tuple[Summed, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +98,8 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         ranked: single effects by what they promise the model without any.
-        tried: sets that were fitted, with any weights.
-        weights: of the fits.
+        tried: sets that were fitted. promise: log posterior that sets which were not may have.
+        weights: of the signatures.
     """
 
     signatures: list[Signature]
@@ -100,6 +111,7 @@ class Posterior:
     failed: dict[Key, str] = field(default_factory=dict)
     ranked: list[Key] = field(default_factory=list)
     tried: set[Key] = field(default_factory=set)
+    promise: dict[Key, float] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -151,7 +163,7 @@ def extended(
         far = best in out.nodes and missed(forward, out.nodes[best].fit) > FAR
         if not far and sum(p[k] for k in open_sets) < UNFITTED:
             break
-        key = max(open_sets, key=lambda k: p[k])
+        key = max(open_sets, key=lambda k: out.promise[k] if far else p[k])
         single = next((k for k in out.ranked if k in open_sets and k not in out.tried), None)
         if far and n % 2 and single is not None:  # far from the data one effect may do what several were expected to
             key = single
@@ -173,29 +185,16 @@ def missed(forward: Predictor, f: Fit) -> float:
     return float(np.sqrt(np.nanmax(np.nanmean(left**2, axis=0))))
 
 
-def reweighted(out: Posterior, forward: Predictor, base: Fit, new: Weights) -> Posterior:
-    """The posterior with other weights: what was fitted and still matters is fitted on from where it is."""
-    factor = out.weights.deviation / new.deviation * np.sqrt(new.part / out.weights.part)
-    line = base.linear
-    assert line is not None
-    scales = []
-    for r in line.rows:
-        data = np.tile(factor, r.data // len(factor))
-        scales.append(np.concatenate([data, np.ones(r.start), np.full(r.tie, out.weights.gap / new.gap)]))
-    moved = [
-        replace(s, parts=[k * p for k, p in zip(scales, s.parts, strict=True)] if s.parts else [])
-        for s in out.signatures
-    ]
-    again = Posterior(rated(moved, base), new, out.hyper, tried=set(out.tried))
-    prior = log_priors(again.signatures)
-    _add(again, forward, frozenset(), base, prior)
-    chance = out.probabilities()
-    kept = [k for k in sorted(out.nodes, key=lambda k: -chance.get(k, 0.0)) if k][:KEPT]
-    for key in kept:
-        f = carried_on(forward, out.nodes[key].fit.reweighted(out.weights, new), new)
+def polished(out: Posterior, forward: Predictor) -> None:
+    """Fits the leaders on, by their own noise."""
+    prior, chance = log_priors(out.signatures), out.probabilities()
+    for key in sorted((k for k in out.nodes if chance[k] > POLISHED), key=lambda k: -chance[k])[:KEPT]:
+        f = out.nodes[key].fit
+        assert f.weights is not None
+        tight = f.reweighted(replace(f.weights, gap=max(f.weights.gap, TIGHT)))
+        f = carried_on(forward, tight)
         if not f.failed:
-            _add(again, forward, key, f, prior)
-    return again
+            _add(out, forward, key, f, prior)
 
 
 def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:
@@ -257,7 +256,7 @@ def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
 
 
 def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Log posteriors (n,) of sets of groups by a node; they are taken over where it is nearer to them than others."""
+    """What sets of groups promise (n,), by a node; their posteriors are taken over where it is nearer than others."""
     if not sets:
         return np.zeros(0)
     members = _members(node.fit.hypothesis, out)
@@ -281,6 +280,14 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
             found[mine, c] = log + cells[c] + log_prior[mine]
             for n in np.flatnonzero(found[mine, c] > peak[mine]):
                 peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
+    promise = logsumexp(found, axis=1)
+    if node.white is not None:
+        problem_, own_ = node.white
+        total = float(logsumexp(node.evidence + cells)) - own_
+        for mine, rows in laid:
+            log, value = problem_.of(rows, out.hyper)
+            promise[mine] = total + log + log_prior[mine]
+            values.update(zip(mine, value, strict=True))
     for n, key in enumerate(keys):
         if key in out.nodes or key in out.failed or n not in values:
             continue
@@ -288,7 +295,8 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
         away = len(key ^ node.key)
         if before is None or (away, -_best(node)) < (len(key ^ before.parent), -_best(out.nodes[before.parent])):
             out.log[key], out.estimates[key] = found[n], Estimate(node.key, sets[n], values[n])
-    return logsumexp(found, axis=1)
+            out.promise[key] = float(promise[n])
+    return promise
 
 
 def _best(node: Node) -> float:
@@ -309,39 +317,24 @@ def _same_place(a: Suspect, b: Suspect) -> bool:
 
 
 def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
-    line, hyper = f.linear, out.hyper
-    assert line is not None
+    hyper, f = out.hyper, with_own_noise(forward, f, out.hyper)
+    line, own = f.linear, own_columns(f)
+    assert line is not None and f.weights is not None
     # order: the fit's own columns by suspect, then one column for each other suspect
-    nominal = np.arange(len(f.free) - len(f.hypothesis.free))
-    scale = np.array([n.scale for n in f.free])
-    precision = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
-    away = (np.array([n.start for n in f.free]) - f.theta) / scale
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
-    groups, columns, place = [], [], len(nominal)
-    for s in f.hypothesis.suspects:
-        inner = list(s.free)
-        strong = [k for k, n in enumerate(inner) if n in s.strengths]
-        arranged = [*strong, *(k for k in range(len(inner)) if k not in strong)]
-        at = np.array([(f.theta[place + k] - inner[k].start) / inner[k].scale for k in arranged])
-        spread = np.array([inner[k].spread / inner[k].scale for k in arranged])
-        first = inner[0]
-        side = 1 if first.start <= first.lower else -1 if first.start >= first.upper else 0
-        begin = len(columns)
-        columns += [place + k for k in arranged]
-        groups.append(Group(tuple(range(begin, begin + len(inner))), len(strong), at, side, spread))
-        place += len(inner)
-    count = len(columns)
+    count, groups = len(own.columns), list(own.groups)
     for n, o in enumerate(others):
-        side = out.signatures[o].side
-        groups.append(Group((count + n,), 1, np.zeros(1), side, np.full(1, np.inf)))
+        groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf)))
     effects = []
-    for n, t in enumerate(line.tangent):
-        added = [out.signatures[o].parts[n] for o in others]
-        effects.append(np.concatenate([t[:, columns], np.stack(added, axis=1) if added else np.zeros((len(t), 0))], 1))
+    for n, (t, rows) in enumerate(zip(line.tangent, line.rows, strict=True)):
+        added = np.zeros((len(t), len(others)))
+        for k, o in enumerate(others):
+            added[:, k] = out.signatures[o].parts[n]
+        effects.append(np.concatenate([t[:, own.columns], recast(added, rows, out.weights, f.weights)], axis=1))
     smooth = cosines(forward, f, line)
     tied = any(t is not None for t in line.tie)
-    own = [tuple(range(len(f.hypothesis.suspects)))]
-    laid = Sets.of(own, groups, len(own[0]), count + len(others))
+    laid = own.sets(count + len(others))
+    volume = f.weights.log_prior - sum(f.weights.log_volume(r) for r in line.rows)
     grid: list[Summed | None] = []
     evidence, problems = np.full(len(hyper.cells), -np.inf), {}
     for c, (gap, size, flaws) in enumerate(hyper.cells):
@@ -349,26 +342,21 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
             grid.append(None)
             continue
         if gap not in problems:
-            now, theirs = _regapped(line, effects, out.weights, gap)
-            problems[gap] = problem(now, nominal, precision, away, theirs, smooth)
+            now, theirs = regapped(line, effects, f.weights, gap)
+            problems[gap] = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
         cell = summed(problems[gap], size, flaws)
+        cell = replace(cell, log=cell.log + volume)
         grid.append(cell)
         evidence[c] = cell.of(laid, hyper)[0][0]
-    return Node(key, f, evidence, groups, others, grid)
-
-
-def _regapped(line: Linearisation, effects: list[np.ndarray], weights: Weights, gap: float):
-    """The linearisation and further columns, for another size of the gaps."""
-    if not any(t is not None for t in line.tie):
-        return line, effects
-    new = Weights(weights.deviation, weights.part, gap)
-    factor = weights.gap / gap
-    out = []
-    for rows, e in zip(line.rows, effects, strict=True):
-        e = e.copy()
-        e[rows.data + rows.start :] *= factor
-        out.append(e)
-    return line.reweighted(weights, new), out
+    white = None
+    if f.weights.colour:
+        plain = Weights(f.weights.deviation, gap=f.weights.gap)
+        now = line.reweighted(f.weights, plain)
+        theirs = [recast(e, r, f.weights, plain) for e, r in zip(effects, line.rows, strict=True)]
+        none = [np.zeros((r.count, 0)) for r in line.rows]
+        whole = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, hyper.flaws[0])
+        white = whole, float(whole.of(laid, hyper)[0][0])
+    return Node(key, f, evidence, groups, others, grid, white)
 
 
 def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:
@@ -422,8 +410,11 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
         column += len(node.groups[g].columns)
     hypothesis = Hypothesis(tuple(suspects))
     # derivatives by the numbers of the model and by starts hardly change with an effect
-    near = {"known": node.fit.linear, "kept": len(forward.subject.nominals)}
-    return fit(forward, hypothesis, out.weights, theta=np.concatenate(begin), local=node.fit.local, **near)
+    parent = node.fit
+    assert parent.linear is not None and parent.weights is not None
+    loose = level(forward, parent)  # white, and with gaps that are no obstacle on the way
+    near = {"known": parent.linear.reweighted(parent.weights, loose), "kept": len(forward.subject.nominals)}
+    return fit(forward, hypothesis, loose, theta=np.concatenate(begin), local=parent.local, **near)
 
 
 def marginals(p: Posterior) -> dict[str, float]:

@@ -9,7 +9,6 @@ from origami_sim.diagnose.verdict import Judgement, log_odds, widened
 from origami_sim.diagnose.words import kind
 from origami_sim.fit.channels import units_of
 from origami_sim.fit.least_squares import LITTLE, Fit
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 
 
@@ -107,7 +106,7 @@ def rms_of(f: Fit) -> np.ndarray:
     return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
 
 
-def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weights, noise: np.ndarray) -> list[Trace]:
+def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, noise: np.ndarray) -> list[Trace]:
     """Recorded and predicted components of each recording, segment after segment."""
     out = []
     units = units_of(forward.recordings[0])
@@ -121,6 +120,7 @@ def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weight
             np.concatenate([b.values - f.residuals[n] for n, b in zip(mine, blocks, strict=True)])
             for f in (given, base, best)
         ]
+        left = noise if best.weights is None else best.weights.deviation
         for d, name in enumerate(forward.components):
             out.append(
                 Trace(
@@ -131,7 +131,7 @@ def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, weights: Weight
                     times.tolist(),
                     recorded[:, d].tolist(),
                     *(p[:, d].tolist() for p in predictions),
-                    band=float(2 * weights.deviation[d]),
+                    band=float(2 * left[d]),
                     breaks=breaks.tolist(),
                 )
             )

@@ -11,7 +11,6 @@ from origami_sim.diagnose.search import Key, Node, Posterior
 from origami_sim.diagnose.words import distinct, joined, kind, pooled, said, say, title
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 
 CREDIBLE = 0.95
@@ -53,19 +52,18 @@ class Judgement:
     notes: list[str] = field(default_factory=list)
 
 
-def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, weights: Weights, compared: float) -> Judgement:
+def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
     """The verdict on a posterior over sets of effects.
 
     Args:
-        given, base: the model as given, and refitted. weights: of these and of the posterior's fits. compared: share of
-            the frames that were compared.
+        given, base: the model as given, and refitted. compared: share of the frames that were compared.
     """
     chance = p.probabilities()
     classes = by_effects(p, chance)
     lead = max(classes, key=lambda c: classes[c])
     best = best_of(p, chance, lead)
     shown = widened(p, best)
-    shares = budget(forward, given, base, p.nodes[best].fit, weights)
+    shares = budget(forward, given, base, p.nodes[best].fit)
     rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
     set_, total = credible(classes)
     tied = [widened(p, k) for c in set_ if (k := best_of(p, chance, c)) in p.nodes]

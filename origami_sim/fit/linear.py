@@ -14,43 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-
-@dataclass(frozen=True, eq=False)
-class Weights:
-    """What a residual is measured by.
-
-    Attributes:
-        deviation: (D,) standard deviation of each component [SI].
-        part: effective number of samples over their number, in (0, 1]: residuals with a memory count less.
-        gap: standard deviation of the gaps between tied segments, as a part of `Segment.reach`.
-    """
-
-    deviation: np.ndarray
-    part: float = 1.0
-    gap: float = 1.0
-
-    def whitened(self, values: np.ndarray) -> np.ndarray:
-        """Residuals [..., n, D] as (..., n D) numbers of unit variance; missing ones are zero."""
-        scaled = np.nan_to_num(values) / self.deviation * np.sqrt(self.part)
-        return scaled.reshape(*values.shape[:-2], values.shape[-2] * values.shape[-1])
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """How many rows the data, the known start and the tie to the next segment have, in this order.
-
-    Attributes:
-        data: n D. start: L of what is known of a start that is not tied to the segment before, else 0.
-        tie: L of the gap to the next segment, else 0.
-    """
-
-    data: int
-    start: int = 0
-    tie: int = 0
-
-    @property
-    def count(self) -> int:
-        return self.data + self.start + self.tie
+from origami_sim.fit.weights import Rows, Weights, recast
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +26,7 @@ class Linearisation:
         tangent: per segment [r, P] derivative of what is predicted by theta / scale.
         slopes: per segment [r, L] by its own start.
         tie: per segment (L,) one over the standard deviations of the gap to the next; None where that is not tied.
+        steps: (P,) changes of theta [SI] by which the derivatives were found.
     """
 
     rows: list[Rows]
@@ -69,6 +34,7 @@ class Linearisation:
     tangent: list[np.ndarray]
     slopes: list[np.ndarray]
     tie: list[np.ndarray | None]
+    steps: np.ndarray | None = None
 
     def data(self, n: int) -> slice:
         """The rows of the data of a segment."""
@@ -174,15 +140,11 @@ class Linearisation:
         """The same for other weights."""
         if old is new:
             return self
-        factor = old.deviation / new.deviation * np.sqrt(new.part / old.part)
-        scales = []
-        for r in self.rows:
-            data = np.tile(factor, r.data // max(len(factor), 1))
-            scales.append(np.concatenate([data, np.ones(r.start), np.full(r.tie, old.gap / new.gap)]))
         return Linearisation(
             self.rows,
-            [f * r for f, r in zip(scales, self.residual, strict=True)],
-            [f[:, None] * t for f, t in zip(scales, self.tangent, strict=True)],
-            [f[:, None] * s for f, s in zip(scales, self.slopes, strict=True)],
+            [recast(r, rows, old, new) for r, rows in zip(self.residual, self.rows, strict=True)],
+            [recast(t, rows, old, new) for t, rows in zip(self.tangent, self.rows, strict=True)],
+            [recast(s, rows, old, new) for s, rows in zip(self.slopes, self.rows, strict=True)],
             [None if t is None else t * (old.gap / new.gap) for t in self.tie],
+            self.steps,
         )

@@ -12,13 +12,13 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
-from scipy.linalg import cholesky_banded, lapack
 from scipy.signal.windows import dpss
 from scipy.special import gammaln, logsumexp
 from scipy.stats import chi2, gamma
 
 from origami_sim.errors import InputError
 from origami_sim.fit.colour import Colours, all_colours, refined
+from origami_sim.fit.correlated import divided, factor, multiplied
 from origami_sim.recording import Channel, Recording, estimate_noise
 from origami_sim.recording.recording import quantisation, scaled_differences
 
@@ -117,10 +117,10 @@ class Noise:
         columns, seen, scale, frames = self._arranged(values, times)
         white = np.full(columns.shape, np.nan)
         if seen.any():
-            factor = _factor(self.colour.tobytes(), frames.tobytes())
-            white[seen] = _solved(factor, columns[seen] / scale[:, None])
+            bands = factor(self.colour, frames)
+            white[seen] = divided(bands, columns[seen] / scale[:, None])
             if self.systematic > 0:  # (1 + U U')^(-1/2), by the eigenvectors of U' U
-                smooth = _solved(factor, self._smooth(times[seen]) / scale[:, None])
+                smooth = divided(bands, self._smooth(times[seen]) / scale[:, None])
                 power, axes = np.linalg.eigh(smooth.T @ smooth)
                 power = np.maximum(power, 1e-12)
                 shrink = (1 - 1 / np.sqrt(1 + power)) / power
@@ -130,10 +130,8 @@ class Noise:
     def draw(self, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """A sample (n,) of this noise at increasing times (n,) [s], rounding and `systematic` left out [SI]."""
         _, _, scale, frames = self._arranged(np.zeros(len(times)), times)
-        factor = np.frombuffer(_factor(self.colour.tobytes(), frames.tobytes())).reshape(len(self.colour), -1)
-        white, out = rng.normal(size=len(times)), np.zeros(len(times))
-        for d, below in enumerate(factor):
-            out[d:] += (below * white)[: len(times) - d]
+        white = rng.normal(size=len(times))[:, None]
+        out = multiplied(factor(self.colour, frames), white)[:, 0]
         return out * scale
 
     def _arranged(self, values: np.ndarray, times: np.ndarray):
@@ -160,31 +158,6 @@ def numbered(times: np.ndarray, frame: float) -> np.ndarray:
     """Numbers (n,) of frames at increasing times [s]: neighbours differ by whole numbers, by one at least."""
     steps = np.maximum(np.round(np.diff(times) / frame), 1).astype(np.int64)
     return np.concatenate([[0], np.cumsum(steps)])
-
-
-@lru_cache(maxsize=32)
-def _factor(colour: bytes, frames: bytes) -> bytes:
-    """Lower factor, by diagonals [Q + 1, m], of the correlation matrix of readings in these frames."""
-    correlation, number = np.frombuffer(colour), np.frombuffer(frames, np.int64)
-    q, m = len(correlation), len(number)
-    reach = min(q, m)
-    bands = np.zeros((q, m))
-    for d in range(reach):
-        apart = number[d:] - number[: m - d]
-        bands[d, : m - d] = np.where(apart < q, correlation[np.minimum(apart, q - 1)], 0.0)
-    for rounding in (0.0, 1e-8, 1e-6, 1e-4):  # a correlation that was cut off may be no correlation by that much
-        try:
-            bands[0] = 1.0 + rounding
-            return np.ascontiguousarray(cholesky_banded(bands, lower=True)).tobytes()
-        except np.linalg.LinAlgError:
-            continue
-    raise InputError("no noise has this correlation", field="colour", value=correlation[:4].tolist())
-
-
-def _solved(factor: bytes, columns: np.ndarray) -> np.ndarray:
-    """Columns [m, k] divided by the factor."""
-    bands = np.frombuffer(factor).reshape(-1, len(columns))
-    return lapack.dtbtrs(bands, np.asfortranarray(columns), uplo="L")[0]
 
 
 def noise_of(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from origami_sim.articulation import Articulation, Pose
 from origami_sim.drive import Drive
 from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
-from origami_sim.fit.linear import Rows
+from origami_sim.fit.noise import numbered
+from origami_sim.fit.weights import Rows
 from origami_sim.model import Model, Parameters
 from origami_sim.recording import Recording
 
@@ -44,7 +46,13 @@ class Block:
     def rows(self, before: bool, after: bool) -> Rows:
         """How many rows of a least-squares problem it has, tied or not to the segments before and after it."""
         size = len(self.known)
-        return Rows(self.values.size, 0 if before else size, size if after else 0)
+        return Rows(self.values.size, 0 if before else size, size if after else 0, self.seen(), self.frames)
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """(n,) numbers of the frames: neighbours differ by one, or more where some are missing."""
+        steps = np.diff(self.times)
+        return numbered(self.times, float(np.median(steps))) if len(steps) else np.zeros(1, np.int64)
 
     def seen(self) -> np.ndarray:
         """[n, D] which values were measured."""
@@ -72,7 +80,7 @@ class Predictor(Protocol):
         blocks: the segments. local: L, numbers of each segment's start (coordinates, then rates); 0 if none is fitted.
         start: "fit" or "rest". panels: "elastic", "rigid" or "" (of curves). separate: whether a segment is predicted
             without those before it.
-        nudge: steps of derivatives, as a part of changes that are noticeable: small enough to be linear.
+        nudge: steps of derivatives, as a part of changes that are noticeable. blur: error of the solver's own [rad, m].
         curve: whether these are load steps or slow loads, each of which has an equilibrium.
         prescribed: whether the motion is.
     """
@@ -91,6 +99,7 @@ class Predictor(Protocol):
     panels: str
     separate: bool
     nudge: float
+    blur: float
     curve: bool
     prescribed: bool
     threads: int | None

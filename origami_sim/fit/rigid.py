@@ -10,7 +10,8 @@ from origami_sim.articulation import Pose
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
-from origami_sim.fit.rollouts import Rollouts, Shots, film, joined_poses
+from origami_sim.fit.rollouts import PARTS, TURN, Path, Rollouts, Shots, film, joined_poses
+from origami_sim.fit.worlds import World
 from origami_sim.model import Parameters, State
 from origami_sim.recording import Recording
 from origami_sim.solve.rigid import RigidBatch, Topology
@@ -42,7 +43,7 @@ class RigidRollouts(Rollouts):
         InputError: what rigid panels refuse; closed loops, a root that is held in part.
     """
 
-    panels, nudge = "rigid", 0.3
+    panels, nudge, blur = "rigid", 0.3, TOLERANCE
 
     def __init__(
         self,
@@ -101,6 +102,35 @@ class RigidRollouts(Rollouts):
         if ends is not None:
             ends[:, lost] = np.nan
         return out, ends
+
+    def _moved(self, r: int, world: World, local: np.ndarray | None) -> Path | None:
+        """See `Rollouts._moved`: of tied segments the motion of the world itself, one segment after the other."""
+        numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
+        blocks = [self.blocks[n] for n in numbers]
+        if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
+            return super()._moved(r, world, local)
+        model, parameters = world
+        recording, count = self.recordings[r], len(blocks)
+        step = float(np.median(np.diff(recording.times)))
+        starts = np.zeros((1, count, self.local)) if local is None else local[None, numbers]
+        shots = Shots(r, blocks, [world], np.zeros((1, count)), starts, None, step, len(recording.times), 0)
+        state = self._state(shots)
+        every = self._driven(replace(shots, blocks=blocks[:1]), model, parameters)
+        first = State.at_rest(model, position=state.x[:, 0])
+        batch = self._batch(model, parameters, every, first, tolerance=TOLERANCE)
+        assert isinstance(batch, RigidBatch)
+        batch.finest = FINEST
+        angles = np.stack([b.pose.angles[:, 0] for b in blocks], axis=1) + starts[0, :, : self.local // 2].T
+        rates = np.stack([b.rates for b in blocks], axis=1) + starts[0, :, self.local // 2 :].T
+        fine = int(np.clip(np.ceil(np.sqrt(np.abs(rates).max(initial=0.0) * step / TURN / 8.0)), 1, PARTS))
+        films = [state.x[None, :, 0]]
+        for n, block in enumerate(blocks):
+            batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
+            after = block.lasting if block.reach is not None else block.times[-1]
+            frames = round(after / step)
+            films.append(batch.film(frames * fine, 1, after / max(frames * fine, 1), np.inf)[0][:, :, 0])
+        path = np.concatenate(films)
+        return Path(path, fine) if np.all(np.isfinite(path)) else super()._moved(r, world, local)
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from origami_sim.articulation import Articulation, Pose
@@ -34,6 +35,10 @@ from origami_sim.solve.rigid import batch_of
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
+
+TURN, PARTS = 1e-4, 8
+"""How far a way of straight steps may cut a turning point [rad], a hundredth of the angle in which friction yields; and
+steps between two frames at most. Without steps between frames of 10 ms, that angle came out a tenth too small."""
 
 FASTEST = 3.0
 """Frames below which a time constant is not told from none."""
@@ -70,6 +75,18 @@ class Shots:
     ends: int
 
 
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A way that nodes take: positions [(F - 1) count + 1, N, 3] [m], `count` steps between two of F frames."""
+
+    positions: np.ndarray
+    count: int
+
+    def between(self, first: int, last: int) -> np.ndarray:
+        """Positions [n, N, 1, 3] from one frame to another."""
+        return self.positions[first * self.count : last * self.count + 1, :, None]
+
+
 class Rollouts(Worlds, ABC):
     """A `Predictor` that simulates; see there for what is public.
 
@@ -87,7 +104,7 @@ class Rollouts(Worlds, ABC):
         super().__init__(subject, recordings, threads)
         self.start = start
         self.drives = [drive_of(r, self.drive) for r in self.recordings]
-        self._paths: dict[int, np.ndarray | None] = {}
+        self._paths: dict[int, Path | None] = {}
         self._usual: dict[int, np.ndarray] = {}
         self.local = 2 * self.articulation.size if start == "fit" else 0
 
@@ -153,7 +170,8 @@ class Rollouts(Worlds, ABC):
             if not mine:
                 continue
             worlds, impossible = self.worlds_of(each, theta, effects, r)
-            memories = self._memories(r, worlds, [self.blocks[b] for b in mine])
+            first = None if local is None else local[0]
+            memories = self._memories(r, worlds, [self.blocks[b] for b in mine], first)
             for group in _by_length(self.blocks, mine):
                 most = max(1, TOGETHER // len(group))
                 parts = [
@@ -270,18 +288,20 @@ class Rollouts(Worlds, ABC):
         state.v[:] = v
         return remembering(state, shots)
 
-    def _memories(self, r: int, worlds: list[World], wanted: Sequence[Block]) -> dict[int, np.ndarray] | None:
+    def _memories(
+        self, r: int, worlds: list[World], wanted: Sequence[Block], local: np.ndarray | None
+    ) -> dict[int, np.ndarray] | None:
         """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
 
-        It is that of the recorded motion up to there. All nodes are held and carried along as recorded, from segment to
-        segment, so that the laws feel the motion without changing it. Before that they rest.
+        It is that of the first world's motion up to there (`_moved`), of which starts are shifted by local [B, L]. All
+        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest.
         """
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
         every = np.union1d(every, [b.first for b in wanted])
         if not len(State.at_rest(model).memory) or not np.any(every):
             return None
-        path = self.path(r)
+        path = self._moved(r, worlds[0], local)
         if path is None:
             return None
         parameters = Parameters.join([p for _, p in worlds])
@@ -293,9 +313,10 @@ class Rollouts(Worlds, ABC):
             """The worlds held as they were at a frame, where they have rested, driven as from there on."""
             span = float(times[-1] - times[frame]) + step
             drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
-            state = State.at_rest(held, len(worlds), position=np.repeat(path[frame][:, None], len(worlds), axis=1))
+            x = path.between(frame, frame)
+            state = State.at_rest(held, len(worlds), position=np.repeat(x[0], len(worlds), axis=1))
             batch = self._batch(held, parameters, drive.held(0.0), state)
-            batch.carry(path[[frame, frame], :, None], LEAD * step)
+            batch.carry(x[[0, 0]], LEAD * step)
             return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()))
 
         out: dict[int, np.ndarray] = {}
@@ -305,24 +326,41 @@ class Rollouts(Worlds, ABC):
                 last = max(first - LEAD, 0)
                 batch = rested(last)
             if first > last:
-                batch.carry(path[last : first + 1, :, None], step)
+                batch.carry(path.between(last, first), step / path.count)
             last, out[first] = first, batch.remembered()
         return out
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)
 
-    def path(self, r: int) -> np.ndarray | None:
-        """Positions [F, N, 3] of the recorded motion, smoothed; None if the channels do not give them."""
+    def _placed(self, recording: Recording, q: np.ndarray) -> Path:
+        """The way that nodes take with coordinates [m, F]."""
+        arm, times = self.articulation, recording.times
+        curve = CubicSpline(times, q, axis=1)
+        bend = float(np.abs(np.diff(q, 2, axis=1)).max(initial=0.0)) / 8.0
+        count = int(np.clip(np.ceil(np.sqrt(bend / TURN)), 1, PARTS))
+        between = np.interp(np.arange((len(times) - 1) * count + 1) / count, np.arange(len(times)), times)
+        fine = curve(between)
+        pose = arm.moved(arm.reference(len(between)), fine - arm.reference().angles)
+        return Path(np.moveaxis(arm.positions(pose), 1, 0), count)
+
+    def path(self, r: int) -> Path | None:
+        """The recorded motion, smoothed; None if the channels do not tell it."""
         if r not in self._paths:
             found = coordinates(self, r)
             self._paths[r] = None
             if found is not None:
                 q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
-                arm = self.articulation
-                pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
-                self._paths[r] = np.moveaxis(arm.positions(pose), 1, 0)
+                self._paths[r] = self._placed(self.recordings[r], q)
         return self._paths[r]
+
+    def _moved(self, r: int, world: World, local: np.ndarray | None) -> Path | None:
+        """The motion of a recording that laws remember where its segments start: here the recorded one.
+
+        Args:
+            world: of whose motion. local: [B, L] shifts of all segments' starts.
+        """
+        return self.path(r)
 
 
 def remembering(state: State, shots: Shots) -> State:

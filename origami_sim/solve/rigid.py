@@ -166,6 +166,29 @@ class RigidBatch(Batch):
             out[len(t.turns) + j, mine] = np.cross(axis[j], x[mine] - pivot[j])
         return out
 
+    def restart(self, angles: np.ndarray, rates: np.ndarray):
+        """Moves on from other angles [J, W] of the joints and their rates [J, W], with what laws remember.
+
+        Raises:
+            InputError: panels that nothing holds.
+        """
+        if len(self.tree_of.turns):
+            raise InputError(
+                "only a sheet that is held can start anew", field="restart", allowed="a panel that is held"
+            )
+        tree, creases = self._tree, [c for c, _ in self.tree_of.joints]
+        data = self._tree.data.numpy().reshape(-1, tree.width)[: self.worlds]
+        begin = data[:, [tree.start + c for c in creases]]
+        first = tree.y + articulated.POSE
+        data[:, first : first + len(creases)] = angles.T - begin
+        data[:, tree.u : tree.u + len(creases)] = rates.T
+        now = self._download(self._angles, len(self.model.creases) + len(self.model.bends))
+        now[creases] = angles
+        if not self.device.is_cpu:
+            tree.data.assign(self._tree.data.numpy())
+        self._overwrite(self._angles, now)
+        self._fresh = 1
+
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
         fixed = self.tolerance == 0.0
         self._launch(

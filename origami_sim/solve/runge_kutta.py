@@ -25,6 +25,14 @@ TABLEAU = np.array(
 """Times and weights of the stages, and the weights of the error (fifth less fourth order)."""
 
 
+REVERSAL = 0.1
+"""Turn that a reversal may lose within a step [rad], over the root of the error that a step may have [rad].
+
+That is 1e-5 where a step may be off by 1e-8, a thousandth of the angle in which dry friction yields. Ten times more
+begins to show in derivatives by friction, a tenth costs a tenth more steps.
+"""
+
+
 @wp.func
 def step_of(tree: Tree, clock: scalar, dt: scalar, tolerance: scalar, w: int):
     """Length of the next step within one of dt, of which `clock` is over: never one that leaves a crumb."""
@@ -172,6 +180,24 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
                 x = x / size
         worst = larger(worst, x)
     return worst
+
+
+@wp.func
+def reversal_of(tree: Tree, h: scalar, tolerance: scalar, w: int):
+    """Turn of a hinge forth and back within a step of h that laws with memory do not see, as an error of a step.
+
+    They are told by how much a hinge has turned from the step's begin to its end.
+    """
+    o = w * tree.width
+    lost = scalar(0.0)
+    for i in range(tree.roots, tree.rates):
+        before = wp.abs(at(tree.data, o + tree.u0 + i))
+        after = wp.abs(at(tree.data, o + tree.u + i))
+        if at(tree.data, o + tree.u0 + i) * at(tree.data, o + tree.u + i) < scalar(0.0):
+            least = wp.min(before, after)
+            lost = wp.max(lost, scalar(0.5) * h * least * least / (before + after))
+    # what is lost falls with the square of the step, an error with its fifth power
+    return tolerance * wp.pow(lost / (scalar(REVERSAL) * wp.sqrt(tolerance)), scalar(2.5))
 
 
 @wp.func

@@ -160,6 +160,8 @@ def rigid({arguments}
             longer = dt
             if s >= 0:
                 error = runge_kutta.error_of(tree, step, size, w)
+                if tolerance > scalar(0.0) and tree.memories > 0:
+                    error = runge_kutta.larger(error, runge_kutta.reversal_of(tree, step, tolerance, w))
             if error <= allowed:
                 runge_kutta.carry_over(tree, work, step, w)
                 clock += step

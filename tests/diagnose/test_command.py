@@ -117,7 +117,7 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
     from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
-    from origami_sim.fit.linear import Weights
+    from origami_sim.fit.weights import Weights
     from origami_sim.observe import panel_angle
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
@@ -146,7 +146,7 @@ def test_an_error_of_one_channel_moves_no_node(recorded):
     from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
     from origami_sim.fit.least_squares import fit
-    from origami_sim.fit.linear import Weights
+    from origami_sim.fit.weights import Weights
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
     forward = BarRollouts(subject, [recording], segment=0.4)
@@ -234,7 +234,7 @@ def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypat
     from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis, suspects
     from origami_sim.fit.least_squares import fit
-    from origami_sim.fit.linear import Weights
+    from origami_sim.fit.weights import Weights
 
     @wp.func
     def moment(angle: scalar, runaway: scalar):

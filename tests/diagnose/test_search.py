@@ -11,7 +11,7 @@ from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.experiment import propose
 from origami_sim.diagnose.held_out import folds, held_out
-from origami_sim.diagnose.nominal import memory, nominal_fits
+from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.screen import screen
 from origami_sim.diagnose.search import by_effect, marginals, search
@@ -112,14 +112,6 @@ def test_numbers_of_which_no_model_can_be_built_are_not_tried_and_end_nothing():
     assert found.failed or found.theta[0] <= 1.02
 
 
-def test_the_memory_of_residuals_is_that_of_a_running_mean():
-    rng = np.random.default_rng(3)
-    white = [rng.normal(size=(2000, 2)) for _ in range(4)]
-    assert memory(white) == pytest.approx(1.0, abs=0.3)
-    smooth = [np.convolve(rng.normal(size=4020), np.ones(20) / 20, "valid")[:, None] for _ in range(4)]
-    assert memory(smooth) == pytest.approx(20.0, rel=0.25)  # a running mean of 20 samples
-
-
 def test_residuals_are_held_against_the_drive_that_varies(rubbing):
     forward = rubbing[0]
     assert varying_drive(forward) == (None, "rate")
@@ -131,8 +123,8 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
 
 def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
     """A number's derivative is large in one fold only: there the held-out error is that without the fit."""
-    forward, _, base, weights, _ = rubbing
-    plain = held_out(forward, base, weights)
+    forward, _, base, _, _ = rubbing
+    plain = held_out(forward, base)
     assert np.all(plain.rms > 0.9 * forward.blocks[0].noise) and len(plain.folds) == 5
     line = base.linear
     first = folds(forward, base.blocks)[0]
@@ -142,7 +134,7 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
         for n, (r, t) in enumerate(zip(line.residual, line.tangent, strict=True))
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
-    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=off, tangent=alone)), weights)
+    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=off, tangent=alone)))
     assert left.folds[0] > 1.5 * plain.folds[0]
     assert left.folds[1:] == pytest.approx(plain.folds[1:], rel=0.2)
 
@@ -173,7 +165,7 @@ def test_recordings_of_one_drive_level_are_held_out_together(levels, parts):
 def test_baselines_are_left_out_where_nothing_is_left_to_learn_from():
     forward, _ = arranged(subject(3), [record(**SMALL)], Options(start="fit", segment=99.0))
     _, base, weights = nominal_fits(forward)
-    refitted, *others = baselines(forward, base, weights, held_out(forward, base, weights).rms)
+    refitted, *others = baselines(forward, base, weights, held_out(forward, base).rms)
     assert np.all(np.isfinite(refitted.rms))
     assert others and all(np.all(np.isnan(b.rms)) and "two halves" in b.note for b in others)
 

@@ -8,7 +8,8 @@ from scipy.special import logsumexp
 
 from origami_sim.fit.evidence import Group, Sets, problem, summed
 from origami_sim.fit.hyper import Hyper
-from origami_sim.fit.linear import Linearisation, Rows
+from origami_sim.fit.linear import Linearisation
+from origami_sim.fit.weights import Rows
 
 HYPER = Hyper(slabs=(3.0, 10.0, 40.0), effects=0.4)
 COUNT, SMOOTH, FLAWS = 24, 0.7, 2.0

@@ -11,8 +11,8 @@ from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, suspects
 from origami_sim.fit.least_squares import fit, linearise
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Block, Prediction
+from origami_sim.fit.weights import Weights
 from tests.diagnose.strips import hanging, record, subject
 
 STIFFENING = {"crease_stiffening": {"cubic_stiffness": (4e-4, [1])}}
@@ -52,7 +52,7 @@ class Valley:
     Where y is below `lowest`, the simulation fails.
     """
 
-    local, nudge = 0, 0.01
+    local, nudge, blur = 0, 0.01, 0.0
     model = SimpleNamespace(contacts=())
     blocks = (made(np.zeros((2, 1))),)
 
@@ -94,7 +94,7 @@ def test_a_curved_valley_is_followed_to_a_bound():
 class Film:
     """Something whose strength shows by its logarithm, and slows the simulation down as it grows."""
 
-    local, nudge = 0, 0.01
+    local, nudge, blur = 0, 0.01, 0.0
     model = SimpleNamespace(contacts=())
     blocks = (made(np.log1p([30.0, 10.0])[:, None]),)
     subject = SimpleNamespace(nominals=(Free("film", "x", "-", start=0.0, scale=1.0, spread=1e-3),))
@@ -119,7 +119,7 @@ def test_no_series_of_fits_asks_for_ever_smaller_steps_of_the_solver():
 
 def test_new_weights_are_those_of_a_new_linearisation(stiff):
     forward, base, weights, _ = stiff
-    new = Weights(weights.deviation * [0.5, 2.0], 0.3 * weights.part, 0.5 * weights.gap)
+    new = Weights(weights.deviation * [0.5, 2.0], (0.7 ** np.arange(20), np.ones(1)), 0.5 * weights.gap)
     quick = base.linear.reweighted(weights, new)
     slow = linearise(forward, base.hypothesis, base.free, base.theta, base.local, base.blocks, new)
     for a, b in zip(quick.residual, slow.residual, strict=True):

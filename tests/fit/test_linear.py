@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import lstsq
 
-from origami_sim.fit.linear import Linearisation, Rows, Weights
+from origami_sim.fit.linear import Linearisation
+from origami_sim.fit.weights import Rows, Weights, recast
 
 TIES = {
     "all tied": [True, True, True, False],
@@ -108,7 +109,7 @@ def test_gaps_without_doubt_join_segments_into_one():
 
 def test_other_weights_scale_data_and_gaps_and_nothing_else():
     line = made([True, True, False], data=8)
-    old, new = Weights(np.array([1.0]), 1.0, 0.1), Weights(np.array([2.0]), 0.25, 0.3)
+    old, new = Weights(np.array([1.0]), gap=0.1), Weights(np.array([4.0]), gap=0.3)
     other = line.reweighted(old, new)
     for n, r in enumerate(line.rows):
         by = np.concatenate([np.full(r.data, 0.25), np.ones(r.start), np.full(r.tie, 1 / 3)])
@@ -121,6 +122,29 @@ def test_other_weights_scale_data_and_gaps_and_nothing_else():
 
 
 def test_missing_values_weigh_nothing():
-    w = Weights(np.array([0.5, 2.0]), 0.25)
+    w = Weights(np.array([0.5, 2.0]))
     values = np.array([[1.0, np.nan], [np.nan, 4.0]])
-    assert w.whitened(values) == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    rows = Rows(4, seen=np.isfinite(values))
+    assert w.whitened(values, rows) == pytest.approx([2.0, 0.0, 0.0, 2.0])
+    coloured = Weights(np.array([0.5, 2.0]), (np.array([1.0, 0.5]), np.array([1.0])))
+    assert coloured.whitened(values, rows) == pytest.approx([2.0, 0.0, 0.0, 2.0])
+
+
+def test_coloured_residuals_are_whitened_exactly_in_the_frames_that_were_seen():
+    rng = np.random.default_rng(3)
+    colour = 0.8 ** np.arange(12)
+    w = Weights(np.array([0.5, 3.0]), (colour, np.array([1.0])))
+    seen = np.ones((12, 2), bool)
+    seen[[3, 4, 9], 0] = False
+    rows = Rows(24, seen=seen)
+    values = np.where(seen, rng.normal(size=(5, 12, 2)), np.nan)
+    white = w.whitened(values, rows)
+    mine = seen[:, 0]
+    cover = 0.25 * colour[np.abs(np.subtract.outer(np.flatnonzero(mine), np.flatnonzero(mine)))]
+    for k in range(5):
+        x = values[k, mine, 0]
+        squares = x @ np.linalg.solve(cover, x) + np.sum(values[k, :, 1] ** 2) / 9.0
+        assert white[k] @ white[k] == pytest.approx(squares)
+    assert w.restored(white, rows) == pytest.approx(np.nan_to_num(values))
+    other = Weights(np.array([1.0, 1.0]), gap=2.0)
+    assert recast(white[0], rows, w, other) == pytest.approx(np.nan_to_num(values[0]).ravel())

@@ -14,8 +14,8 @@ from origami_sim.drive import Drive
 from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.linear import Weights
 from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.fit.weights import Weights
 from origami_sim.model import State
 from origami_sim.pattern import strip
 from origami_sim.recording import Channel, Recording
@@ -45,7 +45,7 @@ SHARP = 1e-6
 
 def fitted(forward, **options):
     deviation = np.full(len(forward.components), SHARP)
-    return fit(forward, Hypothesis(), Weights(deviation, 1.0, SHARP), most=20, done=0.0, **options)
+    return fit(forward, Hypothesis(), Weights(deviation, gap=SHARP), most=20, done=0.0, **options)
 
 
 def gap_of(f) -> float:

@@ -1,0 +1,118 @@
+"""Noise that a fit implies: gaps, levels and colours under which what it leaves is most probable.
+
+Every hypothesis is judged by its own (empirical Bayes), so that what one of them leaves is no noise to another.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.fit.evidence import Group, Sets, problem, summed
+from origami_sim.fit.hyper import Hyper
+from origami_sim.fit.least_squares import Fit, smoothed
+from origami_sim.fit.linear import Linearisation
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.residual_process import residual_process
+from origami_sim.fit.weights import Weights, recast
+
+ROUNDS = 4
+"""Times that gaps and levels follow each other; from the third on they hardly move."""
+
+SAME = 0.02
+"""Relative change of a level, and change of a correlation, below which they have settled."""
+
+
+def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
+    """A fit judged by what it leaves itself: no simulation, all that is fitted moves linearly."""
+    for _ in range(ROUNDS):
+        assert f.weights is not None
+        trial = replace(f.weights, gap=best_gap(f, hyper))
+        new = left_by(forward, smoothed(forward, f, trial), trial.gap)
+        same = unchanged(f.weights, new)
+        f = f.reweighted(new)
+        if same:
+            break
+    return f
+
+
+def left_by(forward: Predictor, residuals: list[np.ndarray], gap: float) -> Weights:
+    """Weights of residuals (n, D) [SI], no smaller than the measurement noise."""
+    found = [residual_process([r[:, d] for r in residuals], float(n)) for d, n in enumerate(forward.blocks[0].noise)]
+    colour = tuple(c for _, c, _ in found)
+    coloured = any(len(c) > 1 for c in colour)
+    return Weights(np.array([d for d, *_ in found]), colour if coloured else (), gap, sum(p for *_, p in found))
+
+
+def unchanged(old: Weights, new: Weights) -> bool:
+    """Whether weights have settled."""
+    if old.gap != new.gap or bool(old.colour) != bool(new.colour):
+        return False
+    if np.any(np.abs(np.log(new.deviation / old.deviation)) >= SAME):
+        return False
+    return all(_apart(a, b) < SAME for a, b in zip(old.colour, new.colour, strict=True))
+
+
+def _apart(a: np.ndarray, b: np.ndarray) -> float:
+    n = max(len(a), len(b))
+    return float(np.max(np.abs(np.pad(a, (0, n - len(a))) - np.pad(b, (0, n - len(b))))))
+
+
+def best_gap(f: Fit, hyper: Hyper) -> float:
+    """The size of the gaps between segments under which a fit is most probable."""
+    line = f.linear
+    assert line is not None and f.weights is not None
+    if not any(t is not None for t in line.tie):
+        return f.weights.gap
+    own = own_columns(f)
+    effects = [t[:, own.columns] for t in line.tangent]
+    none = [np.zeros((r.count, 0)) for r in line.rows]
+    laid = own.sets(len(own.columns))
+    log = []
+    for k, gap in enumerate(hyper.gaps):
+        now, theirs = regapped(line, effects, f.weights, gap)
+        cell = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, 0.0)
+        log.append(cell.of(laid, hyper)[0][0] + k * np.log(hyper.fewer))
+    return hyper.gaps[int(np.argmax(log))]
+
+
+class own_columns:
+    """Columns of a fit's tangent: nominal numbers, then its effects', strengths first.
+
+    Attributes:
+        nominal: their indices. precision: (P,) scale over prior deviation. away: (P,) prior mean minus value, scaled.
+        columns: of the effects. groups: one for each suspect.
+    """
+
+    def __init__(self, f: Fit):
+        self.nominal = np.arange(len(f.free) - len(f.hypothesis.free))
+        scale = np.array([n.scale for n in f.free])
+        self.precision = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+        self.away = (np.array([n.start for n in f.free]) - f.theta) / scale
+        self.columns: list[int] = []
+        self.groups: list[Group] = []
+        place = len(self.nominal)
+        for s in f.hypothesis.suspects:
+            inner = list(s.free)
+            strong = [k for k, n in enumerate(inner) if n in s.strengths]
+            arranged = [*strong, *(k for k in range(len(inner)) if k not in strong)]
+            at = np.array([(f.theta[place + k] - inner[k].start) / inner[k].scale for k in arranged])
+            spread = np.array([inner[k].spread / inner[k].scale for k in arranged])
+            first = inner[0]
+            side = 1 if first.start <= first.lower else -1 if first.start >= first.upper else 0
+            begin = len(self.columns)
+            self.columns += [place + k for k in arranged]
+            self.groups.append(Group(tuple(range(begin, begin + len(inner))), len(strong), at, side, spread))
+            place += len(inner)
+
+    def sets(self, count: int) -> Sets:
+        """The set of all of them, in a problem of so many columns."""
+        whole = tuple(range(len(self.groups)))
+        return Sets.of([whole], self.groups, len(whole), count)
+
+
+def regapped(line: Linearisation, effects: list[np.ndarray], weights: Weights, gap: float):
+    """A linearisation and further columns, for another size of the gaps."""
+    if not any(t is not None for t in line.tie):
+        return line, effects
+    new = replace(weights, gap=gap)
+    return line.reweighted(weights, new), [recast(e, r, weights, new) for e, r in zip(effects, line.rows, strict=True)]
