@@ -23,7 +23,7 @@ from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.screen import Signature, screen
-from origami_sim.diagnose.search import Posterior, extended, marginals, polished, search
+from origami_sim.diagnose.search import Posterior, marginals, search
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
 from origami_sim.diagnose.verdict import judge
 from origami_sim.diagnose.where import located
@@ -102,8 +102,6 @@ def diagnose(
     lap("screen")
     tell("search", 0.0)
     posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
-    polished(posterior, forward)
-    extended(posterior, forward, progress=lambda part: tell("search", part), most=o.fits // 2)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:

@@ -98,7 +98,8 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         ranked: single effects by what they promise the model without any.
-        tried: sets that were fitted. promise: log posterior that sets which were not may have.
+        tried: sets that were fitted. promise: log posterior that sets which were not may have. tight: sets that were
+            fitted by the noise that they or their neighbours imply.
         weights: of the signatures.
     """
 
@@ -112,6 +113,7 @@ class Posterior:
     ranked: list[Key] = field(default_factory=list)
     tried: set[Key] = field(default_factory=set)
     promise: dict[Key, float] = field(default_factory=dict)
+    tight: set[Key] = field(default_factory=set)
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -144,6 +146,8 @@ def search(
     """The posterior over sets of effects, from the refitted model without any."""
     out = Posterior(signatures, weights)
     _add(out, forward, frozenset(), base, log_priors(signatures))
+    extended(out, forward, progress=progress, most=most)
+    polished(out, forward)
     return extended(out, forward, progress=progress, most=most)
 
 
@@ -163,10 +167,16 @@ def extended(
         far = best in out.nodes and missed(forward, out.nodes[best].fit) > FAR
         if not far and sum(p[k] for k in open_sets) < UNFITTED:
             break
-        key = max(open_sets, key=lambda k: out.promise[k] if far else p[k])
-        single = next((k for k in out.ranked if k in open_sets and k not in out.tried), None)
-        if far and n % 2 and single is not None:  # far from the data one effect may do what several were expected to
-            key = single
+        key = max(open_sets, key=lambda k: p[k])
+        if far:  # judged by what is missing, not by the noise that hides it
+            stands = float(logsumexp(out.log[best]))
+            open_sets = [k for k in open_sets if out.promise[k] > stands]
+            if not open_sets:
+                break
+            key = max(open_sets, key=lambda k: out.promise[k])
+            single = next((k for k in out.ranked if k in open_sets and k not in out.tried), None)
+            if n % 2 and single is not None:  # one effect may do what several were expected to
+                key = single
         out.tried.add(key)
         if not far and p[key] < UNFITTED / 5 and best in out.nodes:
             break
@@ -189,12 +199,19 @@ def polished(out: Posterior, forward: Predictor) -> None:
     """Fits the leaders on, by their own noise."""
     prior, chance = log_priors(out.signatures), out.probabilities()
     for key in sorted((k for k in out.nodes if chance[k] > POLISHED), key=lambda k: -chance[k])[:KEPT]:
+        if key in out.tight:
+            continue
         f = out.nodes[key].fit
-        assert f.weights is not None
-        tight = f.reweighted(replace(f.weights, gap=max(f.weights.gap, TIGHT)))
-        f = carried_on(forward, tight)
+        f = carried_on(forward, f.reweighted(tight(f)))
         if not f.failed:
+            out.tight.add(key)
             _add(out, forward, key, f, prior)
+
+
+def tight(f: Fit) -> Weights:
+    """The noise that a fit implies, with gaps that leave its steps linear."""
+    assert f.weights is not None
+    return replace(f.weights, gap=max(f.weights.gap, TIGHT))
 
 
 def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:
@@ -412,9 +429,12 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     # derivatives by the numbers of the model and by starts hardly change with an effect
     parent = node.fit
     assert parent.linear is not None and parent.weights is not None
-    loose = level(forward, parent)  # white, and with gaps that are no obstacle on the way
-    near = {"known": parent.linear.reweighted(parent.weights, loose), "kept": len(forward.subject.nominals)}
-    return fit(forward, hypothesis, loose, theta=np.concatenate(begin), local=parent.local, **near)
+    by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
+    if missed(forward, parent) < FAR:
+        by = tight(parent)
+        out.tight.add(key)
+    near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
+    return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
 
 
 def marginals(p: Posterior) -> dict[str, float]:

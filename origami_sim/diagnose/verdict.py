@@ -19,6 +19,9 @@ CREDIBLE = 0.95
 ALONE = 0.8
 """Probability from which one explanation is named alone: to name a wrong one is four times as bad as a tie."""
 
+LISTED = 3
+"""Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time."""
+
 MOSTLY = 0.5
 """Share of the mismatch that has to be named, or else what is left is the news."""
 
@@ -60,12 +63,12 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     """
     chance = p.probabilities()
     classes = by_effects(p, chance)
-    lead = max(classes, key=lambda c: classes[c])
+    lead, beside = surely(classes)
     best = best_of(p, chance, lead)
     shown = widened(p, best)
     shares = budget(forward, given, base, p.nodes[best].fit)
     rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
-    set_, total = credible(classes)
+    set_, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
     tied = [widened(p, k) for c in set_ if (k := best_of(p, chance, c)) in p.nodes]
     others = [widened(p, k) for k in sorted(p.nodes, key=lambda k: -chance.get(k, 0.0)) if _class(p, k) != lead]
     common = {"best": shown, "tied": tied, "others": others, "budget": shares}
@@ -76,7 +79,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = "None of the catalogue's suspects is excited by these recordings."
         return Judgement("UNTESTABLE", text, 1.0, [], **common)
     discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
-    if not lead:
+    if not lead and max(classes, key=lambda c: classes[c]) == lead:
         found = _nothing_named(forward, given, base, p, shares, rest, discrepancy, classes[lead], compared)
         return replace(found, **{k: v for k, v in common.items() if k != "best"}, best=shown)
     named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
@@ -85,7 +88,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         return Judgement("UNKNOWN", text, np.nan, [shown.hypothesis.label], **common)
     sure = sum(v for c, v in classes.items() if c >= lead)
-    if sure < ALONE and len(set_) > 1:
+    if not lead or beside:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (["nothing"] if frozenset() in set_ else [])
         each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in set_[:4]]
         more = f" and {len(set_) - 4} more" if len(set_) > 4 else ""
@@ -103,6 +106,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     verb = "they" if len(suspects) > 1 else "it"
     explained = explained if len(suspects) < 2 else explained.replace("explains", "explain", 1)
     text = f"Found: {say(shown)}{where}, p = {sure:.2f}; {verb} {explained}."
+    more = 1.0 - classes.get(lead, 0.0) / sure
+    if more > ALONE:
+        text += f" Something small acts besides (p = {more:.2f}); these recordings do not tell what it is."
     return Judgement("SEVERAL" if len(suspects) > 1 else "MECHANISM", text, sure, chosen, **common)
 
 
@@ -156,11 +162,34 @@ def _class(p: Posterior, key: Key) -> frozenset[str]:
     return frozenset(p.suspect(n).effect for n in key)
 
 
+def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
+    """Effects that act together with at least `ALONE`; and the few explanations that add to them, if one surely does.
+
+    What is added is listed where `LISTED` explanations or fewer hold `ALONE`.
+    """
+    marginal: dict[str, float] = {}
+    for c, value in classes.items():
+        for effect in c:
+            marginal[effect] = marginal.get(effect, 0.0) + value
+    lead: frozenset[str] = frozenset()
+    for effect in sorted(marginal, key=lambda e: (-marginal[e], e)):
+        larger = lead | {effect}
+        if sum(v for c, v in classes.items() if c >= larger) < ALONE:
+            break
+        lead = larger
+    likely = sorted((c for c in classes if c > lead), key=lambda c: -classes[c])[:LISTED]
+    for n in range(1, len(likely) + 1 if lead else 1):
+        if sum(classes[c] for c in likely[:n]) >= ALONE:
+            return lead, likely[:n]
+    return lead, []
+
+
 def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> Key:
-    """The most probable fitted set of these effects, or else the most probable one."""
-    mine = [k for k in chance if _class(p, k) == effects]
-    fitted = [k for k in mine if k in p.nodes]
-    return max(fitted or [frozenset()], key=lambda k: chance.get(k, 0.0))
+    """The most probable fitted set of these effects; or else of these and others, or else of any."""
+    classes = {k: _class(p, k) for k in p.nodes}
+    mine = [k for k, c in classes.items() if c == effects] if effects else []
+    mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
+    return max(mine, key=lambda k: chance.get(k, 0.0))
 
 
 def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]], float]:

@@ -10,7 +10,7 @@ from origami_sim.articulation import Pose
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
-from origami_sim.fit.rollouts import PARTS, TURN, Path, Rollouts, Shots, film, joined_poses
+from origami_sim.fit.rollouts import Path, Rollouts, Shots, film, joined_poses
 from origami_sim.fit.worlds import World
 from origami_sim.model import Parameters, State
 from origami_sim.recording import Recording
@@ -64,7 +64,8 @@ class RigidRollouts(Rollouts):
         step, count = float(np.median(np.diff(recording.times))), len(recording.times)
         frames = count if segment is None or self.start != "fit" else max(FEWEST, round(segment / step))
         pieces = max(1, round(count / frames))
-        firsts = np.append(np.arange(pieces) * (count // pieces), count)  # of equal length, but for the last
+        firsts = np.arange(0, count, -(-count // pieces))  # of equal length, but for the last
+        firsts = np.append(firsts[count - firsts >= min(FEWEST, count)], count)
         out = [self.segment(index, int(a), int(b - a)) for a, b in pairwise(firsts)]
         if not tied or self.start != "fit":
             return out
@@ -122,15 +123,16 @@ class RigidRollouts(Rollouts):
         batch.finest = FINEST
         angles = np.stack([b.pose.angles[:, 0] for b in blocks], axis=1) + starts[0, :, : self.local // 2].T
         rates = np.stack([b.rates for b in blocks], axis=1) + starts[0, :, self.local // 2 :].T
-        fine = int(np.clip(np.ceil(np.sqrt(np.abs(rates).max(initial=0.0) * step / TURN / 8.0)), 1, PARTS))
-        films = [state.x[None, :, 0]]
+        films = [angles[:, :1]]
         for n, block in enumerate(blocks):
             batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
             after = block.lasting if block.reach is not None else block.times[-1]
             frames = round(after / step)
-            films.append(batch.film(frames * fine, 1, after / max(frames * fine, 1), np.inf)[0][:, :, 0])
-        path = np.concatenate(films)
-        return Path(path, fine) if np.all(np.isfinite(path)) else super()._moved(r, world, local)
+            if frames:
+                filmed = batch.film(frames, 1, after / frames, np.inf)[1]
+                films.append(filmed[:, self.articulation.creases, 0].T)
+        q = np.concatenate(films, axis=1)
+        return self._placed(recording, q) if np.all(np.isfinite(q)) else super()._moved(r, world, local)
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""

@@ -304,6 +304,8 @@ class Rollouts(Worlds, ABC):
         path = self._moved(r, worlds[0], local)
         if path is None:
             return None
+        some, of = distinct_memories(worlds)
+        worlds = [worlds[k] for k in some]
         parameters = Parameters.join([p for _, p in worlds])
         times = self.recordings[r].times - self.recordings[r].times[0]
         step = float(np.median(np.diff(times)))
@@ -327,7 +329,7 @@ class Rollouts(Worlds, ABC):
                 batch = rested(last)
             if first > last:
                 batch.carry(path.between(last, first), step / path.count)
-            last, out[first] = first, batch.remembered()
+            last, out[first] = first, batch.remembered()[:, of]
         return out
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
@@ -377,6 +379,17 @@ def joined_poses(poses: Sequence[Pose]) -> Pose:
         np.concatenate([p.centre for p in poses]),
         np.concatenate([p.angles for p in poses], axis=1),
     )
+
+
+def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two remember the same motion differently, and (K,) which of them each world is like."""
+    telling = {e for e in worlds[0][0].effects if get(e).memory or get(e).family == "drive"}
+    found: dict[bytes, int] = {}
+    of = [
+        found.setdefault(b"".join(parameters[p].tobytes() for p in parameters if p[0] in telling), len(found))
+        for _, parameters in worlds
+    ]
+    return [of.index(n) for n in range(len(found))], np.array(of)
 
 
 def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:

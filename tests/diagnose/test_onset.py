@@ -43,8 +43,8 @@ def sudden(t0: float, change=None, kick=None, seed: int = 0, noise: float = 2e-3
 
 def dated(recording: Recording) -> float:
     forward, _ = arranged(subject(3), prepared([recording], 200.0), Options())
-    _, base, weights = nominal_fits(forward)
-    return onset(forward, base, weights)
+    _, base, _ = nominal_fits(forward)
+    return onset(forward, base)
 
 
 SUDDEN = {

@@ -14,7 +14,7 @@ from origami_sim.diagnose.held_out import folds, held_out
 from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import by_effect, marginals, search
+from origami_sim.diagnose.search import by_effect, marginals, missed, search
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
@@ -70,11 +70,13 @@ def test_nothing_is_found_of_a_strip_as_it_is():
     assert max(chance, key=lambda k: chance[k]) == frozenset() and chance[frozenset()] > 0.6
 
 
-def test_a_set_that_was_fitted_never_fits_worse_than_one_that_it_contains(found):
+def test_a_set_that_was_fitted_never_fits_worse_than_one_that_it_contains(found, rubbing):
+    forward = rubbing[0]
     for key, node in found.nodes.items():
         for other, smaller in found.nodes.items():
             if other < key:
-                assert node.fit.cost <= smaller.fit.cost + 1.0, (found.label(key), found.label(other))
+                larger, fewer = missed(forward, node.fit), missed(forward, smaller.fit)
+                assert larger <= 1.02 * fewer, (found.label(key), found.label(other))
 
 
 def test_what_all_creases_do_is_the_sum_of_what_each_does(rubbing):
@@ -130,7 +132,7 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
     first = folds(forward, base.blocks)[0]
     alone = [t * (1.0 if n in first else 1e-3) for n, t in enumerate(line.tangent)]
     off = [
-        r + (3.0 * t[:, 0] if n in first else 0.0)
+        r + (100.0 * t[:, 0] if n in first else 0.0)
         for n, (r, t) in enumerate(zip(line.residual, line.tangent, strict=True))
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
