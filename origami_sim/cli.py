@@ -202,16 +202,6 @@ def _parser() -> argparse.ArgumentParser:
     p.set_defaults(action=_calibrate)
     register(p)
 
-    from origami_sim import prove
-
-    p = command(
-        "prove",
-        _prove,
-        "Conceal effects at random in another simulator, diagnose them blindly, and score",
-        "origami-sim prove --cases 12 --seed 1",
-    )
-    prove.register(p)
-
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
 
@@ -272,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"origami-sim: {e}", file=sys.stderr)
         code = BAD_INPUT
     except KeyboardInterrupt as e:
-        print(f"origami-sim: {e or 'interrupted; earlier results are untouched.'}", file=sys.stderr)
+        print(f"origami-sim: {str(e) or 'interrupted; earlier results are untouched.'}", file=sys.stderr)
         code = INTERRUPTED
     except BrokenPipeError:  # the reader of our output left; nothing more can be said there, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -403,12 +393,6 @@ def _study(args) -> int:
     if args.json:
         _print_json(report)
     return NO if any(s["failures"] for s in report.get("sets", {}).values()) else OK
-
-
-def _prove(args) -> int:
-    from origami_sim import prove
-
-    return prove.run(args)
 
 
 def _effects(args) -> int:
