@@ -85,7 +85,7 @@ def run(args: Namespace) -> int:
     subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
-    options = _options(args)
+    options = replace(_options(args), possible=getattr(module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
     keep, progress = Keep(folder / RESUME), Progress()
     files = keep.write = Files(folder, settings, name, keep)

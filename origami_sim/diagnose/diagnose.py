@@ -12,7 +12,7 @@ from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.describe import unnamed
 from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.experiment import propose
+from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
@@ -34,7 +34,9 @@ from origami_sim.fit.least_squares import Fit, carried_on
 from origami_sim.fit.linear import Weights
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
+from origami_sim.possible import Possible
 from origami_sim.recording import Recording, read_dataset
+from origami_sim.scene import scene_module
 
 ROUNDS = 3
 """Times that weights follow the explanation that leaves least: that is the noise that all are judged by."""
@@ -74,6 +76,7 @@ def diagnose(
         seconds[stage] = clock.perf_counter() - began - sum(seconds.values())
 
     tell("prepare", 0.0)
+    said = possible_of(subject)
     subject = subject_of(subject, priors)
     each = [recordings] if isinstance(recordings, (Recording, str, Path)) else recordings
     recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
@@ -148,7 +151,11 @@ def diagnose(
         error_refitted=errors[frozenset()].tolist(),
         error_after=after.tolist(),
         notes=noted,
-        settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
+        settings={
+            **{k: v for k, v in o.__dict__.items() if k != "possible"},
+            "segments": len(forward.blocks),
+            "start": forward.start,
+        },
         seconds=seconds,
         patch={} if judged.verdict == "UNTESTABLE" else patch(best),
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
@@ -169,7 +176,8 @@ def diagnose(
 
     def experiments() -> dict:
         progress = lambda part: tell("next experiment", part)  # noqa: E731
-        return {"experiments": propose(forward, judged, weights, progress=progress)}  # type: ignore[arg-type]
+        can = (o.possible or said).but(recordings[0].metadata.get("possible") or {})
+        return {"experiments": propose(forward, *explanations(posterior), weights, can, progress=progress)}
 
     def others() -> dict:
         return {"baselines": baselines(forward, base, weights, errors[frozenset()])}
@@ -210,6 +218,12 @@ def settled(
         p = extended(p, forward, progress=lambda part: tell("search", part), most=most // 2)
         weights = new
     return given, base, weights, p
+
+
+def possible_of(source: Source) -> Possible:
+    """What a scene says that its set-up can do, or the defaults."""
+    given = source[0] if isinstance(source, tuple) else source
+    return getattr(scene_module(given) if isinstance(given, str) else given, "POSSIBLE", None) or Possible()
 
 
 def share_compared(forward: Predictor) -> float:

@@ -190,11 +190,18 @@ class Correlation:
 
 @dataclass
 class Experiment:
-    """A proposed next experiment: what to do, which explanations it separates, and the expected separation d'."""
+    """A proposed next experiment.
+
+    Attributes:
+        what: to do. separates: explanations that it tells apart, the best one first.
+        information: by how much it is expected to lower the entropy of the posterior over explanations [bits].
+        entropy: that is there now [bits]. repeats: recordings that tell most of what it can; 9999: no number does.
+    """
 
     what: str
     separates: list[str]
-    expected: float
+    information: float
+    entropy: float
     repeats: int
 
 

@@ -486,8 +486,8 @@ def test_pairs_are_of_known_mechanisms(truth):
     ("what", "recording", "expected"),
     [
         ("start from 0.3 times the displacement and rate", {"release": [1.0]}, {"release": [0.3]}),
-        ("let it run three times as long", {"release": [1.0]}, {"release": [1.0], "stretch": 3.0}),
-        ("voltage at twice the level", {"levels": [1.0, 3.0]}, {"levels": [2.0, 6.0]}),
+        ("let it run 3 times as long", {"release": [1.0]}, {"release": [1.0], "stretch": 3.0}),
+        ("voltage at 2 times the level", {"levels": [1.0, 3.0]}, {"levels": [2.0, 6.0]}),
         ("field reversed", {"levels": [1.0]}, {"levels": [-1.0]}),
         ("repeat the same curve", {"levels": [1.0]}, {"levels": [1.0]}),
         ("start from 2 times the displacement and rate", {"levels": [1.0]}, None),
