@@ -24,6 +24,7 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.search import Posterior, extended, marginals, reweighted, search
+from origami_sim.diagnose.stored import Stored
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
 from origami_sim.diagnose.verdict import judge
 from origami_sim.diagnose.where import located
@@ -109,7 +110,8 @@ def diagnose(
     signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("search", 0.0)
-    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
+    store, lead = keep is not None and keep.store, lambda part: tell("search", part)
+    posterior = search(forward, base, signatures, weights, progress=lead, most=o.fits // 2, store=store)
     given, base, weights, posterior = settled(forward, given, base, weights, posterior, o.fits, tell)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
@@ -196,6 +198,10 @@ def diagnose(
         Part("next experiment", "The next experiment could not be told", experiments),
         Part("baselines", "Baselines could not be told", others),
     ]
+    if keep is not None and keep.store:
+        fault = "The search could not be stored"
+        make = lambda: Stored.of(forward, given, base, posterior, weights, compared)  # noqa: E731
+        keep.stored = attempt(noted, fault, make, None)
     add(out, parts, tell, keep.stands if keep is not None else lambda _: None)
     tell("done", 1.0)
     return out

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from origami_sim.diagnose.diagnosis import Diagnosis
+from origami_sim.diagnose.stored import Stored
 from origami_sim.fit.cache import Cache
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -18,13 +19,16 @@ class Keep:
         cache: predictions on disk, if there is a folder for them.
         found: the diagnosis as far as it stands; None before there is a verdict.
         write: called with it whenever it has changed; may be set.
+        store: whether `stored` is wanted: what is needed to judge the search anew; there as soon as the verdict stands.
     """
 
-    def __init__(self, folder: str | Path | None = None):
+    def __init__(self, folder: str | Path | None = None, *, store: bool = False):
         self.cache = None if folder is None else Cache(folder)
         self.forward: Predictor | None = None
         self.fits: dict[str, Fit] = {}
         self.found: Diagnosis | None = None
+        self.store = store
+        self.stored: Stored | None = None
         self.write: Callable[[Diagnosis], object] | None = None
 
     def follow(self, forward: Predictor) -> None:

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 
 from origami_sim.diagnose.screen import Signature, rated
 from origami_sim.effects import get
-from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit
@@ -59,7 +59,7 @@ class Node:
     Attributes:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell.
+        grid: the summed problems by cell. problems: by size of the gaps, if they are to be stored.
     """
 
     key: Key
@@ -68,6 +68,7 @@ class Node:
     groups: list[Group]
     others: list[int]
     grid: list[Summed | None]
+    problems: dict[float, Problem] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ class Posterior:
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         ranked: single effects by what they promise the model without any.
         tried: sets that were fitted, with any weights.
-        weights: of the fits.
+        weights: of the fits. store: whether nodes keep their problems, to be judged anew (`stored`).
     """
 
     signatures: list[Signature]
@@ -100,6 +101,7 @@ class Posterior:
     failed: dict[Key, str] = field(default_factory=dict)
     ranked: list[Key] = field(default_factory=list)
     tried: set[Key] = field(default_factory=set)
+    store: bool = False
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -128,9 +130,10 @@ def search(
     *,
     progress: Callable[[float], None] | None = None,
     most: int = FITS,
+    store: bool = False,
 ) -> Posterior:
     """The posterior over sets of effects, from the refitted model without any."""
-    out = Posterior(signatures, weights)
+    out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     return extended(out, forward, progress=progress, most=most)
 
@@ -186,7 +189,7 @@ def reweighted(out: Posterior, forward: Predictor, base: Fit, new: Weights) -> P
         replace(s, parts=[k * p for k, p in zip(scales, s.parts, strict=True)] if s.parts else [])
         for s in out.signatures
     ]
-    again = Posterior(rated(moved, base), new, out.hyper, tried=set(out.tried))
+    again = Posterior(rated(moved, base), new, out.hyper, tried=set(out.tried), store=out.store)
     prior = log_priors(again.signatures)
     _add(again, forward, frozenset(), base, prior)
     chance = out.probabilities()
@@ -218,8 +221,12 @@ def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
     """Judges a fitted set, and all that add one or two effects to it."""
-    hyper = out.hyper
-    node = _node(out, forward, key, f)
+    place(out, _node(out, forward, key, f), prior)
+
+
+def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
+    """Enters a judged set, and all that add one or two effects to it, into a posterior."""
+    hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
@@ -354,7 +361,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         cell = summed(problems[gap], size, flaws)
         grid.append(cell)
         evidence[c] = cell.of(laid, hyper)[0][0]
-    return Node(key, f, evidence, groups, others, grid)
+    return Node(key, f, evidence, groups, others, grid, problems if out.store else {})
 
 
 def _regapped(line: Linearisation, effects: list[np.ndarray], weights: Weights, gap: float):

@@ -11,6 +11,7 @@ answer; the score opens the answers at the end, and checks them against digests 
     freeze.py   thresholds and sources of the diagnosis that a run belongs to
     score.py    what came of each case, and the scoreboard
     figures.py  its pictures
+    rejudge.py  opened cases judged anew from what they stored, with other hyperparameters
 """
 
 DEVELOPMENT = 1000

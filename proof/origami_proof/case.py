@@ -27,6 +27,9 @@ from origami_sim.scene import scene_module, scene_settings
 RIGIDITY = 2e5
 """Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.003 mm."""
 
+STORED = "stored.npz"
+"""What a case keeps of its search, to be judged anew (`rejudge`)."""
+
 LOSS = 0.1
 """Part of critical damping of a foot on the ground."""
 
@@ -108,8 +111,15 @@ def diagnose_case(folder: Path) -> dict:
     began = time.perf_counter()
     recordings = [read_recording(p) for p in sorted(folder.glob("recording*.csv"))]
     rate = 1.0 / float(np.median(np.diff(recordings[0].times)))
-    keep = Keep()
-    keep.write = lambda found: write_json(folder / "diagnosis.json", short(found, time.perf_counter() - began, rate))
+    keep = Keep(store=True)
+
+    def write(found: Diagnosis) -> None:
+        write_json(folder / "diagnosis.json", short(found, time.perf_counter() - began, rate))
+        if keep.stored is not None:
+            keep.stored.save(folder / STORED)
+            keep.stored = None  # it does not change any more
+
+    keep.write = write
     diagnose(subject(folder), recordings, Options(threads=1), keep=keep)
     return json.loads((folder / "diagnosis.json").read_text())
 

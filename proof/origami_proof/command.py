@@ -25,6 +25,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--nearest", action="store_true", help="look which other effect is hardest to tell from each")
     parser.add_argument("--draw-only", action="store_true", help="only draw; the same command without it goes on")
     parser.add_argument("--score", action="store_true", help="only score what is done")
+    text = "judge the opened cases of these runs anew, with half and double of each hyperparameter"
+    parser.add_argument("--rejudge", nargs="+", type=Path, metavar="RUN", help=text)
+    text = "of these only (default all; none: judge as it is)"
+    parser.add_argument("--vary", nargs="*", metavar="NAME", help=text)
     parser.add_argument("--out", metavar="FOLDER", help="run folder (default runs/prove_SEED)")
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of text")
     return parser
@@ -36,7 +40,8 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: options that make no sense, and what `battery.prove` and `score.report` refuse.
     """
-    from origami_proof import battery, score
+    from origami_proof import battery, rejudge, score
+    from origami_proof.case import write_json
 
     for name in ("cases", "jobs"):
         if getattr(args, name) is not None and getattr(args, name) < 1:
@@ -50,7 +55,11 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
 
-    if args.score:
+    if args.rejudge:
+        board = rejudge.rejudge(args.rejudge, jobs=args.jobs, vary=args.vary, say=say)
+        if args.out:
+            write_json(Path(args.out) / rejudge.REJUDGED, board)
+    elif args.score:
         if not (out / battery.RUN).exists():
             raise InputError("there is no proof in this folder", field="--out", value=str(out))
         board = score.report(out, args.cases or len(list((out / "cases").glob("*"))), say)
