@@ -27,8 +27,8 @@ bench: setup
 CASES ?= 12
 SEED ?= 1
 prove: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[proof]'
-	$(BIN)/origami-sim prove --cases $(CASES) --seed $(SEED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable proof
+	$(BIN)/origami-proof --cases $(CASES) --seed $(SEED)
 
 docs: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -37,7 +37,7 @@ def on_files(files, config):
 
 def on_page_markdown(markdown, page, config, files):
     """Links to files of the repository that are no pages become plain words: the site stands alone."""
-    return re.sub(r"\[([^\]]*)\]\((?:\.\./)*benchmarks/(?!README)[^)]*\)", r"`\1`", markdown).replace(
+    return re.sub(r"\[([^\]]*)\]\((?:\.\./)*(?:benchmarks/(?!README)|proof/)[^)]*\)", r"`\1`", markdown).replace(
         "](../benchmarks/README.md", "](benchmarks.md"
     )
 

@@ -54,8 +54,8 @@ class _Bar:
 
 
 _DIAGNOSE_HELP = """\
-writes report.html, diagnosis.json, patched.toml (for run --calibration, and for --model) and a replay. Interrupted, the
-same command goes on where it stopped.
+writes report.html, diagnosis.json, patched.toml (for run --calibration, and for --model) and a replay; data and patch
+as soon as the verdict stands. Interrupted, the same command goes on where it stopped.
 
 exit codes: 10 ADEQUATE (nothing is found missing), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
 makes the difference), 13 MECHANISM (an effect is missing), 14 TIE (several explain it alike), 15 SEVERAL (more than one
@@ -202,16 +202,6 @@ def _parser() -> argparse.ArgumentParser:
     p.set_defaults(action=_calibrate)
     register(p)
 
-    from origami_sim import prove
-
-    p = command(
-        "prove",
-        _prove,
-        "Conceal effects at random in another simulator, diagnose them blindly, and score",
-        "origami-sim prove --cases 12 --seed 1",
-    )
-    prove.register(p)
-
     p = command("effects", _effects, "Print the catalogue of physical effects", "origami-sim effects crease")
     p.add_argument("name", nargs="?", help="one effect, in full")
 
@@ -271,8 +261,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except InputError as e:
         print(f"origami-sim: {e}", file=sys.stderr)
         code = BAD_INPUT
-    except KeyboardInterrupt:
-        print("origami-sim: interrupted; earlier results are untouched.", file=sys.stderr)
+    except KeyboardInterrupt as e:
+        print(f"origami-sim: {str(e) or 'interrupted; earlier results are untouched.'}", file=sys.stderr)
         code = INTERRUPTED
     except BrokenPipeError:  # the reader of our output left; nothing more can be said there, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -403,12 +393,6 @@ def _study(args) -> int:
     if args.json:
         _print_json(report)
     return NO if any(s["failures"] for s in report.get("sets", {}).values()) else OK
-
-
-def _prove(args) -> int:
-    from origami_sim import prove
-
-    return prove.run(args)
 
 
 def _effects(args) -> int:

@@ -14,11 +14,15 @@ from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import observe, panel_angle
 from origami_sim.pattern import strip
+from origami_sim.possible import Possible
 from origami_sim.recording import Recording, initial_angles
 from origami_sim.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.solve.dynamics import Trajectory, simulate
 
 CALIBRATION = "pendulum_chain"
+POSSIBLE = Possible(tilt=0.0)
+"""What the rig can do in a further recording: it is screwed to its bench."""
+
 SERIES = ("mass", "centre", "length", "inertia", "viscosity", "angle", "rate")
 """Settings of one arm; a calibration may state further arms."""
 

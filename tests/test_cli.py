@@ -23,7 +23,7 @@ from origami_sim.solve.dynamics import simulate
 
 COMMANDS = (
     *("run", "show", "sweep", "replay", "export", "compare", "diagnose"),
-    *("study", "calibrate", "prove", "effects", "stride", "demo"),
+    *("study", "calibrate", "effects", "stride", "demo"),
 )
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")

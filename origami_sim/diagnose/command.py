@@ -1,8 +1,10 @@
 """`origami-sim diagnose`: from files to a verdict, and everything that it leaves behind."""
 
 import json
+import signal
 import sys
 import tempfile
+import threading
 import time as clock
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +18,7 @@ from origami_sim.device import device_module, is_device
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.later import attempt
 from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
@@ -82,24 +85,27 @@ def run(args: Namespace) -> int:
     subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
-    options = _options(args)
+    options = replace(_options(args), possible=getattr(module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
-    keep = Keep(folder / RESUME)
-    progress = Progress()
+    keep, progress = Keep(folder / RESUME), Progress()
+    files = keep.write = Files(folder, settings, name, keep)
     try:
-        found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
-        progress.stage("replay")
-        files = _write(folder, found, keep, settings, name)
+        with ending_as_interrupted():
+            found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
+            progress.stage("replay")
+            files.finish(found)
     except KeyboardInterrupt:
         progress.end()
         print("origami-sim: the same command goes on from here.", file=sys.stderr)
-        raise
+        if keep.found is None:
+            raise
+        raise KeyboardInterrupt(f"interrupted after the verdict, {keep.found.verdict}: {files.shown}") from None
     progress.end()
     keep.clear()
     if args.json:
-        print(json.dumps(_summary(found, files), allow_nan=False))
+        print(json.dumps(_summary(found, files.made), allow_nan=False))
     else:
-        print("\n".join(_text(found, files)))
+        print("\n".join(_text(found, files.made)))
     return found.exit_code
 
 
@@ -302,12 +308,98 @@ class Progress:
             sys.stderr.flush()
 
 
-def _write(folder: Path, found: Diagnosis, keep: Keep, settings: Settings, scene: str) -> dict[str, list[Path] | Path]:
-    assert keep.forward is not None
-    replays = write_overlays(folder, keep, found)
-    patch = write_patch(folder / PATCH, settings, found, scene=scene)
-    report = write_report(found, folder / REPORT, geometry=geometry_of(keep.forward.model))
-    return {"report": report, "data": found.save_json(folder / JSON), "calibration": patch, "replays": replays}
+class Files:
+    """What a diagnosis leaves, written as soon as its verdict stands and anew whenever something was added to it.
+
+    Where the disk is full, stored predictions make room; where nothing can be written, another folder is taken. Page,
+    replays and the patched calibration may fail; a note then says so.
+
+    Attributes:
+        folder: where they are. made: those that are there: "data", "calibration", "report", and a list "replays".
+    """
+
+    def __init__(self, folder: Path, settings: Settings, scene: str, keep: Keep):
+        self.folder, self.settings, self.scene, self.keep = folder, settings, scene, keep
+        self.made: dict[str, list[Path] | Path] = {"replays": []}
+        self._old = True
+
+    def __call__(self, found: Diagnosis) -> None:
+        """Writes data and patch where there is room; says so if that is elsewhere, or nowhere."""
+        fault = ""
+        for room in (lambda: self.folder, self._cleared, self._elsewhere):
+            try:
+                folder = room()
+                if folder != self.folder:
+                    found.notes.append(f"{fault} Data and patch are in {folder}.")
+                self._write(folder, found)
+                self.folder = folder
+                return
+            except OSError as error:
+                fault = fault or f"{self.folder} cannot be written ({error.strerror or error})."
+        self.made = {"replays": []}
+        found.notes.append(f"{fault} Only what is printed is left.")
+
+    def finish(self, found: Diagnosis) -> None:
+        """Writes replays, page, and the data once more, with notes of what failed."""
+        keep, made = self.keep, self.made
+        forward = keep.forward
+        assert forward is not None
+        made["replays"] = attempt(
+            found.notes, "The replay could not be written", lambda: write_overlays(self.folder, keep, found), []
+        )
+        page = attempt(
+            found.notes,
+            "The page could not be written",
+            lambda: write_report(found, self.folder / REPORT, geometry=geometry_of(forward.model)),
+            None,
+        )
+        if page is not None:
+            made["report"] = page
+        self(found)
+
+    @property
+    def shown(self) -> str:
+        """Where the data are, in words."""
+        return f"it is in {self.made['data']}." if "data" in self.made else "it could not be written."
+
+    def _write(self, folder: Path, found: Diagnosis) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        if self._old:  # of a verdict that stood here before
+            for file in (folder / REPORT, folder / PATCH, *folder.glob("replay*.rrd")):
+                if file.is_file():
+                    file.unlink()
+            self._old = False
+        fault, make = "The patched calibration could not be written", lambda: self._patch(folder, found)
+        patch = attempt(found.notes, fault, make, None, passing=OSError)
+        self.made |= {"data": found.save_json(folder / JSON)} | ({} if patch is None else {"calibration": patch})
+
+    def _patch(self, folder: Path, found: Diagnosis) -> Path:
+        return write_patch(folder / PATCH, self.settings, found, scene=self.scene)
+
+    def _cleared(self) -> Path:
+        self.keep.clear()
+        return self.folder
+
+    @staticmethod
+    def _elsewhere() -> Path:
+        return Path(tempfile.mkdtemp(prefix="origami-sim-diagnose-"))
+
+
+@contextmanager
+def ending_as_interrupted() -> Iterator[None]:
+    """Whoever asks the process to end (SIGTERM, as schedulers do) interrupts it: nothing is left half written."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
@@ -342,11 +434,10 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
         lines.append(f"next experiment: {d.experiments[0].what}")
     replays = files["replays"]
     assert isinstance(replays, list)
-    lines += [
-        f"report: {files['report']}",
-        *(f"replay: origami-sim replay {r}" for r in replays),
-        f"patched: origami-sim run {d.subject} --calibration {files['calibration']}"
-        + ("   (the closest explanation, which is not enough)" if d.verdict == "UNKNOWN" and d.patch else ""),
-        f"{sum(d.seconds.values()):.0f} s of computing",
-    ]
-    return lines
+    if "report" in files or "data" in files:
+        lines.append(f"report: {files.get('report', files.get('data'))}")
+    lines += [f"replay: origami-sim replay {r}" for r in replays]
+    if "calibration" in files:
+        far = "   (the closest explanation, which is not enough)" if d.verdict == "UNKNOWN" and d.patch else ""
+        lines.append(f"patched: origami-sim run {d.subject} --calibration {files['calibration']}{far}")
+    return [*lines, f"{sum(d.seconds.values()):.0f} s of computing"]

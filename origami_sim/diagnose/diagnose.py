@@ -1,10 +1,9 @@
-"""`diagnose`: from a model and recordings to a verdict, stage by stage."""
+"""`diagnose`: from a model and recordings to a verdict, stage by stage, and then to what is added to it."""
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -13,10 +12,11 @@ from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.describe import unnamed
 from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.experiment import propose
+from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
+from origami_sim.diagnose.later import Part, add, attempt
 from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.onset import onset
@@ -24,17 +24,19 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.search import Posterior, marginals, search
+from origami_sim.diagnose.stored import Stored
 from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
 from origami_sim.diagnose.verdict import judge
 from origami_sim.diagnose.where import located
 from origami_sim.effects import get
-from origami_sim.errors import InputError
 from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
+from origami_sim.possible import Possible
 from origami_sim.recording import Recording, read_dataset
+from origami_sim.scene import scene_module
 
 
 def diagnose(
@@ -55,7 +57,8 @@ def diagnose(
         options: see `Options`. catalogue: suspect only these effects (default: all that can act).
         priors: standard deviations of the model's numbers, see `subject_of`.
         progress: called with the stage and the fraction done.
-        keep: remembers predictions, so that an interrupted diagnosis resumes, and the fits.
+        keep: remembers predictions, so that an interrupted diagnosis resumes, and the fits; told of the diagnosis as
+            soon as its verdict stands, and again whenever something was added to it.
 
     Raises:
         InputError: no recording, a file that cannot be read, recordings of different channels, too few frames, a drive
@@ -70,16 +73,18 @@ def diagnose(
         seconds[stage] = clock.perf_counter() - began - sum(seconds.values())
 
     tell("prepare", 0.0)
+    said = possible_of(subject)
     subject = subject_of(subject, priors)
     each = [recordings] if isinstance(recordings, (Recording, str, Path)) else recordings
     recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
     forward, noted = arranged(subject, recordings, o)
     if keep is not None:
         keep.follow(forward)
-    loop = closed_loop(recordings)
     compared = share_compared(forward)
     frames = sum(len(r.times) for r in recordings)
     noted = [f"{compared:.0%} of {frames:,} frames are compared.", *noted]
+    listens = "Whether a drive listens to the device could not be told"
+    loop = attempt(noted, listens, lambda: closed_loop(recordings), None)
     noted += [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
     unseen = unobserved(forward)
     if unseen is not None:
@@ -101,7 +106,8 @@ def diagnose(
     signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
     lap("screen")
     tell("search", 0.0)
-    posterior = search(forward, base, signatures, weights, progress=lambda part: tell("search", part), most=o.fits // 2)
+    store, lead = keep is not None and keep.store, lambda part: tell("search", part)
+    posterior = search(forward, base, signatures, weights, progress=lead, most=o.fits // 2, store=store)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:
@@ -113,35 +119,18 @@ def diagnose(
     best = judged.best
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
-    lap("verdict")
-    tell("locate", 0.0)
     noted = list(dict.fromkeys([*judged.notes, *noted]))
-    places, actions = attempt(noted, "Where the mismatch is", lambda: located(forward, base), ([], []))
-    if judged.verdict == "UNKNOWN":
-        more = attempt(noted, "What is left", lambda: unnamed(forward, base, best), "")
-        judged = replace(judged, sentence=f"{judged.sentence} {more}".strip())
-    lap("locate")
-    experiments = attempt(
-        noted,
-        "The next experiment",
-        lambda: propose(
-            forward,  # type: ignore[arg-type]
-            judged,
-            weights,
-            progress=lambda part: tell("next experiment", part),
-        ),
-        [],
-    )
-    lap("next experiment")
-    tell("baselines", 0.0)
-    errors = {key: held_out(forward, node.fit).rms for key, node in posterior.nodes.items()}
-    refitted = errors[frozenset()]
-    beside = attempt(noted, "Baselines", lambda: baselines(forward, base, weights, refitted), [])
-    lap("baselines")
+    nowhere, left_out = np.full(len(forward.components), np.nan), "Held-out error could not be told"
+    errors = {
+        key: attempt(noted, left_out, lambda f=node.fit: held_out(forward, f).rms, nowhere)
+        for key, node in posterior.nodes.items()
+    }
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
     noise = forward.blocks[0].noise
-    scores = scored(posterior)
+    scores = attempt(noted, "The screening cannot be shown", lambda: scored(posterior), [])
+    shown = [s for s, _ in scores[:12] if s.norm > 0]
     missed = float(sum(s.share for s in judged.budget) and base.cost)
+    lap("verdict")
     out = Diagnosis(
         verdict=judged.verdict,
         sentence=judged.sentence,
@@ -149,35 +138,76 @@ def diagnose(
         chosen=judged.chosen,
         candidates=table(forward, posterior, base, judged, errors),
         screening=[suspected(s, z, missed) for s, z in scores],
-        isolability_labels=[s.suspect.label for s, _ in scores[:12] if s.norm > 0],
-        isolability=overlap([s for s, _ in scores[:12] if s.norm > 0], base),
-        places=places,
         budget=judged.budget,
         marginals=marginals(posterior),
         compared=compared,
-        onset=attempt(noted, "The onset", lambda: onset(forward, base), float("nan")),
-        traces=traces(forward, given, base, best, noise),
-        correlations=correlations(forward, base, best),
-        experiments=experiments,
-        baselines=beside,
         components=list(forward.components),
         units=units_of(recordings[0]),
         noise=noise.tolist(),
         error_before=rms_of(given).tolist(),
-        error_refitted=refitted.tolist(),
+        error_refitted=errors[frozenset()].tolist(),
         error_after=after.tolist(),
         notes=noted,
-        settings={**{k: v for k, v in o.__dict__.items()}, "segments": len(forward.blocks), "start": forward.start},
+        settings={
+            **{k: v for k, v in o.__dict__.items() if k != "possible"},
+            "segments": len(forward.blocks),
+            "start": forward.start,
+        },
         seconds=seconds,
         patch={} if judged.verdict == "UNTESTABLE" else patch(best),
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
-        impulses=attempt(noted, "Impulses", lambda: impulses(forward, base), []),  # type: ignore[arg-type]
-        acting=actions,
     )
+
+    def curves() -> dict:
+        return {"traces": traces(forward, given, base, best, noise)}
+
+    def places() -> dict:
+        found, actions = located(forward, base)
+        return {"places": found, "acting": actions}
+
+    def left() -> dict:
+        more = unnamed(forward, base, best) if judged.verdict == "UNKNOWN" else ""
+        return {"sentence": f"{judged.sentence} {more}".strip()}
+
+    def experiments() -> dict:
+        progress = lambda part: tell("next experiment", part)  # noqa: E731
+        can = (o.possible or said).but(recordings[0].metadata.get("possible") or {})
+        return {
+            "experiments": propose(forward, *explanations(posterior), best.weights or weights, can, progress=progress)
+        }
+
+    def others() -> dict:
+        return {"baselines": baselines(forward, base, weights, errors[frozenset()])}
+
+    rest = lambda: {"correlations": correlations(forward, base, best)}  # noqa: E731
+    blows = lambda: {"impulses": impulses(forward, base)}  # type: ignore[arg-type]  # noqa: E731
+    since = lambda: {"onset": onset(forward, base)}  # noqa: E731
+    parts = [
+        Part("curves", "What was predicted cannot be shown", curves, quick=True),
+        Part("curves", "Correlations could not be told", rest, quick=True),
+        Part("curves", "What looks alike could not be told", lambda: alike(shown, base), quick=True),
+        Part("locate", "Where the mismatch is could not be told", places),
+        Part("locate", "What is left could not be described", left, quick=True),
+        Part("locate", "Impulses could not be told", blows, quick=True),
+        Part("locate", "The onset could not be told", since),
+        Part("next experiment", "The next experiment could not be told", experiments),
+        Part("baselines", "Baselines could not be told", others),
+    ]
+    if keep is not None and keep.store:
+        fault = "The search could not be stored"
+        make = lambda: Stored.of(forward, given, base, posterior, compared)  # noqa: E731
+        keep.stored = attempt(noted, fault, make, None)
+    add(out, parts, tell, keep.stands if keep is not None else lambda _: None)
     tell("done", 1.0)
     return out
+
+
+def possible_of(source: Source) -> Possible:
+    """What a scene says that its set-up can do, or the defaults."""
+    given = source[0] if isinstance(source, tuple) else source
+    return getattr(scene_module(given) if isinstance(given, str) else given, "POSSIBLE", None) or Possible()
 
 
 def share_compared(forward: Predictor) -> float:
@@ -203,6 +233,11 @@ def scored(p: Posterior) -> list[tuple[Signature, float]]:
     return [(p.signatures[k], float(z[k])) for k in order]
 
 
+def alike(signatures: Sequence[Signature], base: Fit) -> dict:
+    """Labels of suspects, and how much each looks like each other."""
+    return {"isolability_labels": [s.suspect.label for s in signatures], "isolability": overlap(signatures, base)}
+
+
 def overlap(signatures: Sequence[Signature], base: Fit) -> list[list[float]]:
     """|cos| between signatures, without what starts and numbers could explain: 1 where two look the same."""
     if not signatures or base.linear is None:
@@ -217,15 +252,3 @@ def overlap(signatures: Sequence[Signature], base: Fit) -> list[list[float]]:
     shapes = whole[:, width:] - q @ (q.T @ whole[:, width:])
     shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
     return np.abs(shapes.T @ shapes).tolist()
-
-
-T = TypeVar("T")
-
-
-def attempt(notes: list[str], what: str, do: Callable[[], T], otherwise: T) -> T:
-    """What may fail without losing the verdict; a note says so."""
-    try:
-        return do()
-    except (ArithmeticError, IndexError, InputError, KeyError, ValueError, np.linalg.LinAlgError) as error:
-        notes.append(f"{what} could not be told: {error}")
-        return otherwise

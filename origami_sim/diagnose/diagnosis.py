@@ -190,11 +190,18 @@ class Correlation:
 
 @dataclass
 class Experiment:
-    """A proposed next experiment: what to do, which explanations it separates, and the expected separation d'."""
+    """A proposed next experiment.
+
+    Attributes:
+        what: to do. separates: explanations that it tells apart, the best one first.
+        information: by how much it is expected to lower the entropy of the posterior over explanations [bits].
+        entropy: that is there now [bits]. repeats: recordings that tell most of what it can; 9999: no number does.
+    """
 
     what: str
     separates: list[str]
-    expected: float
+    information: float
+    entropy: float
     repeats: int
 
 
@@ -218,16 +225,14 @@ class Diagnosis:
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
         impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
-        structure: slow structure that the refitted nominal model leaves, and that the best explanation leaves in more
-            than one segment, in standard deviations of what noise gives.
-        p_value: of the best suspect's score among all that were tried, under the refitted nominal.
-        p_small: the same if small effects act beside the noise, each too weak to be told.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
         components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
         notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
         patch: numbers to write into the calibration: label -> value. changed: effects of it that the model has
             already: their numbers are changes of what it has.
+        unfinished: stages after the verdict that were not reached when this was written; empty at the end. Fields that
+            they give, from `places` on, are empty until then.
     """
 
     verdict: str
@@ -236,17 +241,9 @@ class Diagnosis:
     chosen: list[str]
     candidates: list[Candidate]
     screening: list[Suspected]
-    isolability_labels: list[str]
-    isolability: list[list[float]]
-    places: list[Place]
     budget: list[Share]
     marginals: dict[str, float]
     compared: float
-    onset: float
-    traces: list[Trace]
-    correlations: list[Correlation]
-    experiments: list[Experiment]
-    baselines: list[Baseline]
     components: list[str]
     units: list[str]
     noise: list[float]
@@ -259,9 +256,18 @@ class Diagnosis:
     patch: dict[str, float]
     subject: str = ""
     recordings: list[str] = field(default_factory=list)
-    impulses: list[Impulse] = field(default_factory=list)
-    acting: list[Acting] = field(default_factory=list)
     changed: list[str] = field(default_factory=list)
+    places: list[Place] = field(default_factory=list)
+    acting: list[Acting] = field(default_factory=list)
+    impulses: list[Impulse] = field(default_factory=list)
+    onset: float = float("nan")
+    traces: list[Trace] = field(default_factory=list)
+    correlations: list[Correlation] = field(default_factory=list)
+    isolability_labels: list[str] = field(default_factory=list)
+    isolability: list[list[float]] = field(default_factory=list)
+    experiments: list[Experiment] = field(default_factory=list)
+    baselines: list[Baseline] = field(default_factory=list)
+    unfinished: list[str] = field(default_factory=list)
 
     @property
     def exit_code(self) -> int:

@@ -1,236 +1,231 @@
-"""The next experiment: of a menu, the one that would best tell the surviving explanations apart."""
+"""The next experiment: of what the set-up can do, that from which most is expected to be learnt.
 
-import copy
-from collections.abc import Callable
-from dataclasses import replace
+The expected information of an experiment is by how much it lowers the entropy of the posterior over explanations in the
+mean (Lindley 1956; MacKay 1992; Houlsby et al. 2011), the mutual information of explanation h and recording y,
+
+    I = sum_h p_h E_{y | h} log2 ( p(y | h) / sum_k p_k p(y | k) ).
+
+Each explanation predicts a normal distribution: its simulation, the noise, and what is still uncertain of its numbers
+and of the start. Everything but noise lies in the few directions in which explanations and numbers differ, so that the
+integrals are taken there, by Monte Carlo, to within two hundredths of a bit.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from origami_sim.diagnose.diagnosis import Experiment
-from origami_sim.drive import Drive, Signal
-from origami_sim.fit.least_squares import Fit, linearise
+from origami_sim.diagnose.menu import Trial, menu
+from origami_sim.diagnose.search import Key, Posterior
+from origami_sim.diagnose.verdict import widened
+from origami_sim.fit.hypothesis import Free
+from origami_sim.fit.least_squares import Fit, changed, links, start_steps
 from origami_sim.fit.linear import Linearisation
-from origami_sim.fit.rollouts import Rollouts
+from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
-from origami_sim.model import Parameters
+from origami_sim.possible import Possible
 
-WANTED = 5.0
-"""Separation d' at which two explanations count as told apart."""
+LEADING, LEAST = 5, 0.01
+"""Explanations that are looked at, and the probability of the least of them; with more, what is told of the leaders
+hardly changes, and each costs as many rollouts as it has numbers."""
 
-TOLD = 1.0
-"""Separation in the best experiment of the menu below which a rival is left out: no number of repeats would do."""
+DRAWS = 1000
+"""Draws of a recording per explanation: what is expected is then known to a hundredth of a bit, or 0.015 with half."""
 
-LENGTH = 8
-"""A proposed experiment is simulated in four stretches of this part of a recording."""
+REPEATS = (1, 2, 4, 8, 16, 32, 64)
+"""Numbers of repeats that are looked at."""
 
-CREASE, PANEL = ("crease", "stiffness"), ("panel_bending", "stiffness")
+ENOUGH = 0.8
+"""Part of what any number of repeats of the best experiment would tell that is worth stopping at; with 0.9 it takes
+about twice as many."""
 
-CLAMPED = 300.0
-"""Times as stiff as the stiffest crease that a clamped one is; as stiff as panels where creases have no stiffness."""
+LITTLE = 0.02
+"""Entropy of the explanations [bits] below which nothing is proposed: expected information is known no better."""
+
+TOLD = 0.1
+"""Expected information [bits] between two explanations that are as likely, from which an experiment separates them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What explanations expect of an experiment where they differ, in standard deviations of the noise.
+
+    Attributes:
+        means: [H, k] predictions. spreads: per explanation [k, P] columns of the covariance beyond the noise.
+    """
+
+    means: np.ndarray
+    spreads: list[np.ndarray]
+
+    @classmethod
+    def of(cls, means: np.ndarray, spreads: Sequence[np.ndarray]) -> "Prospect":
+        """From predictions [H, n] and columns [n, P] in all directions."""
+        apart = (means - means[0]).T
+        q, r = np.linalg.qr(np.concatenate([apart[:, 1:], *spreads], axis=1))
+        ends = np.cumsum([len(means) - 1, *(s.shape[1] for s in spreads)])
+        own = [r[:, a:b] for a, b in pairwise(ends)]
+        return cls((q.T @ apart).T, own)
+
+    def among(self, chosen: Sequence[int]) -> "Prospect":
+        """That of some explanations."""
+        return Prospect(self.means[list(chosen)], [self.spreads[h] for h in chosen])
+
+    def information(self, chance: np.ndarray, amount: float = 1.0) -> float:
+        """Expected information about which explanation is true [bits].
+
+        Args:
+            chance: (H,) probabilities. amount: of data, over what was simulated.
+        """
+        scale = np.sqrt(amount)
+        size = self.means.shape[1]
+        normal = np.random.default_rng(0).normal(size=(DRAWS, size))
+        roots = [np.linalg.cholesky(np.eye(size) + amount * s @ s.T) for s in self.spreads]
+        total = 0.0
+        for h, p in enumerate(chance):
+            y = scale * self.means[h] + normal @ roots[h].T
+            log = np.stack([_log_density(y - scale * m, r) for m, r in zip(self.means, roots, strict=True)])
+            mixed = logsumexp(log + np.log(chance)[:, None], axis=0)
+            total += p * float(np.mean(log[h] - mixed))
+        return float(np.clip(total / np.log(2.0), 0.0, entropy(chance)))
+
+
+def _log_density(x: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Log density (n,) of x [n, k] under a normal distribution, without its constant."""
+    z = solve_triangular(root, x.T, lower=True)
+    return -0.5 * np.sum(z**2, axis=0) - float(np.sum(np.log(np.diag(root))))
+
+
+def entropy(chance: np.ndarray) -> float:
+    """Entropy of probabilities [bits]."""
+    p = chance[chance > 0.0]
+    return float(-np.sum(p * np.log2(p)))
+
+
+def explanations(p: Posterior) -> tuple[list[Fit], np.ndarray]:
+    """The leading explanations that were fitted, and their probabilities among themselves.
+
+    What only adds an effect to another one of them is not a further explanation, nor are the same effects at the same
+    sites that were fitted from another start.
+    """
+    chance = p.probabilities()
+    kept: list[Key] = []
+    for key in sorted(p.nodes, key=lambda k: -chance[k]):
+        same = any((k and key > k) or p.label(k) == p.label(key) for k in kept)
+        if len(kept) < LEADING and (len(kept) < 2 or chance[key] >= LEAST) and not same:
+            kept.append(key)
+    share = np.array([max(chance[k], 1e-12) for k in kept])
+    return [widened(p, k) for k in kept], share / share.sum()
 
 
 def propose(
-    forward: Rollouts, judged, weights: Weights, *, progress: Callable[[float], None] | None = None, most: int = 4
+    forward: Predictor,
+    leading: Sequence[Fit],
+    chance: np.ndarray,
+    weights: Weights,
+    possible: Possible | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
+    most: int = 4,
 ) -> list[Experiment]:
-    """Experiments, best first: the expected whitened separation of the best explanation from the nearest of its rivals.
-
-    Rivals that nothing in the menu would tell from it do not count, unless none would. Each experiment is simulated
-    under both explanations from the same start. What the rival's numbers, known as well as the recordings left them,
-    and a new start could still absorb is projected out.
-    """
-    rivals = rivals_of(judged)
-    if not rivals:
-        return []
-    menu = forward.menu() if forward.curve else _menu(forward)
-    apart = np.zeros((len(menu), len(rivals)))
-    for n, (_, changed) in enumerate(menu):
-        known = None
-        for k, rival in enumerate(rivals if recorded(changed, judged.best) else ()):
-            try:
-                apart[n, k], known = separation(changed, rival, weights, known)
-            except (FloatingPointError, np.linalg.LinAlgError):
-                apart[n, k] = 0.0
-        if progress:
-            progress((n + 1) / len(menu))
-    apart = np.where(np.isfinite(apart), apart, 0.0)
-    told = np.flatnonzero(apart.max(axis=0) >= TOLD)
-    told = told if len(told) else np.arange(len(rivals))
-    labels = [judged.best.hypothesis.label, *(rivals[k].hypothesis.label for k in told)]
-    out = []
-    for (what, _), row in zip(menu, apart, strict=True):
-        d = float(row[told].min())
-        out.append(Experiment(what, labels, d, int(np.clip(np.ceil((WANTED / max(d, 0.05)) ** 2), 1, 9999))))
-    return sorted(out, key=lambda e: -e.expected)[:most]
-
-
-def rivals_of(judged, most: int = 4) -> list[Fit]:
-    """The strongest other explanations that were fitted."""
-    tied = [f for f in judged.tied if f is not judged.best]
-    return tied[:most] if tied else judged.others[:1]
-
-
-def recorded(forward: Rollouts, f: Fit) -> bool:
-    """Puts what a fitted explanation predicts in the place of what was recorded; False where it goes unstable."""
-    blocks = range(len(forward.blocks))
-    local = np.zeros((1, len(blocks), forward.local))
-    truth = [v[0] for v in forward.predict(f.hypothesis, f.theta[None], local, blocks)]
-    forward.blocks = [replace(b, values=v) for b, v in zip(forward.blocks, truth, strict=True)]
-    return all(np.all(np.isfinite(v)) for v in truth)
-
-
-def separation(
-    forward: Rollouts, rival: Fit, weights: Weights, known: Linearisation | None = None
-) -> tuple[float, Linearisation | None]:
-    """Expected separation d' of a fitted explanation from what was recorded, and the derivatives under it.
+    """Experiments, those first from which most is expected to be learnt; none where nothing is open.
 
     Args:
-        known: derivatives under another explanation, of which those by nominal numbers and starts hold here too.
+        leading: explanations. chance: (H,) their probabilities. weights: of the noise. possible: see there.
+
+    Raises:
+        InputError: what is said to be possible does not fit the device.
     """
-    blocks = list(range(len(forward.blocks)))
-    local = np.zeros((len(blocks), forward.local))
-    own = len(rival.free) - len(rival.hypothesis.free)
-    line = linearise(forward, rival.hypothesis, rival.free, rival.theta, local, blocks, weights, known=known, kept=own)
-    rows = np.concatenate(line.cleared(line.tangent))
-    gap = np.concatenate(line.cleared(line.residual))
-    scale = np.array([f.scale for f in rival.free])
-    # a number on its bound has next to no spread
-    value, vector = np.linalg.eigh(rival.covariance / np.outer(scale, scale))
-    learnt = vector.T / np.sqrt(np.maximum(value, 1e-12))[:, None]
-    stacked = np.concatenate([rows, learnt])
-    target = np.concatenate([gap, np.zeros(len(learnt))])
-    if not np.all(np.isfinite(stacked)) or not np.all(np.isfinite(target)):
-        return 0.0, known
-    x, *_ = np.linalg.lstsq(stacked, target, rcond=None)
-    return float(np.linalg.norm(target - stacked @ x)), line
+    trials = menu(forward, possible or Possible())
+    if entropy(chance) < LITTLE:
+        return []
+    prospects: list[Prospect | None] = []
+    for n, trial in enumerate(trials):
+        prospects.append(prospect(trial.forward, leading, weights))
+        if progress:
+            progress((n + 1) / len(trials))
+    made = [(t, p) for t, p in zip(trials, prospects, strict=True) if p is not None]
+    told = [[p.information(chance, t.amount * n) for n in REPEATS] for t, p in made]
+    whole = max((row[-1] for row in told), default=0.0)
+    out = []
+    for (trial, p), row in zip(made, told, strict=True):
+        enough = next((n for n, v in zip(REPEATS, row, strict=True) if v >= ENOUGH * whole), 9999)
+        labels = _separated(trial, p, leading)
+        out.append(Experiment(trial.what, labels, row[0], entropy(chance), enough if whole > 0.0 else 9999))
+    return sorted(out, key=lambda e: -e.information)[:most]
 
 
-def _menu(forward: Rollouts) -> list[tuple[str, Rollouts]]:
-    """Variants of the recordings' own experiments that a user could make."""
-    out = [("repeat the same experiment", _variant(forward))]
-    if forward.start == "fit":
-        for size in (0.1, 0.3, 2.0):
-            out.append((f"start from {size:g} times the displacement and rate", _variant(forward, size=size)))
-        out.append(("let it run three times as long", _variant(forward, stretch=3.0)))
-    varying = [n for d in forward.drives for n, s in d.signals.items() if not s.is_zero]
-    if varying:
-        names = ", ".join(sorted({n.split("_")[0] for n in varying}))
-        for gain in (0.3, 0.6, 1.5):
-            out.append((f"{names} at {gain:g} times the level", _variant(forward, gain=gain)))
-        out.append((f"{names} reversed", _variant(forward, gain=-1.0)))
-        for speed in (0.3, 3.0):
-            out.append((f"{names} at {speed:g} times the frequency", _variant(forward, speed=speed)))
-        out.append((f"a step of {names} to its highest level, held", _variant(forward, held=True)))
-    if ("gravity", "gravity_z") in set(forward.parameters):
-        out.append(("the set-up tilted by 10 degrees about y", _variant(forward, tilt=np.deg2rad(10.0))))
-        if not len(forward.model.contacts):
-            out.append(("the set-up upside down", _variant(forward, tilt=np.pi)))
-    out.append(("a tenth more mass on every panel", _variant(forward, load=1.1)))
-    if len(forward.articulation.creases) > 1 and _splint(forward.parameters):
-        for joint, c in enumerate(forward.articulation.creases):
-            name = forward.model.name("crease", int(c))
-            out.append((f"{name} clamped as it is in the reference state", _variant(forward, clamped=joint)))
-    return out
+def _separated(trial: Trial, p: Prospect, leading: Sequence[Fit]) -> list[str]:
+    """The best explanation and those that an experiment tells from it; all if it tells none."""
+    even = np.array([0.5, 0.5])
+    others = [h for h in range(1, len(leading)) if p.among([0, h]).information(even, trial.amount) >= TOLD]
+    return [leading[h].hypothesis.label for h in (0, *(others or range(1, len(leading))))]
 
 
-def _splint(parameters: Parameters) -> float:
-    """Stiffness of a clamped crease [N m/rad]; 0 where neither creases nor panels have one."""
-    known = set(parameters)
-    if CREASE not in known:
-        return 0.0
-    panel = float(np.max(parameters[PANEL])) if PANEL in known else 0.0
-    return CLAMPED * float(np.max(parameters[CREASE])) or panel
+def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Prospect | None:
+    """What explanations expect of an experiment, from one batch of rollouts; None where one of them goes unstable.
+
+    The start is known as well as block.known says, and shared: derivatives by it and by the numbers of the model are
+    those of the first explanation.
+    """
+    first, count = leading[0], len(leading[0].free) - len(leading[0].hypothesis.free)
+    blocks, nudges = range(len(forward.blocks)), start_steps(forward)
+    each, thetas, steps, rows = [], [], [], []
+    for h, f in enumerate(leading):
+        rows.append(len(each))
+        moved = [k for k in range(len(f.free)) if k >= count or h == 0]
+        steps.append(np.array([_step(f.free[k], f.theta[k], forward.nudge) for k in moved]))
+        for k, step in zip([None, *moved], [0.0, *steps[-1]], strict=True):
+            theta = f.theta.copy()
+            if k is not None:
+                theta[k] += step
+            each.append(f.hypothesis)
+            thetas.append(theta)
+    worlds = len(each)
+    each += [first.hypothesis] * forward.local
+    thetas += [first.theta] * forward.local
+    local = np.zeros((len(each), len(forward.blocks), forward.local))
+    for i in range(forward.local):
+        local[worlds + i, :, i] = nudges[i]
+    parts = changed(forward, forward.shoot(each, thetas, local, blocks), weights, blocks)
+    if not all(np.all(np.isfinite(c)) for c in parts):
+        return None
+    line = _line(forward, parts, worlds, nudges)
+    columns = [np.concatenate([np.zeros((1, c.shape[1])), c[: worlds - 1]]).T for c in parts]
+    moves = np.concatenate(line.cleared(columns))
+    means = moves[:, rows].T
+    shared, spreads = np.zeros((len(moves), 0)), []
+    for h, f in enumerate(leading):
+        scale = np.array([n.scale for n in f.free])
+        own = moves[:, rows[h] + 1 : rows[h] + 1 + len(steps[h])] - means[h][:, None]
+        own = own / steps[h] * scale[len(scale) - len(steps[h]) :]
+        if not h:
+            shared = own[:, :count]
+        every = own if not h else np.concatenate([shared, own], axis=1)
+        deviation = f.deviations() / np.sqrt(np.maximum(np.diag(f.covariance), 1e-300))
+        cover = f.covariance * np.outer(deviation, deviation) / np.outer(scale, scale)
+        value, vector = np.linalg.eigh(0.5 * (cover + cover.T))
+        spreads.append(every @ (vector * np.sqrt(np.maximum(value, 0.0))))
+    return Prospect.of(means, spreads)
 
 
-def _variant(
-    forward: Rollouts,
-    *,
-    size=1.0,
-    stretch=1.0,
-    gain=1.0,
-    speed=1.0,
-    held=False,
-    tilt=0.0,
-    load=1.0,
-    clamped: int | None = None,
-) -> Rollouts:
-    """The same object in another experiment; recordings keep their frames, whose values are replaced by predictions."""
-    out = copy.copy(forward)
-    arm = forward.articulation
-    out.blocks = []
-    chosen = forward.blocks[:: max(1, len(forward.blocks) // 4)][:4]
-    for b in chosen:
-        pose, rates = b.pose, b.rates
-        if forward.start == "fit" and size != 1.0 and not arm.floating:
-            rest = arm.reference()
-            pose = arm.moved(rest, size * (b.pose.angles - rest.angles))
-            rates = size * rates
-        if clamped is not None:
-            here = np.arange(len(pose.angles)) == clamped
-            pose = replace(pose, angles=np.where(here[:, None], arm.reference().angles, pose.angles))
-            rates = np.where(np.arange(len(rates)) == len(rates) - len(here) + clamped, 0.0, rates)
-        times = b.times
-        step = times[1] - times[0]
-        whole = len(forward.recordings[b.recording].times) // LENGTH if b.reach is not None else 0
-        if stretch != 1.0 or whole > len(times):
-            times = np.arange(round((max(whole, len(times)) - 1) * stretch) + 1) * step
-        values = np.zeros((len(times), b.values.shape[1]))
-        out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=values, reach=None, lasting=0.0))
-    if gain != 1.0 or speed != 1.0:
-        out.drives = [_changed(d, gain, speed) for d in forward.drives]
-    if held:
-        spans = [float(r.times[-1] - r.times[0]) for r in forward.recordings]
-        out.drives = [_held(d, span) for d, span in zip(forward.drives, spans, strict=True)]
-    if tilt or load != 1.0 or clamped is not None:
-        build = forward.subject.build
-
-        def other(values):
-            model, parameters, drive = build(values)
-            parameters = parameters.copy()
-            if clamped is not None:
-                c = arm.creases[clamped : clamped + 1]
-                parameters.set("crease", "stiffness", _splint(parameters), c)
-                parameters.set("crease", "rest_angle", arm.reference().angles[clamped], c)
-            if load != 1.0:
-                parameters.replace("inertia", "mass", parameters["inertia", "mass"] * load)
-            if tilt:
-                gx, gz = parameters["gravity", "gravity_x"], parameters["gravity", "gravity_z"]
-                parameters.set("gravity", "gravity_x", np.cos(tilt) * gx - np.sin(tilt) * gz)
-                parameters.set("gravity", "gravity_z", np.sin(tilt) * gx + np.cos(tilt) * gz)
-            return model, parameters, drive
-
-        out.subject = replace(forward.subject, build=other)
-    out._built = {}
-    return out
+def _line(forward: Predictor, parts: list[np.ndarray], worlds: int, nudges: np.ndarray) -> Linearisation:
+    """The derivatives by starts, from changes of which the last ones are theirs."""
+    rows = [b.rows(*link) for b, link in zip(forward.blocks, links(forward, range(len(parts))), strict=True)]
+    slopes = []
+    for block, own, c in zip(forward.blocks, rows, parts, strict=True):
+        slope = c[worlds - 1 :].T / nudges
+        if own.start:
+            slope[own.data : own.data + own.start] = np.diag(1.0 / block.known)
+        slopes.append(slope)
+    still, none = [np.zeros(c.shape[1]) for c in parts], [c[:0].T for c in parts]
+    return Linearisation(rows, still, none, slopes, [None] * len(rows))
 
 
-def _held(drive: Drive, span: float) -> Drive:
-    """Every channel at the value of its that is furthest from zero, from the start on."""
-    at = np.linspace(0.0, span, 1000)
-    changed = {}
-    for name, s in drive.signals.items():
-        values = np.broadcast_to(np.squeeze(s(at)), at.shape)
-        changed[name] = float(values[np.argmax(np.abs(values))])
-    return drive.replace(**changed)
-
-
-def _changed(drive: Drive, gain: float, speed: float) -> Drive:
-    changed = {}
-    for name, s in drive.signals.items():
-        if s.is_zero:
-            continue
-        times = None if s.times is None else s.times / speed
-        changed[name] = Signal(
-            offset=gain * np.asarray(s.offset),
-            amplitude=gain * np.asarray(s.amplitude),
-            frequency=speed * np.asarray(s.frequency),
-            phase=s.phase,
-            times=times,
-            values=s.values,
-            scale=gain * np.asarray(s.scale),
-        )
-        if times is not None and s.values is not None and speed > 1.0:  # a run must not outlast its drive: repeat it
-            span = times[-1] - times[0]
-            count = int(np.ceil(speed)) + 1
-            tiled = np.concatenate([times + k * (span + (times[1] - times[0])) for k in range(count)])
-            changed[name] = replace(changed[name], times=tiled, values=np.concatenate([s.values] * count))
-    return drive.replace(**changed)
+def _step(f: Free, value: float, nudge: float) -> float:
+    """Step of a derivative, inwards at a bound."""
+    step = nudge * f.scale
+    return -step if value + step > f.upper else step

@@ -1,7 +1,10 @@
-"""What a diagnosis keeps beside its answer: its fits, and predictions on disk with which it resumes."""
+"""What a diagnosis keeps beside its answer: its fits, what stands so far, predictions on disk with which it resumes."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+from origami_sim.diagnose.diagnosis import Diagnosis
+from origami_sim.diagnose.stored import Stored
 from origami_sim.fit.cache import Cache
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -14,18 +17,31 @@ class Keep:
     Attributes:
         forward: what predicted. fits: "before" (as given), "refitted" and "after" (the best explanation).
         cache: predictions on disk, if there is a folder for them.
+        found: the diagnosis as far as it stands; None before there is a verdict.
+        write: called with it whenever it has changed; may be set.
+        store: whether `stored` is wanted: what is needed to judge the search anew; there as soon as the verdict stands.
     """
 
-    def __init__(self, folder: str | Path | None = None):
+    def __init__(self, folder: str | Path | None = None, *, store: bool = False):
         self.cache = None if folder is None else Cache(folder)
         self.forward: Predictor | None = None
         self.fits: dict[str, Fit] = {}
+        self.found: Diagnosis | None = None
+        self.store = store
+        self.stored: Stored | None = None
+        self.write: Callable[[Diagnosis], object] | None = None
 
     def follow(self, forward: Predictor) -> None:
         """From now on, predictions of this predictor, and of copies of it, are remembered."""
         self.forward = forward
         if isinstance(forward, Worlds):
             forward.cache = self.cache
+
+    def stands(self, found: Diagnosis) -> None:
+        """Takes over the diagnosis as it is now."""
+        self.found = found
+        if self.write is not None:
+            self.write(found)
 
     def clear(self) -> None:
         """Forgets the predictions on disk."""

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from origami_sim.possible import Possible
+
 
 @dataclass(frozen=True)
 class Options:
@@ -14,6 +16,8 @@ class Options:
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; what was recorded faster is averaged to it.
         fits: sets of effects that are fitted at most. threads: see `Batch`.
+        possible: what the set-up can do in a further recording; None: what the scene says, else the defaults. What a
+            sidecar states goes before either.
     """
 
     panels: str = "auto"
@@ -22,6 +26,7 @@ class Options:
     rate: float = 200.0
     fits: int = 16
     threads: int | None = None
+    possible: Possible | None = None
 
 
 Report = Callable[[str, float], None]

@@ -16,7 +16,7 @@ from origami_sim.diagnose.implied import own_columns, regapped, with_own_noise
 from origami_sim.diagnose.nominal import level
 from origami_sim.diagnose.screen import Signature
 from origami_sim.effects import get
-from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit
@@ -36,6 +36,9 @@ So far from what was recorded linear estimates say little, and all is judged by 
 
 FITS = 16
 """Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
+
+SINGLES = 12
+"""Leading single effects that are fitted where the best set is far off, whatever is expected of them."""
 
 KEPT, POLISHED = 4, 1e-3
 """Leading fits that are fitted on by their own noise, and their posterior at least."""
@@ -70,6 +73,7 @@ class Node:
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
         grid: the summed problems by cell. white: of a fit that leaves coloured noise, the problem in which it is white,
             and the log evidence of the fit's own set in it: what is missing explains some of the colour.
+            problems: by size of the gaps, if they are to be stored.
     """
 
     key: Key
@@ -79,6 +83,7 @@ class Node:
     others: list[int]
     grid: list[Summed | None]
     white: tuple[Summed, float] | None = None
+    problems: dict[float, Problem] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +105,7 @@ class Posterior:
         ranked: single effects by what they promise the model without any.
         tried: sets that were fitted. promise: log posterior that sets which were not may have. tight: sets that were
             fitted by the noise that they or their neighbours imply.
-        weights: of the signatures.
+        weights: of the signatures. store: whether nodes keep their problems, to be judged anew (`stored`).
     """
 
     signatures: list[Signature]
@@ -114,6 +119,7 @@ class Posterior:
     tried: set[Key] = field(default_factory=set)
     promise: dict[Key, float] = field(default_factory=dict)
     tight: set[Key] = field(default_factory=set)
+    store: bool = False
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -142,9 +148,10 @@ def search(
     *,
     progress: Callable[[float], None] | None = None,
     most: int = FITS,
+    store: bool = False,
 ) -> Posterior:
     """The posterior over sets of effects, from the refitted model without any."""
-    out = Posterior(signatures, weights)
+    out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     extended(out, forward, progress=progress, most=most)
     polished(out, forward)
@@ -170,13 +177,17 @@ def extended(
         key = max(open_sets, key=lambda k: p[k])
         if far:  # judged by what is missing, not by the noise that hides it
             stands = float(logsumexp(out.log[best]))
-            open_sets = [k for k in open_sets if out.promise[k] > stands]
-            if not open_sets:
-                break
-            key = max(open_sets, key=lambda k: out.promise[k])
-            single = next((k for k in out.ranked if k in open_sets and k not in out.tried), None)
-            if n % 2 and single is not None:  # one effect may do what several were expected to
+            hopeful = [k for k in open_sets if out.promise[k] > stands]
+            # one effect may do what several were expected to: what is linear far from the data promises too little
+            known = {out.suspect(m).effect for m in best}
+            others = (k for k in out.ranked[:SINGLES] if k in open_sets and k not in out.tried)
+            single = next((k for k in others if not known & {out.suspect(m).effect for m in k}), None)
+            if single is not None and (n % 2 or not hopeful):
                 key = single
+            elif hopeful:
+                key = max(hopeful, key=lambda k: out.promise[k])
+            else:
+                break
         out.tried.add(key)
         if not far and p[key] < UNFITTED / 5 and best in out.nodes:
             break
@@ -234,8 +245,12 @@ def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
     """Judges a fitted set, and all that add one or two effects to it."""
-    hyper = out.hyper
-    node = _node(out, forward, key, f)
+    place(out, _node(out, forward, key, f), prior)
+
+
+def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
+    """Enters a judged set, and all that add one or two effects to it, into a posterior."""
+    hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
@@ -360,9 +375,9 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
             continue
         if gap not in problems:
             now, theirs = regapped(line, effects, f.weights, gap)
-            problems[gap] = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
+            made = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
+            problems[gap] = replace(made, constant=made.constant + volume)
         cell = summed(problems[gap], size, flaws)
-        cell = replace(cell, log=cell.log + volume)
         grid.append(cell)
         evidence[c] = cell.of(laid, hyper)[0][0]
     white = None
@@ -373,7 +388,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         none = [np.zeros((r.count, 0)) for r in line.rows]
         whole = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, hyper.flaws[0])
         white = whole, float(whole.of(laid, hyper)[0][0])
-    return Node(key, f, evidence, groups, others, grid, white)
+    return Node(key, f, evidence, groups, others, grid, white, problems if out.store else {})
 
 
 def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:

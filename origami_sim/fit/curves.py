@@ -181,12 +181,17 @@ class Curves(Worlds, ABC):
         """Residual moments by recording; none where they cannot be told."""
         ...
 
-    def menu(self) -> list[tuple[str, "Curves"]]:
-        """Experiments like those recorded that a user could make: what, and its predictions."""
+    def menu(self, levels: Sequence[float]) -> list[tuple[str, "Curves"]]:
+        """Experiments like those recorded that a user could make: what, and its predictions.
+
+        Args:
+            levels: of the drives, over those that were recorded.
+        """
         out: list[tuple[str, Curves]] = [("repeat the same curve", self._other())]
         if any(not s.is_zero for d in self.drives for s in d.signals.values()):
             names = sorted({n.split("_")[0] for d in self.drives for n, s in d.signals.items() if not s.is_zero})
-            for gain, words in ((0.3, "at 0.3 times the level"), (2.0, "at twice the level"), (-1.0, "reversed")):
+            for gain in levels:
+                words = "reversed" if gain == -1.0 else f"at {gain:g} times the level"
                 other = self._other()
                 other.drives = [_gained(d, gain) for d in self.drives]
                 out.append((f"{' and '.join(names)} {words}", other))

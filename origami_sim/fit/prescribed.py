@@ -133,8 +133,8 @@ class Prescribed(Curves):
             found.append(Balance(own, recording.times, self._q[r][rows], missing, error, clock))
         return found
 
-    def menu(self) -> list[tuple[str, Curves]]:
-        out = super().menu()
+    def menu(self, levels: Sequence[float]) -> list[tuple[str, Curves]]:
+        out = super().menu(levels)
         rest = self.articulation.reference().angles
         changes = [
             ("half of the angles", [rest + 0.5 * (q - rest) for q in self._q]),

@@ -85,6 +85,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
             "notes": notes,
             "scene": side.scene,
             "priors": side.priors,
+            "possible": side.possible,
             **side.free_text,
         },
         gravity=side.gravity,

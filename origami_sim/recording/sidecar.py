@@ -74,6 +74,17 @@
     sd = "0.01 rad"                     # how well they, or the equilibrium, are known
     rate_sd = "0.01 rad/s"              # and how well that it rests
 
+    [possible]                          # optional, for a diagnosis: what can be done in a further recording
+    levels = [0.3, 0.6, 1.5, -1]        # of the drives, over those recorded; [] if they cannot be changed
+    frequencies = [0.3, 3]              # of the drives, over those recorded
+    steps = true                        # whether a drive can be switched on and held
+    starts = [0.1, 0.3, 2]              # displacements at the start, over those recorded
+    ring_down = 0.2                     # displacement from which it can be let go at rest; 0: it cannot
+    clamps = ["hinge1"]                 # creases that can be clamped; all when left out
+    tilt = "10 deg"                     # how far it can be tilted; from 180 deg on also upside down; 0: not at all
+    weights = true                      # whether mass can be added to panels
+    longest = "60 s"                    # longest recording; three times the longest of what is held when left out
+
 Any other key is an error. Units: see `origami_sim.units`.
 """
 
@@ -87,6 +98,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
+from origami_sim.possible import Possible
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
@@ -111,6 +123,7 @@ _TOP_KEYS = (
     "priors",
     "gravity",
     "start",
+    "possible",
 )
 _SOURCE_KEYS = ("format", "likelihood", "axes", "origin", "about")
 _TIME_KEYS = ("column", "unit", "rate_hz")
@@ -152,6 +165,7 @@ class Sidecar:
     priors: dict[str, float | str]
     gravity: Gravity | None
     start: Start | None
+    possible: dict[str, Any]
 
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
@@ -189,6 +203,7 @@ class Sidecar:
             priors={name: prior_spec(top, name) for name in top.table("priors")},
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
+            possible=_possible_spec(path, top.table("possible")),
         )
 
     @property
@@ -228,6 +243,12 @@ class Sidecar:
                 field="time.rate_hz",
                 value=rate,
             )
+
+
+def _possible_spec(path: Path, given: dict[str, Any]) -> dict[str, Any]:
+    """What can be done in a further recording, checked."""
+    Possible().but(given, path)
+    return given
 
 
 def _device(stated: str | None) -> str | None:

@@ -175,8 +175,8 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
         traces=traces,
         correlations=correlations,
         experiments=[
-            Experiment("release from 40 deg instead of 20 deg", [best, second], 8.3, 1),
-            Experiment("record until rest, 20 s", [best, second, "air_drag at panel 2"], 3.1, 3),
+            Experiment("release from 40 deg instead of 20 deg", [best, second], 0.19, 0.21, 1),
+            Experiment("record until rest, 20 s", [best, second, "air_drag at panel 2"], 0.13, 0.21, 2),
         ],
         baselines=[Baseline("best parameter-only refit", [0.043, 0.04, 0.045]),
                    Baseline("sparse regression (STLSQ)", [0.012, 0.011, 0.013], "rate: -3.1, rate |rate|: 0.2"),
@@ -405,7 +405,7 @@ def test_one_missing_thing_is_drawn_by_its_own_size():
 
 def test_experiments_that_tell_nothing_are_not_proposed():
     d = example()
-    d.experiments = [Experiment("repeat the same experiment", ["a", "b"], 1e-6, 9999)]
+    d.experiments = [Experiment("repeat the same experiment", ["a", "b"], 1e-6, 1.0, 9999)]
     text = " ".join(Read(page(d)).words)
     assert "repeat the same" not in text and "would tell the explanations apart" in text
 

@@ -70,11 +70,12 @@ def test_nothing_is_found_of_a_strip_as_it_is():
     assert max(chance, key=lambda k: chance[k]) == frozenset() and chance[frozenset()] > 0.6
 
 
-def test_a_set_that_was_fitted_never_fits_worse_than_one_that_it_contains(found, rubbing):
+def test_a_set_that_is_likely_never_fits_worse_than_one_that_it_contains(found, rubbing):
     forward = rubbing[0]
+    chance = found.probabilities()
     for key, node in found.nodes.items():
         for other, smaller in found.nodes.items():
-            if other < key:
+            if other < key and chance[key] > 1e-3:
                 larger, fewer = missed(forward, node.fit), missed(forward, smaller.fit)
                 assert larger <= 1.02 * fewer, (found.label(key), found.label(other))
 
@@ -132,7 +133,7 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
     first = folds(forward, base.blocks)[0]
     alone = [t * (1.0 if n in first else 1e-3) for n, t in enumerate(line.tangent)]
     off = [
-        r + (100.0 * t[:, 0] if n in first else 0.0)
+        r + (1e3 * t[:, 0] if n in first else 0.0)
         for n, (r, t) in enumerate(zip(line.residual, line.tangent, strict=True))
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
@@ -178,10 +179,9 @@ def test_what_acts_at_a_crease_is_told_least_where_that_crease_is_clamped(rubbin
     best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
     # with the same numbers of the model: these differ by what friction was taken for
     best = replace(best, theta=np.concatenate([base.theta, best.theta[len(base.theta) :]]))
-    judged = SimpleNamespace(best=best, tied=[best, base], others=[base])
-    menu = {e.what: e for e in propose(forward, judged, weights, most=99)}
-    clamped = [menu[f"crease {c} clamped as it is in the reference state"].expected for c in (0, 1)]
-    assert clamped[1] < 0.05 * clamped[0]
+    menu = {e.what: e for e in propose(forward, [best, base], np.array([0.5, 0.5]), weights, most=99)}
+    clamped = [menu[f"crease {c} clamped as it is in the reference state"].information for c in (0, 1)]
+    assert clamped[0] > 0.95 and clamped[1] < 0.05
     for e in menu.values():
-        assert e.repeats == int(np.clip(np.ceil((5.0 / max(e.expected, 0.05)) ** 2), 1, 9999))
+        assert e.entropy == 1.0 and 0.0 <= e.information <= 1.0
         assert e.separates == ["crease_friction at crease 1", "nominal"]

@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim.diagnose import Subject
 from origami_sim.diagnose.arrange import starting, steady
-from origami_sim.diagnose.experiment import _menu
+from origami_sim.diagnose.menu import menu
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.fit.bars import BarRollouts
@@ -16,6 +16,7 @@ from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.measured import lateness
 from origami_sim.fit.starts import local_line, seen_first
 from origami_sim.model import Parameters
+from origami_sim.possible import Possible
 from origami_sim.recording import Recording
 from origami_sim.recording.recording import DriveChannel
 from tests.diagnose.strips import hanging, record, subject
@@ -178,10 +179,10 @@ def test_a_drive_seen_from_several_starts_keeps_its_bends():
 
 def test_experiments_hold_a_drive_and_turn_the_set_up_upside_down():
     forward = driven("rest")
-    menu = dict(_menu(forward))
-    held = menu["a step of field to its highest level, held"].drives[0]["field_z"]
+    trials = {t.what: t.forward for t in menu(forward, Possible(tilt=np.pi))}
+    held = trials["a step of field to its highest level, held"].drives[0]["field_z"]
     assert np.abs(held(np.array([0.0, 1.3]))) == pytest.approx(0.02, rel=1e-4) and held(0.0) == held(1.3)
-    turned = menu["the set-up upside down"].subject.build({})[1]
+    turned = trials["the set-up upside down"].subject.build({})[1]
     given = forward.parameters["gravity", "gravity_z"]
     assert turned["gravity", "gravity_z"] == pytest.approx(-given) and np.all(given < 0)
     assert turned["gravity", "gravity_x"] == pytest.approx(0.0, abs=1e-9)

@@ -10,7 +10,7 @@ from origami_sim.articulation import Articulation
 from origami_sim.bodies import body_of
 from origami_sim.model import Model, Parameters, State, dihedral_angles
 
-mujoco = pytest.importorskip("mujoco", reason="the comparison needs MuJoCo: pip install 'origami-sim[proof]'")
+mujoco = pytest.importorskip("mujoco", reason="the comparison needs MuJoCo: pip install mujoco")
 
 STEP = 1e-4
 """Of MuJoCo's Runge-Kutta scheme [s]; half of it changes no angle here by more than 1e-9 rad."""

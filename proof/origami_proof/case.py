@@ -1,6 +1,11 @@
-"""The diagnosis of one case, from its folder alone."""
+"""The diagnosis of one case, from its folder alone.
 
+python -m origami_proof.case FOLDER [--show INTO]: the diagnosis, or its page and replays.
+"""
+
+import argparse
 import json
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.build import Sheet
-from origami_sim.diagnose import Options, Subject, diagnose, factor
+from origami_sim.diagnose import Diagnosis, Options, Subject, diagnose, factor
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.diagnose.page import geometry_of, write_report
@@ -21,6 +26,9 @@ from origami_sim.scene import scene_module, scene_settings
 
 RIGIDITY = 2e5
 """Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.003 mm."""
+
+STORED = "stored.npz"
+"""What a case keeps of its search, to be judged anew (`rejudge`)."""
 
 LOSS = 0.1
 """Part of critical damping of a foot on the ground."""
@@ -99,20 +107,33 @@ def panels(o: dict) -> Subject:
 
 
 def diagnose_case(folder: Path) -> dict:
-    """Diagnoses the recordings of a case's folder and writes diagnosis.json there."""
+    """Diagnoses the recordings of a case's folder and writes diagnosis.json there, as soon as there is a verdict."""
     began = time.perf_counter()
     recordings = [read_recording(p) for p in sorted(folder.glob("recording*.csv"))]
-    found = diagnose(subject(folder), recordings, Options(threads=1)).to_dict()
+    rate = 1.0 / float(np.median(np.diff(recordings[0].times)))
+    keep = Keep(store=True)
+
+    def write(found: Diagnosis) -> None:
+        write_json(folder / "diagnosis.json", short(found, time.perf_counter() - began, rate))
+        if keep.stored is not None:
+            keep.stored.save(folder / STORED)
+            keep.stored = None  # it does not change any more
+
+    keep.write = write
+    diagnose(subject(folder), recordings, Options(threads=1), keep=keep)
+    return json.loads((folder / "diagnosis.json").read_text())
+
+
+def short(diagnosis: Diagnosis, seconds: float, rate: float) -> dict:
+    """A diagnosis without what only its page shows, with the time that it took [s] and frames per second."""
+    found = diagnosis.to_dict()
     found["worked"] = telling(found["traces"])
     for bulky in ("traces", "correlations", "isolability"):
         found.pop(bulky, None)
     for place in found["places"]:
         for bulky in ("times", "moment", "error", "curves"):
             place.pop(bulky, None)
-    found["wall"] = time.perf_counter() - began
-    found["rate"] = 1.0 / float(np.median(np.diff(recordings[0].times)))
-    write_json(folder / "diagnosis.json", found)
-    return found
+    return {**found, "wall": seconds, "rate": rate}
 
 
 def show(folder: Path, into: Path) -> list[Path]:
@@ -145,3 +166,15 @@ def guard(event: str, arguments: tuple) -> None:
 
 def write_json(path: Path, value) -> None:
     write_text(path, json.dumps(value, indent=1))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="the diagnosis of one case, or its page and replays")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--show", type=Path, metavar="INTO", help="write page and replays here, not the diagnosis")
+    args = parser.parse_args()
+    sys.addaudithook(guard)
+    if args.show:
+        print(*show(args.folder, args.show), sep="\n")
+    else:
+        diagnose_case(args.folder)

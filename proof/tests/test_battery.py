@@ -6,9 +6,8 @@ from collections import Counter
 
 import pytest
 
-from origami_sim import cli
+from origami_proof import KINDS, battery, command, freeze
 from origami_sim.errors import InputError
-from origami_sim.prove import KINDS, battery, freeze
 
 
 @pytest.fixture
@@ -98,14 +97,14 @@ def test_a_digest_knows_names_and_contents(tmp_path):
 )
 def test_wrong_options(tmp_path, capsys, given, message):
     with pytest.raises(SystemExit) as end:
-        cli.main(["prove", *given, "--out", str(tmp_path / "run")])
+        command.main([*given, "--out", str(tmp_path / "run")])
     assert end.value.code == 2
     assert message in capsys.readouterr().err
 
 
 def test_a_cluster_without_dask_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'origami-sim\[cluster\]'"), battery.workers("local:2", 1):
+    with pytest.raises(InputError, match=r"pip install -e 'proof\[cluster\]'"), battery.workers("local:2", 1):
         pass
 
 
@@ -122,8 +121,8 @@ def test_threads_do_every_case_once(monkeypatch):
 
 @pytest.mark.slow
 def test_a_dask_cluster_draws(tmp_path):
-    pytest.importorskip("distributed", reason="needs Dask: pip install 'origami-sim[cluster]'")
-    pytest.importorskip("mujoco", reason="the truth of the proof needs MuJoCo: pip install 'origami-sim[proof]'")
+    pytest.importorskip("distributed", reason="needs Dask: pip install -e 'proof[cluster]'")
+    pytest.importorskip("mujoco", reason="the truth of the proof needs MuJoCo: pip install -e proof")
     options = {"cases": 3, "seed": 5, "structures": ["de_bender"], "kinds": ["single"], "say": lambda text: None}
     battery.prove(tmp_path / "dask", cluster="local:2", draw_only=True, **options)
     battery.prove(tmp_path / "threads", jobs=1, draw_only=True, **options)
@@ -132,3 +131,22 @@ def test_a_dask_cluster_draws(tmp_path):
         assert one.read_bytes() == other.read_bytes()
     with pytest.raises(InputError, match="no scheduler answers"), battery.workers("tcp://127.0.0.1:9", 1):
         pass
+
+
+def test_a_verdict_counts_that_stood_when_its_process_ended(tmp_path, monkeypatch):
+    result, asked = tmp_path / "diagnosis.json", []
+
+    def ends(command):
+        asked.append(command[-1])
+        if len(asked) > 1:
+            result.write_text(json.dumps({"verdict": "TIE", "chosen": ["a", "b"], "unfinished": ["baselines"]}))
+        return "longer than 1800 s"
+
+    monkeypatch.setattr(battery, "_run", ends)
+    assert battery.diagnosed(tmp_path) == {"failed": "longer than 1800 s"}
+    result.unlink()
+    assert battery.diagnosed(tmp_path)["verdict"] == "TIE"
+    assert battery.diagnosed(tmp_path)["ended"] == "longer than 1800 s" and len(asked) == 2  # it is done
+    result.write_text(json.dumps({"verdict": "TIE", "chosen": [], "unfinished": ["baselines"]}))
+    battery.diagnosed(tmp_path)
+    assert len(asked) == 3  # of a battery that was interrupted

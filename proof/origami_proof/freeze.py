@@ -10,9 +10,10 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
+import origami_sim
 from origami_sim.errors import InputError
 
-PACKAGE = Path(__file__).resolve().parent.parent
+PACKAGE = Path(origami_sim.__file__).resolve().parent
 FROZEN = "frozen.json"
 
 
@@ -22,13 +23,12 @@ def state(truth: Path) -> dict:
     Args:
         truth: folder of the truth generator.
     """
-    own = [p for p in PACKAGE.rglob("*.py") if "prove" not in p.relative_to(PACKAGE).parts]
-    case = PACKAGE / "prove" / "case.py"
+    case = Path(__file__).resolve().parent / "case.py"
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": _git("rev-parse", "HEAD"),
         "changed": bool(_git("status", "--porcelain", "--", str(PACKAGE), str(truth))),
-        "diagnosis": digest([*own, case]),
+        "diagnosis": digest([*PACKAGE.rglob("*.py"), case]),
         "truth": digest(truth.glob("*.py")),
         "thresholds": thresholds(),
     }

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from origami_proof import score
+from origami_proof.score import judge
 from origami_sim.errors import InputError
-from origami_sim.prove import score
-from origami_sim.prove.score import judge
 
-TRUTH = Path(__file__).resolve().parents[2] / "benchmarks" / "concealed"
+TRUTH = Path(__file__).resolve().parents[1] / "concealed"
 
 ANSWER = {
     **{"case": 0, "kind": "single", "null": "", "structure": "box", "mechanism": "dry_friction", "site": "fold2"},
@@ -301,6 +301,7 @@ def test_the_diagnosis_cannot_open_an_answer(tmp_path):
     answer = tmp_path / "sealed" / "0000.json"
     answer.parent.mkdir()
     answer.write_text("{}")
-    code = f"import sys; from origami_sim.prove.case import guard; sys.addaudithook(guard); open({str(answer)!r})"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    code = f"import sys; from origami_proof.case import guard; sys.addaudithook(guard); open({str(answer)!r})"
+    home = str(TRUTH.parent)
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=home)
     assert ran.returncode and "sealed answer" in ran.stderr

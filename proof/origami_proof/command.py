@@ -1,35 +1,20 @@
-"""The proof: concealed effects drawn at random, diagnosed from the recordings alone, and a scoreboard.
+"""`origami-proof`: conceals effects at random in another simulator, diagnoses them blindly, and scores.
 
-Three kinds of processes that know nothing of each other: the truth (`benchmarks/concealed/draw.py`, other formulations
-than ours, imports nothing of this package) writes recordings into a case's folder and the answer into a sealed one; the
-diagnosis (`python -m origami_sim.prove CASE_FOLDER`) gets the case's folder, and an audit hook stops it if it opens an
-answer; the score opens the answers at the end, and checks them against digests that were taken when they were drawn.
-
-    case.py     the diagnosis of one case, in a process of its own
-    battery.py  drawing and diagnosing many, here or on a cluster
-    freeze.py   thresholds and sources of the diagnosis that a run belongs to
-    score.py    what came of each case, and the scoreboard
-    figures.py  its pictures
+Exit codes: 0 done; 2 bad input; 130 interrupted.
 """
 
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
+from origami_proof import DEVELOPMENT, KINDS, STRUCTURES
 from origami_sim.errors import InputError
 
-DEVELOPMENT = 1000
-"""Seeds below this are for development; a seed from here on is sealed: it counts once."""
 
-KINDS = ("single", "null", "outside", "confounded", "double")
-RIGID = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold", "crawler")
-STRUCTURES = (*RIGID, "mae_cantilever", "de_bender", "crease_coupon")
-"""As the truth names them."""
-
-
-def register(parser: argparse.ArgumentParser) -> None:
-    """Arguments of `origami-sim prove`."""
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="origami-proof", description=__doc__)
     parser.add_argument("--cases", type=int, help="cases to draw (default 12; 480 are the full battery)")
     parser.add_argument("--seed", type=int, default=1, help=f"from {DEVELOPMENT} on: a sealed run (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time on this machine (default 1)")
@@ -40,16 +25,23 @@ def register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nearest", action="store_true", help="look which other effect is hardest to tell from each")
     parser.add_argument("--draw-only", action="store_true", help="only draw; the same command without it goes on")
     parser.add_argument("--score", action="store_true", help="only score what is done")
+    text = "judge the opened cases of these runs anew, with half and double of each hyperparameter"
+    parser.add_argument("--rejudge", nargs="+", type=Path, metavar="RUN", help=text)
+    text = "of these only (default all; none: judge as it is)"
+    parser.add_argument("--vary", nargs="*", metavar="NAME", help=text)
     parser.add_argument("--out", metavar="FOLDER", help="run folder (default runs/prove_SEED)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of text")
+    return parser
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs `origami-sim prove`.
+    """Does what was asked; returns the exit code.
 
     Raises:
         InputError: options that make no sense, and what `battery.prove` and `score.report` refuse.
     """
-    from origami_sim.prove import battery, score
+    from origami_proof import battery, rejudge, score
+    from origami_proof.case import write_json
 
     for name in ("cases", "jobs"):
         if getattr(args, name) is not None and getattr(args, name) < 1:
@@ -63,7 +55,11 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
 
-    if args.score:
+    if args.rejudge:
+        board = rejudge.rejudge(args.rejudge, jobs=args.jobs, vary=args.vary, say=say)
+        if args.out:
+            write_json(Path(args.out) / rejudge.REJUDGED, board)
+    elif args.score:
         if not (out / battery.RUN).exists():
             raise InputError("there is no proof in this folder", field="--out", value=str(out))
         board = score.report(out, args.cases or len(list((out / "cases").glob("*"))), say)
@@ -84,3 +80,17 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({k: v for k, v in board.items() if k != "rows"}))
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command line and exits with its code."""
+    args = _parser().parse_args(arguments)
+    try:
+        code = run(args)
+    except InputError as e:
+        print(f"origami-proof: {e}", file=sys.stderr)
+        code = 2
+    except KeyboardInterrupt:
+        print("origami-proof: interrupted; the same command goes on from here.", file=sys.stderr)
+        code = 130
+    sys.exit(code)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
+from origami_proof import DEVELOPMENT, KINDS
+from origami_proof.battery import NEAREST, RUN, SEPARATING, SUGGESTED
+from origami_proof.case import write_json
+from origami_proof.freeze import FROZEN
 from origami_sim.errors import InputError
-from origami_sim.prove import DEVELOPMENT, KINDS
-from origami_sim.prove.battery import NEAREST, RUN, SEPARATING, SUGGESTED
-from origami_sim.prove.case import write_json
-from origami_sim.prove.freeze import FROZEN
 
 NAMED = ("MECHANISM", "MEASUREMENT", "SEVERAL", "TIE")
 QUIET = ("ADEQUATE", "PARAMETER", "UNTESTABLE")
@@ -497,7 +497,7 @@ def report(out: Path, cases: int, say: Callable[[str], None] = print) -> dict:
     Raises:
         InputError: an answer that was changed after it was sealed.
     """
-    from origami_sim.prove.figures import figures
+    from origami_proof.figures import figures
 
     rows, undrawn = [], 0
     for index in range(cases):

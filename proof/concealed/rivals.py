@@ -88,9 +88,12 @@ def changed(recording: dict, *, size=1.0, gain=1.0, speed=1.0, stretch=1.0) -> d
 MENU = (
     (r"repeat the same (?:experiment|curve)", lambda m: {}),
     (r"start from ([\d.]+) times the displacement and rate", lambda m: {"size": float(m[1])}),
-    (r"let it run three times as long", lambda m: {"stretch": 3.0}),
+    (r"let it run ([\d.]+) times as long", lambda m: {"stretch": float(m[1])}),
+    (
+        r"let go at rest from ([\d.]+) times the displacement, drives off, until it rests",
+        lambda m: {"size": float(m[1]), "stretch": 3.0},
+    ),
     (r"(?:field|voltage) at ([\d.]+) times the level", lambda m: {"gain": float(m[1])}),
-    (r"(?:field|voltage) at twice the level", lambda m: {"gain": 2.0}),
     (r"(?:field|voltage) reversed|the same angles to the other side", lambda m: {"gain": -1.0}),
     (r"half of the angles", lambda m: {"gain": 0.5}),
     (r"(?:field|voltage) at ([\d.]+) times the frequency", lambda m: {"speed": float(m[1])}),

@@ -15,10 +15,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+from origami_proof import DEVELOPMENT
+from origami_proof.case import write_json
+from origami_proof.freeze import freeze
 from origami_sim.errors import InputError
-from origami_sim.prove import DEVELOPMENT
-from origami_sim.prove.case import write_json
-from origami_sim.prove.freeze import freeze
 
 TIMEOUT = 1800.0
 """Longest diagnosis or drawing of one case [s]."""
@@ -41,9 +41,9 @@ def generator() -> Path:
     Raises:
         InputError: the package was installed without it.
     """
-    path = Path(__file__).resolve().parents[2] / "benchmarks" / "concealed" / "draw.py"
+    path = Path(__file__).resolve().parents[1] / "concealed" / "draw.py"
     if not path.is_file():
-        raise InputError("the proof needs a checkout of the repository", field="benchmarks/concealed", value="absent")
+        raise InputError("the proof needs a checkout of the repository", field="proof/concealed", value="absent")
     return path
 
 
@@ -78,7 +78,7 @@ def prove(
         InputError: another seed or choice in the same folder, no MuJoCo to draw with, a sealed run that goes on with
         another diagnosis, a cluster that is not there.
     """
-    from origami_sim.prove.score import report
+    from origami_proof.score import report
 
     if cluster is not None:
         dask(cluster)
@@ -96,7 +96,7 @@ def prove(
     works = [Work(n, str(out.resolve()), json.dumps(choice), follow, nearest, draw_only) for n in range(cases)]
     missing = any(not (out / "cases" / f"{n:04d}" / "answer.sha256").exists() for n in range(cases))
     if (missing or follow or nearest) and find_spec("mujoco") is None:
-        raise InputError("drawing needs MuJoCo: pip install 'origami-sim[proof]'", field="mujoco", value="absent")
+        raise InputError("drawing needs MuJoCo: pip install -e proof", field="mujoco", value="absent")
     began = time.perf_counter()
     with workers(cluster, jobs) as each:
         for done, told in enumerate(each(works), 1):
@@ -176,12 +176,17 @@ def compared(answer: Path) -> None:
 
 
 def diagnosed(folder: Path) -> dict:
-    """The diagnosis of a case, in a process of its own; a failure is a result too."""
+    """The diagnosis of a case, in a process of its own; a failure is a result too.
+
+    A verdict counts that stood when the process ended; `ended` says why it did.
+    """
     result = folder / "diagnosis.json"
-    if not result.exists():
-        ran = _run([sys.executable, "-m", "origami_sim.prove", str(folder)])
+    stood = json.loads(result.read_text()) if result.exists() else None
+    if stood is None or ("ended" not in stood and stood.get("unfinished")):  # the battery was interrupted there
+        ran = _run([sys.executable, "-m", "origami_proof.case", str(folder)])
         if isinstance(ran, str):
-            write_json(result, {"failed": ran})
+            stood = json.loads(result.read_text()) if result.exists() else None
+            write_json(result, {"failed": ran} if stood is None else {**stood, "ended": ran})
     return json.loads(result.read_text())
 
 
@@ -210,7 +215,9 @@ def followed(folder: Path, answer: Path, found: dict) -> str:
 
 def _run(command: list[str]) -> str | None:
     """None if it succeeded, else its last line."""
-    single = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    home = str(Path(__file__).resolve().parents[1])
+    path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
+    single = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, env=single)
     except subprocess.TimeoutExpired:
@@ -270,7 +277,7 @@ def dask(cluster: str):
         return import_module("distributed")
     except ImportError:
         raise InputError(
-            "a cluster needs Dask: pip install 'origami-sim[cluster]'", field="--cluster", value=cluster
+            "a cluster needs Dask: pip install -e 'proof[cluster]'", field="--cluster", value=cluster
         ) from None
 
 

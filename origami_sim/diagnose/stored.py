@@ -1,0 +1,276 @@
+"""A finished search as arrays, and the posterior that follows from them with any hyperparameters, without a simulation.
+
+What is stored is what judging needs and not the reasoning: suspects with their groups of columns, and of every fitted
+set the Gram matrices of all columns and of the residual, one for each size of the gaps. Sizes of flaws, of the
+channels' discrepancy and of strengths, and the priors of sets, are not in them. The sizes of the gaps are: only those
+that were stored, or some of them, can be judged.
+
+Columns of the discrepancy have one prior for all, so that they are stored in the axes in which their Gram matrix is
+diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2 / 2, and nothing is lost.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from origami_sim.diagnose.budget import Share, budget
+from origami_sim.diagnose.screen import Signature
+from origami_sim.diagnose.search import Key, Node, Posterior, log_priors, place
+from origami_sim.diagnose.verdict import (
+    COMPARED,
+    MOSTLY,
+    _class,
+    _nothing_named,
+    _of_recorder,
+    best_of,
+    by_effects,
+    credible,
+    surely,
+)
+from origami_sim.errors import InputError
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed
+from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
+
+NULL = 1e-9
+"""Part of the largest eigenvalue of the discrepancy's columns below which an axis is nothing but rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A `Problem` whose columns of the discrepancy are in axes of their own.
+
+    Attributes:
+        gram: [C + 1, C + 1] of the effects' columns and of the residual. cross: [C + 1, K] of these with the axes.
+        size: (K,) squares of the axes. constant: of the log evidence.
+    """
+
+    gram: np.ndarray
+    cross: np.ndarray
+    size: np.ndarray
+    constant: float
+
+    @classmethod
+    def of(cls, p: Problem) -> "Reduced":
+        c, last = p.columns, len(p.gram) - 1
+        size, axes = np.linalg.eigh(p.gram[c:last, c:last])
+        kept = size > NULL * size.max(initial=0.0)
+        rows = [*range(c), last]
+        return cls(p.gram[np.ix_(rows, rows)], p.gram[rows, c:last] @ axes[:, kept], size[kept], p.constant)
+
+    def summed(self, smooth: float, flaws: float) -> Summed:
+        """As `evidence.summed`, of what that does in one step: the discrepancy is summed out first, then the flaws."""
+        c = len(self.gram) - 1
+        norms = np.sqrt(np.maximum(np.diag(self.gram)[:c], 1e-12))
+        scale = np.where(norms > 1e-5, flaws / np.sqrt(max(c, 1)) / norms, 0.0)
+        by = smooth**2 / (1.0 + smooth**2 * self.size)
+        gram = self.gram - (self.cross * by) @ self.cross.T
+        log = self.constant - 0.5 * float(np.sum(np.log1p(smooth**2 * self.size)))
+        root = np.linalg.cholesky(np.eye(c) + gram[:c, :c] * scale[:, None] * scale)
+        left = np.linalg.solve(root, gram[:c] * scale[:, None])
+        return Summed(gram - left.T @ left, log - float(np.sum(np.log(np.diag(root)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """What judging needs.
+
+    Attributes:
+        suspects: of the search, with sides and whether they can be tested. gaps: sizes that were stored.
+        nodes: of each fitted set: members in order, groups, other suspects, problems by gap (where segments are not
+            tied: one for all).
+        failed: sets that could not be fitted. shares: budget of each fitted set.
+        quiet: the verdict if nothing is named. compared: share of the frames.
+    """
+
+    suspects: list[tuple[Suspect, int, str]]
+    gaps: tuple[float, ...]
+    nodes: dict[Key, tuple[list[int], list[Group], list[int], dict[float, Reduced]]]
+    failed: list[Key]
+    shares: dict[Key, list[Share]]
+    quiet: str
+    compared: float
+
+    @classmethod
+    def of(cls, forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> "Stored":
+        """From a finished search that kept its problems (`search(store=True)`)."""
+        place_of = {id(s.suspect): n for n, s in enumerate(p.signatures)}
+        nodes = {}
+        for key, node in p.nodes.items():
+            members = [place_of[id(s)] for s in node.fit.hypothesis.suspects]
+            nodes[key] = members, node.groups, node.others, {g: Reduced.of(q) for g, q in node.problems.items()}
+        quiet = _nothing_named(forward, given, base, p, [], 0.0, 0.0, 1.0, 1.0).verdict
+        return cls(
+            [(s.suspect, s.side, s.status or ("" if s.parts else "none")) for s in p.signatures],
+            p.hyper.gaps,
+            nodes,
+            list(p.failed),
+            {k: budget(forward, given, base, n.fit) for k, n in p.nodes.items()},
+            quiet,
+            compared,
+        )
+
+    def judged(self, hyper: Hyper = HYPER) -> Posterior:
+        """The posterior with any hyperparameters.
+
+        Raises:
+            InputError: a size of the gaps that was not stored.
+        """
+        foreign = sorted(set(hyper.gaps) - set(self.gaps))
+        if foreign:
+            allowed = ", ".join(f"{g:g}" for g in self.gaps)
+            raise InputError("this size was not stored", field="gaps", value=foreign[0], allowed=allowed)
+        signatures = [
+            Signature(s, [] if status else [np.zeros(0)], 1.0 if side >= 0 else -1.0, status=status)
+            for s, side, status in self.suspects
+        ]
+        out = Posterior(signatures, Weights(np.ones(1)), hyper)
+        out.failed = dict.fromkeys(self.failed, "")
+        prior = log_priors(signatures, hyper)
+        for key, node in self.nodes.items():
+            place(out, self._node(key, *node, signatures, hyper), prior)
+        return out
+
+    def _node(self, key, members, groups, others, problems, signatures, hyper: Hyper) -> Node:
+        hypothesis = Hypothesis(tuple(signatures[m].suspect for m in members))
+        fit = Fit(
+            hypothesis, hypothesis.free, np.zeros(0), np.zeros((0, 0)), (), 0.0, 0.0, [], np.zeros((0, 0)), np.zeros(0)
+        )
+        own = [tuple(range(len(members)))]
+        laid = Sets.of(own, groups, len(members), len(next(iter(problems.values())).gram) - 1)
+        grid, evidence = [], np.full(len(hyper.cells), -np.inf)
+        for c, (gap, size, flaws) in enumerate(hyper.cells):
+            # segments that are not tied have one problem; the cells of other gaps then say the same and are left out
+            known = (
+                problems.get(gap) if len(problems) > 1 else problems[min(problems)] if gap == hyper.gaps[0] else None
+            )
+            grid.append(known.summed(size, flaws) if known is not None else None)
+            if known is not None:
+                evidence[c] = grid[-1].of(laid, hyper)[0][0]
+        return Node(key, fit, evidence, groups, others, grid)
+
+    def decided(self, p: Posterior) -> dict[str, Any]:
+        """Verdict, labels that are chosen and probability, as `verdict.judge` has them before it writes sentences."""
+        chance = p.probabilities()
+        classes = by_effects(p, chance)
+        lead, beside = surely(classes)
+        best = best_of(p, chance, lead)
+        shares = self.shares[best]
+        rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
+        discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
+
+        def said(verdict: str, chosen: list[str], probability: float | None) -> dict[str, Any]:
+            return {"verdict": verdict, "chosen": chosen, "probability": probability}
+
+        if all(status for *_, status in self.suspects):
+            return said("UNTESTABLE", [], 1.0)
+        if not lead and max(classes, key=lambda c: classes[c]) == lead:
+            if self.quiet == "UNKNOWN" or (discrepancy > MOSTLY and rest > MOSTLY):
+                return said("UNKNOWN", [], None)
+            return said("UNTESTABLE" if self.compared < COMPARED else self.quiet, [], classes[lead])
+        named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
+        if rest > MOSTLY and discrepancy > MOSTLY and rest > named:
+            return said("UNKNOWN", [p.label(best)], None)
+        set_, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
+        sure = sum(v for c, v in classes.items() if c >= lead)
+        if not lead or beside:
+            names = [p.label(best_of(p, chance, c)) for c in set_ if c] + (["nominal"] if frozenset() in set_ else [])
+            return said("MEASUREMENT" if all(map(_of_recorder, set_)) else "TIE", names, total)
+        word = "MEASUREMENT" if _of_recorder(_class(p, best)) else "SEVERAL" if len(best) > 1 else "MECHANISM"
+        return said(word, [p.suspect(n).label for n in best], sure)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes a compressed file of arrays; nothing in it is pickled."""
+        arrays: dict[str, np.ndarray] = {}
+        nodes = []
+        for n, (key, (members, groups, others, problems)) in enumerate(self.nodes.items()):
+            shares = [[s.name, s.kind, s.share] for s in self.shares[key]]
+            told = [[list(g.columns), g.strengths, g.at.tolist(), g.side, [_json(v) for v in g.spread]] for g in groups]
+            nodes.append(
+                {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
+            )
+            for k, r in enumerate(problems.values()):
+                upper = np.triu_indices(len(r.gram))
+                arrays[f"{n}.{k}.gram"], arrays[f"{n}.{k}.cross"] = r.gram[upper], r.cross.astype(np.float32)
+                arrays[f"{n}.{k}.size"], arrays[f"{n}.{k}.constant"] = r.size, np.array(r.constant)
+        about = {
+            "suspects": [[_plain(s), side, status] for s, side, status in self.suspects],
+            "gaps": self.gaps,
+            "nodes": nodes,
+            "failed": [sorted(k) for k in self.failed],
+            "quiet": self.quiet,
+            "compared": self.compared,
+        }
+        arrays["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+        path = Path(path)
+        part = path.with_name(f".{path.name}.partial.npz")
+        try:
+            np.savez_compressed(part, allow_pickle=False, **arrays)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Stored":
+        """Reads what `save` wrote.
+
+        Raises:
+            InputError: no such file, or one of another kind.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                about = json.loads(data["about"].tobytes())
+                arrays = {k: data[k] for k in data.files}
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"is no stored search ({error})", file=path) from None
+        nodes, shares = {}, {}
+        for n, node in enumerate(about["nodes"]):
+            key = frozenset(node["members"])
+            groups = [
+                Group(tuple(c), s, np.array(at, float), side, np.array([np.inf if v is None else v for v in spread]))
+                for c, s, at, side, spread in node["groups"]
+            ]
+            problems = {}
+            for k, gap in enumerate(node["gaps"]):
+                cross = arrays[f"{n}.{k}.cross"].astype(float)
+                gram = np.zeros((len(cross), len(cross)))
+                gram[np.triu_indices(len(cross))] = arrays[f"{n}.{k}.gram"]
+                gram += np.triu(gram, 1).T
+                size, constant = arrays[f"{n}.{k}.size"], float(arrays[f"{n}.{k}.constant"])
+                problems[float(gap)] = Reduced(gram, cross, size, constant)
+            nodes[key] = list(node["members"]), groups, list(node["others"]), problems
+            shares[key] = [Share(*s) for s in node["shares"]]
+        suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
+        failed = [frozenset(k) for k in about["failed"]]
+        return cls(suspects, tuple(about["gaps"]), nodes, failed, shares, about["quiet"], about["compared"])
+
+
+def _json(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _plain(s: Suspect) -> dict[str, Any]:
+    free = [{k: _json(v) if isinstance(v, float) else v for k, v in asdict(f).items()} for f in s.free]
+    return {**asdict(s), "free": free}
+
+
+def _suspect(given: Mapping[str, Any]) -> Suspect:
+    """The suspect that was stored; bounds and spreads that are infinite were left out."""
+
+    def tupled(value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+    ends = {"lower": -np.inf, "upper": np.inf, "spread": np.inf}
+    free = [
+        Free(**{k: tupled(ends.get(k, np.nan) if v is None and k in ends else v) for k, v in f.items()})
+        for f in given["free"]
+    ]
+    return Suspect(**{k: tupled(v) for k, v in given.items() if k != "free"}, free=tuple(free))
