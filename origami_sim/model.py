@@ -91,6 +91,8 @@ class Model:
                 "triangle": self.triangles,
                 "membrane": self.triangles,
                 "plate": self.triangles,
+                "pair": self.triangles,
+                "rub": self.triangles,
                 "node": self.position,
             }[family]
         )
@@ -104,6 +106,12 @@ class Model:
     def laws(self) -> tuple[str, ...]:
         """The effects that act as forces: all but the distortions of drive and measurement."""
         return tuple(n for n in self.effects if get(n).family not in DISTORTIONS)
+
+    @property
+    def memories(self) -> list[tuple[str, str, int]]:
+        """Effect, name and size of every memory of its laws, in their order in `State.memory`."""
+        laws = map(get, self.laws)
+        return [(e.name, m.name, m.base + m.size * self.count(e.family)) for e in laws for m in e.memory]
 
     def name(self, family: str, i: int) -> str:
         """Label of an entity."""
@@ -300,7 +308,7 @@ class State:
         if len(model.carriers) and position is not None:
             _carry(model, x)
         effects = [get(e) for e in model.laws]
-        rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
+        rows = sum(size for *_, size in model.memories)
         hinges = np.concatenate([model.creases, model.bends])
         angles = dihedral_angles(x, hinges)
         return cls(

@@ -258,6 +258,7 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
         "dt_reason": str(step),
         "time_step": {"limit": step.limit, "dt": step.dt, "node": step.node, "cause": step.cause},
         "energy_error": t.energy_error,
+        "crossing_pairs": t.crossings().tolist(),
         "wall": float(t.wall),
         "steps": t.state.step,
         "failures": [{"world": f.world, "time": f.time, "node": f.node, "cause": f.cause} for f in t.failures],

@@ -10,6 +10,7 @@ from origami_sim.effects._effect import (
     DRIVES,
     FAMILIES,
     HINGES,
+    PAIRS,
     SHELLS,
     Effect,
     Memory,
@@ -19,7 +20,7 @@ from origami_sim.effects._effect import (
 from origami_sim.errors import InputError, nearest
 
 __all__ = [
-    "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "SHELLS", "Effect", "Memory", "Parameter",
+    "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "PAIRS", "SHELLS", "Effect", "Memory", "Parameter",
     "get", "scalar",
 ]  # fmt: skip
 

@@ -1,0 +1,206 @@
+"""The surface of a model: its triangles, nested in boxes as they lie in the reference state, and which parts touch."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import warp as wp
+from scipy.sparse.csgraph import connected_components
+
+from origami_sim.model import Model, Parameters
+from origami_sim.solve import touching
+from origami_sim.solve.compose_touch import DEEPEST
+
+MARGIN = 0.25
+"""Distance within which pairs are listed beyond that at which they touch, over the median edge.
+
+The list is made anew when a point has moved by half of it. Half makes twice as many lists, double has half as many with
+more pairs in each; the result is the same.
+"""
+
+ROOM = 32
+"""Pairs per triangle for which a list has room. What finds no room is listed within a smaller margin."""
+
+LEAST_ROOM = 256
+"""Pairs for which it has room in any case: more than a few triangles can make."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What the kernels need of a model's surface, see `touching.Skin`."""
+
+    corners: np.ndarray
+    owned: np.ndarray
+    body: np.ndarray
+    home: np.ndarray
+    tree: np.ndarray
+    beyond: np.ndarray
+    leaf: np.ndarray
+    rest: np.ndarray
+    margin: float
+
+
+def surface(model: Model) -> Surface:
+    """The surface of a model."""
+    corners = model.triangles.astype(np.int32).reshape(-1, 3)
+    rest = model.position
+    tree, beyond, leaf = _boxes(rest[corners].mean(axis=1)) if len(corners) else (np.zeros(0, np.int32),) * 3
+    edges = rest[corners] - rest[np.roll(corners, -1, axis=1)]
+    median = float(np.median(np.linalg.norm(edges, axis=-1))) if len(corners) else 1.0
+    return Surface(
+        corners=corners,
+        owned=_owned(corners),
+        body=_bodies(corners, len(rest)),
+        home=np.arange(len(corners), dtype=np.int32),
+        tree=tree,
+        beyond=beyond,
+        leaf=leaf,
+        rest=rest,
+        margin=MARGIN * median,
+    )
+
+
+def upload(model: Model, room: Callable[..., wp.array], device, pairs: int | None = None) -> touching.Skin:
+    """The surface of a model on a device, with the lists of its worlds.
+
+    Args:
+        room: makes an array [*shape, W], see `Batch`. pairs: for which a list has room.
+    """
+    found = surface(model)
+
+    def constant(a, dtype):
+        return wp.array(np.ascontiguousarray(a), dtype=dtype, device=device)
+
+    s = touching.Skin()
+    s.nodes, s.margin = len(model.position), found.margin
+    s.corners = constant(found.corners, wp.vec3i)
+    for name in ("owned", "body", "home", "tree", "beyond", "leaf"):
+        setattr(s, name, constant(getattr(found, name), wp.int32))
+    s.rest = constant(found.rest, wp.vec3d)
+    s.carrier = constant(np.zeros((0, 3)), wp.vec3i)
+    s.weights, s.lift = constant(np.zeros((0, 3)), wp.vec3d), constant(np.zeros(0), wp.float64)
+    boxes, points = max(len(found.tree), 1), max(len(found.rest), 1)
+    pairs = pairs or LEAST_ROOM + ROOM * len(found.corners)
+    s.low, s.high = room(boxes, dtype=wp.vec3d), room(boxes, dtype=wp.vec3d)
+    s.built = room(points, dtype=wp.vec3d)
+    s.points, s.kind = room(pairs, dtype=wp.vec4i), room(pairs, dtype=wp.vec3i)
+    s.label, s.offset, s.wake = (room(pairs, dtype=wp.float64) for _ in range(3))
+    s.fade = room(pairs, dtype=wp.vec2d)
+    s.count, s.span = room(2, dtype=wp.int32), room(2, dtype=wp.float64)
+    return s
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of the surface that are near each other.
+
+    Attributes:
+        points: [P, 4] nodes: a corner and a triangle, or two edges. edges: [P] whether edges.
+        sides: [P, 2] triangles. offset: [P] distance at which they touch [m]. distance: [P] [m].
+        inside: [P] whether a corner lies over the inside of the triangle, or an edge crosses that of the other.
+    """
+
+    points: np.ndarray
+    edges: np.ndarray
+    sides: np.ndarray
+    offset: np.ndarray
+    distance: np.ndarray
+    inside: np.ndarray
+
+
+def near_pairs(model: Model, parameters: Parameters, x: np.ndarray, *, world: int = 0, margin: float = 0.0) -> Pairs:
+    """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] beyond that."""
+    thick = parameters["touch", "thickness"]
+    thick = thick[:, world if thick.shape[1] > 1 else 0]
+
+    def room(*shape: int, dtype):
+        return wp.zeros((*shape, 1), dtype=dtype, device="cpu")
+
+    pairs = LEAST_ROOM + ROOM * len(model.triangles)
+    while True:
+        s = upload(model, room, "cpu", pairs)
+        s.margin = margin
+        distance, inside = room(pairs, dtype=wp.float64), room(pairs, dtype=wp.int32)
+        given = [wp.array(np.ascontiguousarray(a), dtype=t) for a, t in ((x[:, None], wp.vec3d), (thick, wp.float64))]
+        wp.launch(touching.survey, dim=1, inputs=[s, *given, distance, inside], device="cpu")
+        count, whole = s.count.numpy()[:, 0]
+        if whole == 1 and s.span.numpy()[1, 0] == 0.5 * margin:
+            break
+        pairs *= 4
+
+    def rows(a: wp.array) -> np.ndarray:
+        return a.numpy()[:count, 0].copy()
+
+    kind = rows(s.kind)
+    return Pairs(
+        rows(s.points), kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0
+    )
+
+
+def too_deep(model: Model, parameters: Parameters, x: np.ndarray, world: int) -> str:
+    """Why panels that touch stop a world at positions x [N, 3], in a sentence; empty if they do not."""
+    found = near_pairs(model, parameters, x, world=world)
+    deep = found.offset - found.distance
+    if not len(deep):
+        return ""
+    worst = int((deep / found.offset).argmax())
+    one, other = (model.name("panel", int(model.triangle_panel[t])) for t in found.sides[worst])
+    if deep[worst] > DEEPEST * found.offset[worst]:
+        return (
+            f"{one} and {other} are pressed {deep[worst] * 1e3:.3g} mm into each other, of {found.offset[worst] * 1e3:.3g} "
+            "mm between their middle planes; touch stiffer (Sheet.touch) or load less"
+        )
+    room = LEAST_ROOM + ROOM * len(model.triangles)
+    if len(deep) > min(room, 32 + 4 * len(model.triangles)):
+        return f"{len(deep)} pairs touch, of which {one} and {other}: more than there is room for; take a coarser mesh"
+    return ""
+
+
+def _owned(corners: np.ndarray) -> np.ndarray:
+    """Bits of the corners and edges that each triangle stands for: those that no triangle before it has."""
+    out = np.zeros(len(corners), np.int32)
+    seen: set[tuple[int, ...]] = set()
+    for t, nodes in enumerate(corners.tolist()):
+        for k in range(3):
+            for bit, key in ((1 << k, (nodes[k],)), (8 << k, tuple(sorted((nodes[k], nodes[(k + 1) % 3]))))):
+                if key not in seen:
+                    seen.add(key)
+                    out[t] |= bit
+    return out
+
+
+def _bodies(corners: np.ndarray, nodes: int) -> np.ndarray:
+    """Number of the body that each triangle belongs to: triangles that share a node are one."""
+    if not len(corners):
+        return np.zeros(0, np.int32)
+    one, other = np.repeat(corners[:, 0], 2), corners[:, 1:].ravel()
+    joined = sp.coo_array((np.ones(len(one)), (one, other)), shape=(nodes, nodes))
+    return connected_components(joined, directed=False)[1][corners[:, 0]].astype(np.int32)
+
+
+def _boxes(middle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Boxes in depth-first order (triangle or -1; the next box outside), and the box of each triangle.
+
+    Each box is halved along its longest side, by number of triangles.
+    """
+    tree, beyond = [], []
+    leaf = np.zeros(len(middle), np.int32)
+
+    def split(mine: np.ndarray):
+        i = len(tree)
+        tree.append(-1)
+        beyond.append(0)
+        if len(mine) == 1:
+            tree[i] = int(mine[0])
+            leaf[mine[0]] = i
+        else:
+            along = int(np.ptp(middle[mine], axis=0).argmax())
+            order = mine[np.argsort(middle[mine, along], kind="stable")]
+            half = len(order) // 2
+            split(order[:half])
+            split(order[half:])
+        beyond[i] = len(tree)
+
+    split(np.arange(len(middle)))
+    return np.array(tree, np.int32), np.array(beyond, np.int32), leaf
