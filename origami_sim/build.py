@@ -95,7 +95,7 @@ class Sheet(Grounds, Electrodes, Touches):
         self._labels: dict[str, tuple[str, ...]] = {}
         self._contacts: list[Contact] = []
         self._ground: Ground | None = None
-        self._touch: Touch | None = None
+        self._between: Touch | None = None
         self._settings: list[tuple[str, str, object, object]] = []
         self._effects = ["bars"]
         self._shell: Shell | None = None

@@ -36,7 +36,7 @@ class Touches(Masses):
     """The part of `Sheet` that knows that panels may touch each other."""
 
     modulus: np.ndarray
-    _touch: Touch | None
+    _between: Touch | None
 
     # what a designer states ------------------------------------------------------------------------------------
 
@@ -75,14 +75,14 @@ class Touches(Masses):
             )
         if thickness is not None and not positive(thickness):
             raise InputError("panels without thickness cannot touch", field="thickness", value=thickness, allowed="> 0")
-        self._touch = Touch(float(friction), stiffness, float(damping_ratio), thickness)
+        self._between = Touch(float(friction), stiffness, float(damping_ratio), thickness)
         return self.on("touch", "touch_friction")
 
     # what follows from it ----------------------------------------------------------------------------------------
 
     def _touching(self, parameters: Parameters) -> None:
         """Sets how each triangle touches."""
-        stated = self._touch
+        stated = self._between
         if stated is None:
             return
         face = self.mesh.triangle_face
@@ -113,7 +113,7 @@ def refuse_overlap(model: Model, parameters: Parameters) -> None:
     deep = np.where(through, np.inf, found.offset * (1 - 1e-6) - found.distance)
     if len(deep) and deep.max() > 0:
         worst = int(deep.argmax())
-        one, other = (model.name("panel", int(model.triangle_panel[t])) for t in found.sides[worst])
+        one, other = (model.name("panel", p) for p in sorted(model.triangle_panel[found.sides[worst]].tolist()))
         inside = f"lie {(found.offset - found.distance)[worst] * 1e3:.3g} mm inside each other"
         raise InputError(
             f"{one} and {other} {'overlap' if through[worst] else inside} at the start",

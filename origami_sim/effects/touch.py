@@ -23,7 +23,9 @@ EFFECT = Effect(
     force=force,
     energy=energy,
     parameters=(
-        Parameter("thickness", "h", "m", 0.0, (0.0, math.inf), "of the panel; surfaces touch half of it off its middle"),
+        Parameter(
+            "thickness", "h", "m", 0.0, (0.0, math.inf), "of the panel; surfaces touch half of it off its middle"
+        ),
         Parameter("stiffness", "kp", "N/m", 0.0, (0.0, math.inf), "of each pair that touches", typical=100.0),
         Parameter("loss_time", "tau", "s", 0.0, (0.0, math.inf), "dashpot over spring; 2 zeta sqrt(m / kp)"),
     ),

@@ -80,7 +80,7 @@ class Touching:
             with self.acting(t, e):
                 self._rub(t, e, mode)
         if mode in ("rollout", "rigid"):
-            with t.block(f"if gap < scalar({-DEEPEST}) * skin.offset[row, w]:"):
+            with t.block(f"if gap < scalar({-DEEPEST}) * skin.offset[row, w] and normal_load > scalar(0.0):"):
                 t("pressed = touching.node(skin, p0)")
 
     def _rub(self, t: Text, e, mode: str):

@@ -350,9 +350,7 @@ def _accurate(
     return refined(run, accuracy, balanced=not implicit or options["spectral_radius"] == 1.0)
 
 
-def _cause(
-    model: Model, parameters: Parameters, state: State, world: int, dt: float, step: TimeStep
-) -> str:
+def _cause(model: Model, parameters: Parameters, state: State, world: int, dt: float, step: TimeStep) -> str:
     """Why a world failed: the most strained bar of the state in which it stopped."""
     x = state.x[:, world]
     now = np.linalg.norm(x[model.bars[:, 1]] - x[model.bars[:, 0]], axis=-1)

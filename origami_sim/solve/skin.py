@@ -1,7 +1,9 @@
 """The surface of a model: its triangles, nested in boxes as they lie in the reference state, and which parts touch."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,8 +45,13 @@ class Surface:
 
 def surface(model: Model) -> Surface:
     """The surface of a model."""
-    corners = model.triangles.astype(np.int32).reshape(-1, 3)
-    rest = model.position
+    return _surface(model.position.tobytes(), np.asarray(model.triangles, np.int32).tobytes())
+
+
+@functools.lru_cache(maxsize=16)
+def _surface(position: bytes, triangles: bytes) -> Surface:
+    rest = np.frombuffer(position, float).reshape(-1, 3)
+    corners = np.frombuffer(triangles, np.int32).reshape(-1, 3)
     tree, beyond, leaf = _boxes(rest[corners].mean(axis=1)) if len(corners) else (np.zeros(0, np.int32),) * 3
     edges = rest[corners] - rest[np.roll(corners, -1, axis=1)]
     median = float(np.median(np.linalg.norm(edges, axis=-1))) if len(corners) else 1.0
@@ -61,7 +68,7 @@ def surface(model: Model) -> Surface:
     )
 
 
-def upload(model: Model, room: Callable[..., wp.array], device, pairs: int | None = None) -> touching.Skin:
+def upload(model: Model, room: Callable[..., wp.array], device, pairs: int | None = None) -> Any:
     """The surface of a model on a device, with the lists of its worlds.
 
     Args:
@@ -110,32 +117,55 @@ class Pairs:
 
 
 def near_pairs(model: Model, parameters: Parameters, x: np.ndarray, *, world: int = 0, margin: float = 0.0) -> Pairs:
-    """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] beyond that."""
-    thick = parameters["touch", "thickness"]
-    thick = thick[:, world if thick.shape[1] > 1 else 0]
-
-    def room(*shape: int, dtype):
-        return wp.zeros((*shape, 1), dtype=dtype, device="cpu")
-
-    pairs = LEAST_ROOM + ROOM * len(model.triangles)
-    while True:
-        s = upload(model, room, "cpu", pairs)
-        s.margin = margin
-        distance, inside = room(pairs, dtype=wp.float64), room(pairs, dtype=wp.int32)
-        given = [wp.array(np.ascontiguousarray(a), dtype=t) for a, t in ((x[:, None], wp.vec3d), (thick, wp.float64))]
-        wp.launch(touching.survey, dim=1, inputs=[s, *given, distance, inside], device="cpu")
-        count, whole = s.count.numpy()[:, 0]
-        if whole == 1 and s.span.numpy()[1, 0] == 0.5 * margin:
-            break
-        pairs *= 4
+    """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] above."""
+    s, count, distance, inside = _surveyed(model, parameters, x, world, margin)
 
     def rows(a: wp.array) -> np.ndarray:
         return a.numpy()[:count, 0].copy()
 
     kind = rows(s.kind)
-    return Pairs(
-        rows(s.points), kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0
-    )
+    return Pairs(rows(s.points), kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0)
+
+
+def _room(*shape: int, dtype) -> wp.array:
+    return wp.zeros((*shape, 1), dtype=dtype, device="cpu")
+
+
+def _one(a: np.ndarray, dtype) -> wp.array:
+    return wp.array(np.ascontiguousarray(a), dtype=dtype, device="cpu")
+
+
+def _surveyed(model: Model, parameters: Parameters, x: np.ndarray, world: int, margin: float):
+    """The surface of one world with its list, which has found room; number of pairs, distances, inside or not."""
+    thick = parameters["touch", "thickness"]
+    thick = thick[:, world if thick.shape[1] > 1 else 0]
+    pairs = LEAST_ROOM + ROOM * len(model.triangles)
+    while True:
+        s = upload(model, _room, "cpu", pairs)
+        s.margin = margin
+        distance, inside = _room(pairs, dtype=wp.float64), _room(pairs, dtype=wp.int32)
+        given = _one(x[:, None], wp.vec3d), _one(thick, wp.float64)
+        wp.launch(touching.survey, dim=1, inputs=[s, *given, distance, inside], device="cpu")
+        count, whole = s.count.numpy()[:, 0]
+        if whole == 1 and s.span.numpy()[1, 0] == 0.5 * margin:
+            return s, int(count), distance, inside
+        pairs *= 4
+
+
+def clear_share(model: Model, parameters: Parameters, x: np.ndarray, d: np.ndarray, *, world: int = 0) -> float:
+    """Largest share of a move d [N, 3] from positions x [N, 3] on which nothing passes through anything else.
+
+    What touches at its end is pressed by no more than a tenth of its thickness, or a fifth more than before.
+    """
+    far = float(np.linalg.norm(d, axis=-1).max(initial=0.0))
+    if not (far > 0 and np.isfinite(far)) or "touch" not in model.laws:
+        return 1.0
+    s, count, *_ = _surveyed(model, parameters, x, world, 2 * far)
+    if not count:
+        return 1.0
+    share = wp.zeros(count, dtype=wp.float64, device="cpu")
+    wp.launch(touching.clear, dim=count, inputs=[s, _one(d[:, None], wp.vec3d), share], device="cpu")
+    return float(share.numpy().min())
 
 
 def too_deep(model: Model, parameters: Parameters, x: np.ndarray, world: int) -> str:
@@ -145,11 +175,11 @@ def too_deep(model: Model, parameters: Parameters, x: np.ndarray, world: int) ->
     if not len(deep):
         return ""
     worst = int((deep / found.offset).argmax())
-    one, other = (model.name("panel", int(model.triangle_panel[t])) for t in found.sides[worst])
+    one, other = (model.name("panel", p) for p in sorted(model.triangle_panel[found.sides[worst]].tolist()))
     if deep[worst] > DEEPEST * found.offset[worst]:
         return (
-            f"{one} and {other} are pressed {deep[worst] * 1e3:.3g} mm into each other, of {found.offset[worst] * 1e3:.3g} "
-            "mm between their middle planes; touch stiffer (Sheet.touch) or load less"
+            f"{one} and {other} are pressed {deep[worst] * 1e3:.3g} mm into each other, of "
+            f"{found.offset[worst] * 1e3:.3g} mm between their middle planes; touch stiffer (Sheet.touch) or load less"
         )
     room = LEAST_ROOM + ROOM * len(model.triangles)
     if len(deep) > min(room, 32 + 4 * len(model.triangles)):

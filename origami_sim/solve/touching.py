@@ -4,13 +4,15 @@ The surface is its triangles, each as thick as its panel. Two of them touch wher
 or an edge to an edge, than half of both thicknesses. Pairs that may do so soon are kept in a list per world, which is
 made anew once a node has moved by half the margin within which it was made: boxes around the triangles, nested as the
 sheet lies in its reference state, are fitted to the present state and compared with each other (a bounding volume
-hierarchy; each corner and edge counts with one of its triangles: Curtis, Tamstorf & Manocha 2008). A pair is passed over
-until the nodes have moved far enough to close its gap. So the list changes nothing but the time that it takes.
+hierarchy; each corner and edge counts with one of its triangles: Curtis, Tamstorf & Manocha 2008). A pair is passed
+over until the nodes have moved far enough to close its gap. So the list changes nothing but the time that it takes.
 """
 
 import warp as wp
 
 from origami_sim import _warp, kinematics  # noqa: F401  settings
+from origami_sim.solve import nearness
+from origami_sim.solve.nearness import between, crossing, edge_near, from_triangle, nearest
 
 scalar = wp.float64
 
@@ -23,15 +25,6 @@ thickness folds to 157 degrees, with half of it to 169 and with double to 133; c
 
 HALVINGS = 8
 """So many times the margin is halved where a list would not find room: to 1/256, where hardly anything is left."""
-
-PARALLEL = wp.constant(wp.float64(0.01))
-"""Squared sine of the angle from which on two edges count as crossing (6 degrees); below, corners carry the load.
-
-The law fades in up to there, so that the force stays the gradient of an energy. Half and double change nothing that
-corners against triangles do not hold as well.
-"""
-
-TINY = wp.constant(wp.float64(1e-30))
 
 
 @wp.struct
@@ -48,7 +41,7 @@ class Skin:
         low, high: [M, W] corners of the boxes [m]. built: [K, W] points where the list was made [m].
         points: [L, W] the four points of a pair. kind: [L, W] 0 corner and triangle, 1 edge and edge; the model's
             triangles of both sides. label: [L, W] a number that belongs to the pair alone.
-        offset: [L, W] distance at which a pair touches [m]. wake: [L, W] travel of the nodes before which it cannot [m].
+        offset: [L, W] distance at which a pair touches [m]. wake: [L, W] travel of the nodes before which it does not.
         fade: [L, W] lengths of both edges over the offset.
         count: [2, W] pairs in the list; 0 no list, 1 made, 2 it found no room. span: [2, W] travel before which no
             pair touches, and after which the list is made anew [m].
@@ -79,31 +72,6 @@ class Skin:
     span: wp.array2d(dtype=wp.float64)
     nodes: int
     margin: wp.float64
-
-
-@wp.struct
-class Near:
-    """A pair as it lies: distance [m], unit normal towards its first part, and how both go with its four points.
-
-    share: the distance's gradient is share[k] * normal. window, w0 to w3: weight of the pair, and its gradient [1/m].
-    j0 to j3: slip per velocity of the points; a rigid motion of the pair slips by nothing.
-    t1, t2: tangents that go with the pair.
-    """
-
-    distance: wp.float64
-    normal: wp.vec3d
-    share: wp.vec4d
-    window: wp.float64
-    w0: wp.vec3d
-    w1: wp.vec3d
-    w2: wp.vec3d
-    w3: wp.vec3d
-    j0: wp.mat33d
-    j1: wp.mat33d
-    j2: wp.mat33d
-    j3: wp.mat33d
-    t1: wp.vec3d
-    t2: wp.vec3d
 
 
 # points ---------------------------------------------------------------------------------------------------------------
@@ -153,202 +121,7 @@ def push(s: Skin, X: wp.array2d(dtype=wp.vec3d), F: wp.array2d(dtype=wp.vec3d), 
         F[c[2], w] = F[c[2], w] + share[2] * force - wp.dot(force, t.g3) * lever
 
 
-# distances ------------------------------------------------------------------------------------------------------------
-
-
-@wp.func
-def nearest(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
-    """Weights of the corners of a triangle at its point that is nearest to p (Ericson 2005, section 5.1.5)."""
-    ab = b - a
-    ac = c - a
-    d1 = wp.dot(ab, p - a)
-    d2 = wp.dot(ac, p - a)
-    d3 = wp.dot(ab, p - b)
-    d4 = wp.dot(ac, p - b)
-    d5 = wp.dot(ab, p - c)
-    d6 = wp.dot(ac, p - c)
-    va = d3 * d6 - d5 * d4
-    vb = d5 * d2 - d1 * d6
-    vc = d1 * d4 - d3 * d2
-    zero = scalar(0.0)
-    one = scalar(1.0)
-    out = wp.vec3d(one, zero, zero)
-    if d1 <= zero and d2 <= zero:
-        out = wp.vec3d(one, zero, zero)
-    elif d3 >= zero and d4 <= d3:
-        out = wp.vec3d(zero, one, zero)
-    elif d6 >= zero and d5 <= d6:
-        out = wp.vec3d(zero, zero, one)
-    elif vc <= zero and d1 >= zero and d3 <= zero:
-        t = d1 / (d1 - d3)
-        out = wp.vec3d(one - t, t, zero)
-    elif vb <= zero and d2 >= zero and d6 <= zero:
-        t = d2 / (d2 - d6)
-        out = wp.vec3d(one - t, zero, t)
-    elif va <= zero and d4 - d3 >= zero and d5 - d6 >= zero:
-        t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        out = wp.vec3d(zero, one - t, t)
-    else:
-        inverse = one / (va + vb + vc)
-        out = wp.vec3d(va * inverse, vb * inverse, vc * inverse)
-    return out
-
-
-@wp.func
-def from_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
-    """Distance of a point from a triangle."""
-    w = nearest(p, a, b, c)
-    return wp.length(p - w[0] * a - w[1] * b - w[2] * c)
-
-
-@wp.func
-def between(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
-    """Distance of two edges (Ericson 2005, section 5.1.9)."""
-    d1 = p2 - p1
-    d2 = q2 - q1
-    r = p1 - q1
-    a = wp.dot(d1, d1)
-    e = wp.dot(d2, d2)
-    f = wp.dot(d2, r)
-    c = wp.dot(d1, r)
-    b = wp.dot(d1, d2)
-    zero = scalar(0.0)
-    one = scalar(1.0)
-    denominator = a * e - b * b
-    s = zero
-    if denominator > TINY:
-        s = wp.clamp((b * f - c * e) / denominator, zero, one)
-    t = (b * s + f) / wp.max(e, TINY)
-    if t < zero:
-        t = zero
-        s = wp.clamp(-c / wp.max(a, TINY), zero, one)
-    elif t > one:
-        t = one
-        s = wp.clamp((b - c) / wp.max(a, TINY), zero, one)
-    return wp.length(r + s * d1 - t * d2)
-
-
-@wp.func
-def smooth(x: scalar):
-    """0 below 0, 1 above 1, and smooth in between."""
-    y = wp.clamp(x, scalar(0.0), scalar(1.0))
-    return y * y * (scalar(3.0) - scalar(2.0) * y)
-
-
-@wp.func
-def smooth_slope(x: scalar):
-    y = wp.clamp(x, scalar(0.0), scalar(1.0))
-    return scalar(6.0) * y * (scalar(1.0) - y)
-
-
-@wp.func
-def unit(a: wp.vec3d):
-    return a / wp.max(wp.length(a), TINY)
-
-
-@wp.func
-def corner_near(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
-    """A corner p and a triangle."""
-    near = Near()
-    share = nearest(p, a, b, c)
-    apart = p - share[0] * a - share[1] * b - share[2] * c
-    near.distance = wp.length(apart)
-    near.normal = unit(apart)
-    near.share = wp.vec4d(scalar(1.0), -share[0], -share[1], -share[2])
-    near.window = scalar(1.0)
-    # the triangle carries a point beside p along: slip is p's motion against that
-    t = kinematics.normal_gradients(a, b, c)
-    height = wp.dot(p - a, t.n)
-    l2 = wp.dot(p - a, t.g2)
-    l3 = wp.dot(p - a, t.g3)
-    one = wp.identity(n=3, dtype=wp.float64)
-    near.j0 = one
-    near.j1 = (l2 + l3 - scalar(1.0)) * one + height * wp.outer(t.g1, t.n)
-    near.j2 = -l2 * one + height * wp.outer(t.g2, t.n)
-    near.j3 = -l3 * one + height * wp.outer(t.g3, t.n)
-    along = b - a
-    near.t1 = unit(along - near.normal * wp.dot(near.normal, along))
-    near.t2 = wp.cross(near.normal, near.t1)
-    return near
-
-
-@wp.func
-def edge_near(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d, fade: wp.vec2d):
-    """An edge p1-p2 that crosses over an edge q1-q2.
-
-    It fades out towards the ends of both, within the distance at which they touch, where corners take over.
-    """
-    near = Near()
-    one = scalar(1.0)
-    e = p2 - p1
-    f = q2 - q1
-    r = p1 - q1
-    a = wp.dot(e, e)
-    b = wp.dot(e, f)
-    c = wp.dot(f, f)
-    d = a * c - b * b
-    sine = d / wp.max(a * c, TINY)
-    near.window = scalar(0.0)
-    if sine > scalar(1e-12):
-        s = (b * wp.dot(f, r) - c * wp.dot(e, r)) / d
-        t = (a * wp.dot(f, r) - b * wp.dot(e, r)) / d
-        if s > scalar(0.0) and s < one and t > scalar(0.0) and t < one:
-            apart = r + s * e - t * f
-            near.distance = wp.length(apart)
-            near.normal = unit(apart)
-            near.share = wp.vec4d(one - s, s, t - one, -t)
-            s0 = smooth(s * fade[0])
-            s1 = smooth((one - s) * fade[0])
-            t0 = smooth(t * fade[1])
-            t1 = smooth((one - t) * fade[1])
-            m = smooth(sine / PARALLEL)
-            near.window = s0 * s1 * t0 * t1 * m
-            by_s = (smooth_slope(s * fade[0]) * s1 - s0 * smooth_slope((one - s) * fade[0])) * fade[0] * t0 * t1 * m
-            by_t = (smooth_slope(t * fade[1]) * t1 - t0 * smooth_slope((one - t) * fade[1])) * fade[1] * s0 * s1 * m
-            by_m = smooth_slope(sine / PARALLEL) / PARALLEL * s0 * s1 * t0 * t1
-            # ds = (b r2 - c r1) / d and dt = (a r2 - b r1) / d, where r1, r2 change what is zero at the nearest points
-            s1st = (by_s * (-c) + by_t * (-b)) / d  # of the window by r1
-            s2nd = (by_s * b + by_t * a) / d
-            sine_e = scalar(2.0) * b / (a * c) * (b / a * e - f)  # of sine by e
-            sine_f = scalar(2.0) * b / (a * c) * (b / c * f - e)
-            near.w0 = s1st * ((one - s) * e - apart) + s2nd * ((one - s) * f) - by_m * sine_e
-            near.w1 = s1st * (s * e + apart) + s2nd * (s * f) + by_m * sine_e
-            near.w2 = s1st * ((t - one) * e) + s2nd * ((t - one) * f - apart) - by_m * sine_f
-            near.w3 = s1st * (-t * e) + s2nd * (-t * f + apart) + by_m * sine_f
-            across = wp.cross(e, f)
-            size = wp.length(across)
-            lever = wp.dot(apart, across) / (size * size)
-            unity = wp.identity(n=3, dtype=wp.float64)
-            flat = unity - wp.outer(near.normal, near.normal)
-            by_e = lever * flat * wp.skew(f)
-            by_f = -lever * flat * wp.skew(e)
-            near.j0 = (one - s) * unity - by_e
-            near.j1 = s * unity + by_e
-            near.j2 = (t - one) * unity - by_f
-            near.j3 = -t * unity + by_f
-            near.t1 = unit(e)
-            near.t2 = wp.cross(near.normal, near.t1)
-    return near
-
-
-@wp.func
-def crossing(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
-    """Distance of two edges where they cross over each other, seen along it; infinite where they do not."""
-    e = p2 - p1
-    f = q2 - q1
-    r = p1 - q1
-    a = wp.dot(e, e)
-    b = wp.dot(e, f)
-    c = wp.dot(f, f)
-    er = wp.dot(e, r)
-    fr = wp.dot(f, r)
-    d = a * c - b * b
-    s = b * fr - c * er
-    t = a * fr - b * er
-    out = scalar(wp.inf)
-    if s > scalar(0.0) and s < d and t > scalar(0.0) and t < d:
-        out = wp.length(r + (s / d) * e - (t / d) * f)
-    return out
+# pairs ----------------------------------------------------------------------------------------------------------------
 
 
 @wp.func
@@ -375,9 +148,9 @@ def look(s: Skin, X: wp.array2d(dtype=wp.vec3d), row: int, w: int):
     b = place(s, X, p[1], w)
     c = place(s, X, p[2], w)
     d = place(s, X, p[3], w)
-    near = Near()
+    near = nearness.Near()
     if s.kind[row, w][0] == 0:
-        near = corner_near(a, b, c, d)
+        near = nearness.corner_near(a, b, c, d)
     else:
         near = edge_near(a, b, c, d, s.fade[row, w])
     return near
@@ -420,7 +193,7 @@ def note(
         if kind == 1:
             one = wp.length(s.rest[points[1]] - s.rest[points[0]])
             other = wp.length(s.rest[points[3]] - s.rest[points[2]])
-            s.fade[count, w] = wp.vec2d(one, other) / wp.max(offset, TINY)
+            s.fade[count, w] = wp.vec2d(one, other) / wp.max(offset, scalar(1e-30))
     return count + 1
 
 
@@ -429,7 +202,8 @@ def corners_of(s: Skin, a: int, b: int, thick: scalar, margin: scalar, count: in
     """Notes the corners that triangle a stands for, against triangle b."""
     found = count
     c = s.corners[b]
-    for k in range(3):
+    three = int(3)  # a loop that is not unrolled is compiled in a fraction of the time
+    for k in range(three):
         n = s.corners[a][k]
         if (s.owned[a] & (1 << k)) != 0 and n != c[0] and n != c[1] and n != c[2]:
             distance = from_triangle(s.built[n, w], s.built[c[0], w], s.built[c[1], w], s.built[c[2], w])
@@ -447,11 +221,12 @@ def corners_of(s: Skin, a: int, b: int, thick: scalar, margin: scalar, count: in
 def edges_of(s: Skin, a: int, b: int, thick: scalar, margin: scalar, count: int, w: int):
     """Notes the edges that triangle a stands for, against those of triangle b."""
     found = count
-    for k in range(3):
+    three = int(3)
+    for k in range(three):
         if (s.owned[a] & (8 << k)) != 0:
             n1 = s.corners[a][k]
             n2 = s.corners[a][(k + 1) % 3]
-            for m in range(3):
+            for m in range(three):
                 o1 = s.corners[b][m]
                 o2 = s.corners[b][(m + 1) % 3]
                 apart = n1 != o1 and n1 != o2 and n2 != o1 and n2 != o2
@@ -570,7 +345,7 @@ def travelled(s: Skin, X: wp.array2d(dtype=wp.vec3d), P: wp.array(dtype=wp.float
 
 
 # what is remembered of pairs that touch -------------------------------------------------------------------------------
-# memory[row]: which of two lists is the present one; memory[row + 1]: its length; then both lists, label and two numbers
+# memory[row]: which of two lists is the present one; memory[row + 1]: its length; then both, label and two numbers each
 
 
 @wp.func
@@ -639,3 +414,47 @@ def survey(
             distance[row, w] = between(a, b, c, d)
             ends = wp.vec2d(scalar(1e9), scalar(1e9))
             inside[row, w] = int(edge_near(a, b, c, d, ends).window > scalar(0.0))
+
+
+@wp.kernel(enable_backward=False)
+def clear(s: Skin, D: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float64)):
+    """Largest share of a move D of the points at which no pair of the list comes nearer than it may.
+
+    Pairs may close to 0.9 of the distance at which they touch, or by a fifth from where they are (conservative
+    advancement: Li, Kaufman & Jiang 2021, section 5).
+    """
+    row = wp.tid()
+    p = s.points[row, 0]
+    a = s.built[p[0], 0]
+    b = s.built[p[1], 0]
+    c = s.built[p[2], 0]
+    d = s.built[p[3], 0]
+    mean = scalar(0.25) * (D[p[0], 0] + D[p[1], 0] + D[p[2], 0] + D[p[3], 0])
+    da = D[p[0], 0] - mean
+    db = D[p[1], 0] - mean
+    dc = D[p[2], 0] - mean
+    dd = D[p[3], 0] - mean
+    speed = wp.length(da) + wp.max(wp.length(db), wp.max(wp.length(dc), wp.length(dd)))
+    if s.kind[row, 0][0] == 1:
+        speed = wp.max(wp.length(da), wp.length(db)) + wp.max(wp.length(dc), wp.length(dd))
+    gone = scalar(0.0)
+    floor = scalar(0.0)
+    first = int(1)
+    going = int(1)
+    while going == 1:
+        apart_now = scalar(0.0)
+        if s.kind[row, 0][0] == 0:
+            apart_now = from_triangle(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+        else:
+            apart_now = between(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+        if first == 1:
+            floor = wp.min(scalar(0.9) * s.offset[row, 0], scalar(0.8) * apart_now)
+            first = 0
+        free = apart_now - floor
+        if gone >= scalar(1.0) or free <= scalar(0.01) * floor or speed <= scalar(0.0):
+            going = 0
+        else:
+            gone = gone + free / speed
+    if speed <= scalar(0.0):
+        gone = scalar(1.0)
+    share[row] = wp.min(gone, scalar(1.0))
