@@ -34,6 +34,7 @@ EFFECT = Effect(
         Parameter("damping", "ct", "N s/m", 0.0, (0.0, math.inf), "tangential dashpot while sticking"),
     ),
     fitted=("friction_coefficient",),
+    stated=("stiffness",),
     stiffness=lambda p: p["stiffness"] * (p["friction_coefficient"] > 0),
     damping=lambda p: p["damping"] * (p["friction_coefficient"] > 0),
     formula="f = -kt s - ct v,  ds/dt = v while |f| < mu fn,  |f| = mu fn while slipping; s turns with the pair",
