@@ -349,7 +349,7 @@ class Sheet(Grounds, Electrodes, Touches):
         if "eccentric_weight" in self._effects:
             for t, (weight, offset) in self._off_plane().items():
                 p.set("eccentric_weight", "mass", weight, [t]).set("eccentric_weight", "offset", offset, [t])
-        model = self._stand(model, p, shares)
+        model = self._padded(self._stand(model, p, shares))
         self._touching(p)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)

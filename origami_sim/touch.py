@@ -1,6 +1,6 @@
 """Panels that touch each other: what a designer states of it, and what follows for each triangle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -79,6 +79,27 @@ class Touches(Masses):
         return self.on("touch", "touch_friction")
 
     # what follows from it ----------------------------------------------------------------------------------------
+
+    def _padded(self, model: Model) -> Model:
+        """The model with the patches that can touch: rectangles in their middle planes, with rounded borders."""
+        found: list[tuple[int, np.ndarray, float]] = []
+        thickness = []
+        for panel, patch in enumerate(self._patches if self._between is not None else []):
+            if not patch:
+                continue
+            height = patch["side"] * 0.5 * (float(self.thickness[panel]) + patch["thickness"])
+            half = np.maximum(0.5 * patch["size"] - 0.5 * patch["thickness"], 0.05 * patch["size"])
+            for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                triangle, weights, _ = self._carrier(panel, patch["centre"] + np.array([x * half[0], y * half[1], 0.0]))
+                found.append((int(triangle), weights, height))
+            thickness.append(patch["thickness"])
+        if not found:
+            return model
+        triangles, weights, heights = (np.array(a) for a in zip(*found, strict=True))
+        return replace(
+            model, pad_triangles=triangles.astype(np.int32), pad_weights=weights, pad_heights=heights,
+            pad_thickness=np.array(thickness),
+        )  # fmt: skip
 
     def _touching(self, parameters: Parameters) -> None:
         """Sets how each triangle touches."""

@@ -40,30 +40,54 @@ class Surface:
     beyond: np.ndarray
     leaf: np.ndarray
     rest: np.ndarray
+    panel: np.ndarray
+    own: np.ndarray
+    carrier: np.ndarray
+    weights: np.ndarray
+    lift: np.ndarray
     margin: float
 
 
 def surface(model: Model) -> Surface:
     """The surface of a model."""
-    return _surface(model.position.tobytes(), np.asarray(model.triangles, np.int32).tobytes())
+    whole = (model.triangles, model.triangle_panel, model.pad_triangles)
+    real = (model.position, model.pad_weights, model.pad_heights, model.pad_thickness)
+    given = [np.asarray(a, np.int32).tobytes() for a in whole], [np.asarray(a, float).tobytes() for a in real]
+    return _surface(*map(tuple, given))
 
 
 @functools.lru_cache(maxsize=16)
-def _surface(position: bytes, triangles: bytes) -> Surface:
-    rest = np.frombuffer(position, float).reshape(-1, 3)
-    corners = np.frombuffer(triangles, np.int32).reshape(-1, 3)
+def _surface(whole: tuple[bytes, ...], real: tuple[bytes, ...]) -> Surface:
+    triangles, panels, carried = (np.frombuffer(a, np.int32) for a in whole)
+    nodes, weights, lift, thickness = (np.frombuffer(a, float) for a in real)
+    nodes, weights, triangles = nodes.reshape(-1, 3), weights.reshape(-1, 3), triangles.reshape(-1, 3)
+    carrier = triangles[carried].reshape(-1, 3)
+    a, b, c = (nodes[carrier[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    points = np.einsum("pk,pka->pa", weights, nodes[carrier]) + lift[:, None] * normal
+    rest = np.concatenate([nodes, points])
+    first = len(nodes) + 4 * np.arange(len(thickness))[:, None, None]
+    pads = (first + np.array([(0, 1, 2), (0, 2, 3)])).reshape(-1, 3)
+    corners = np.concatenate([triangles, pads]).astype(np.int32)
+    home = np.concatenate([np.arange(len(triangles)), np.repeat(carried[::4], 2)]).astype(np.int32)
     tree, beyond, leaf = _boxes(rest[corners].mean(axis=1)) if len(corners) else (np.zeros(0, np.int32),) * 3
-    edges = rest[corners] - rest[np.roll(corners, -1, axis=1)]
-    median = float(np.median(np.linalg.norm(edges, axis=-1))) if len(corners) else 1.0
+    edges = nodes[triangles] - nodes[np.roll(triangles, -1, axis=1)]
+    median = float(np.median(np.linalg.norm(edges, axis=-1))) if len(triangles) else 1.0
     return Surface(
         corners=corners,
         owned=_owned(corners),
-        body=_bodies(corners, len(rest)),
-        home=np.arange(len(corners), dtype=np.int32),
+        body=_bodies(triangles, len(nodes))[home],
+        home=home,
         tree=tree,
         beyond=beyond,
         leaf=leaf,
         rest=rest,
+        panel=panels[home].astype(np.int32),
+        own=np.concatenate([np.full(len(triangles), -1.0), np.repeat(thickness, 2)]),
+        carrier=carrier,
+        weights=weights,
+        lift=lift,
         margin=MARGIN * median,
     )
 
@@ -82,11 +106,11 @@ def upload(model: Model, room: Callable[..., wp.array], device, pairs: int | Non
     s = touching.Skin()
     s.nodes, s.margin = len(model.position), found.margin
     s.corners = constant(found.corners, wp.vec3i)
-    for name in ("owned", "body", "home", "tree", "beyond", "leaf"):
+    for name in ("owned", "body", "home", "panel", "tree", "beyond", "leaf"):
         setattr(s, name, constant(getattr(found, name), wp.int32))
     s.rest = constant(found.rest, wp.vec3d)
-    s.carrier = constant(np.zeros((0, 3)), wp.vec3i)
-    s.weights, s.lift = constant(np.zeros((0, 3)), wp.vec3d), constant(np.zeros(0), wp.float64)
+    s.carrier, s.weights = constant(found.carrier, wp.vec3i), constant(found.weights, wp.vec3d)
+    s.lift, s.own = constant(found.lift, wp.float64), constant(found.own, wp.float64)
     boxes, points = max(len(found.tree), 1), max(len(found.rest), 1)
     pairs = pairs or LEAST_ROOM + ROOM * len(found.corners)
     s.low, s.high = room(boxes, dtype=wp.vec3d), room(boxes, dtype=wp.vec3d)
@@ -103,12 +127,13 @@ class Pairs:
     """Pairs of the surface that are near each other.
 
     Attributes:
-        points: [P, 4] nodes: a corner and a triangle, or two edges. edges: [P] whether edges.
+        nodes: [P, 12] of a corner and a triangle, or of two edges; each thrice, or those of the triangle that carries
+            a patch's corner. edges: [P] whether edges.
         sides: [P, 2] triangles. offset: [P] distance at which they touch [m]. distance: [P] [m].
         inside: [P] whether a corner lies over the inside of the triangle, or an edge crosses that of the other.
     """
 
-    points: np.ndarray
+    nodes: np.ndarray
     edges: np.ndarray
     sides: np.ndarray
     offset: np.ndarray
@@ -124,7 +149,9 @@ def near_pairs(model: Model, parameters: Parameters, x: np.ndarray, *, world: in
         return a.numpy()[:count, 0].copy()
 
     kind = rows(s.kind)
-    return Pairs(rows(s.points), kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0)
+    own = np.repeat(np.arange(len(model.position))[:, None], 3, axis=1)
+    nodes = np.concatenate([own, surface(model).carrier])[rows(s.points)].reshape(-1, 12)
+    return Pairs(nodes, kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0)
 
 
 def _room(*shape: int, dtype) -> wp.array:
@@ -160,11 +187,11 @@ def clear_share(model: Model, parameters: Parameters, x: np.ndarray, d: np.ndarr
     far = float(np.linalg.norm(d, axis=-1).max(initial=0.0))
     if not (far > 0 and np.isfinite(far)) or "touch" not in model.laws:
         return 1.0
-    s, count, *_ = _surveyed(model, parameters, x, world, 2 * far)
+    s, count, *_ = _surveyed(model, parameters, x, world, (4 if len(model.pad_triangles) else 2) * far)
     if not count:
         return 1.0
     share = wp.zeros(count, dtype=wp.float64, device="cpu")
-    wp.launch(touching.clear, dim=count, inputs=[s, _one(d[:, None], wp.vec3d), share], device="cpu")
+    wp.launch(touching.clear, dim=count, inputs=[s, _one((x + d)[:, None], wp.vec3d), share], device="cpu")
     return float(share.numpy().min())
 
 

@@ -196,7 +196,7 @@ class System:
             self._margin, self._coupled = surface(model).margin, x.copy()
             for w in range(x.shape[1]):
                 near = near_pairs(model, parameters, x[:, w], margin=self._margin)
-                pairs.append(_every_two(near.points))
+                pairs.append(_every_two(near.nodes))
                 self._steps = np.minimum(self._steps, TOUCHING * near.offset.min(initial=np.inf))
         rows, columns = np.unique(np.concatenate(pairs, axis=1), axis=1)
         self._rows, self._columns = rows, columns

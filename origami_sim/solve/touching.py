@@ -34,6 +34,7 @@ class Skin:
     Attributes:
         corners: [S] triangles of the surface. owned: [S] bits of the corners (1, 2, 4) and edges (8, 16, 32) that a
             triangle stands for. body: [S] what hangs together. home: [S] the model's triangle that carries it.
+        panel: [S] its panel. own: [S] thickness of a patch [m]; negative for triangles of panels.
         tree, beyond: [M] nested boxes in depth-first order: the triangle of each or -1, and the next box outside it.
         leaf: [S] box of each triangle.
         rest: [K] reference positions of the points [m]: nodes, then those that triangles carry.
@@ -52,6 +53,8 @@ class Skin:
     owned: wp.array(dtype=wp.int32)
     body: wp.array(dtype=wp.int32)
     home: wp.array(dtype=wp.int32)
+    panel: wp.array(dtype=wp.int32)
+    own: wp.array(dtype=wp.float64)
     tree: wp.array(dtype=wp.int32)
     beyond: wp.array(dtype=wp.int32)
     leaf: wp.array(dtype=wp.int32)
@@ -161,10 +164,27 @@ def look(s: Skin, X: wp.array2d(dtype=wp.vec3d), row: int, w: int):
 
 @wp.func
 def touches_at(s: Skin, thick: scalar, distance_at_rest: scalar, a: int, b: int):
-    """Distance at which a pair touches: half of both thicknesses, less for what lies near in one body."""
+    """Distance at which a pair touches: half of both thicknesses, less for what lies near in one body.
+
+    Negative for a patch and its own panel, which never do.
+    """
     out = thick
     if s.body[a] == s.body[b]:
-        out = wp.min(thick, SHARE * distance_at_rest)
+        if s.own[a] < scalar(0.0) and s.own[b] < scalar(0.0):
+            out = wp.min(thick, SHARE * distance_at_rest)
+        elif s.panel[a] == s.panel[b]:
+            out = scalar(-1.0)
+        else:  # patches stay clear of creases by their own shape
+            out = wp.min(thick, distance_at_rest)
+    return out
+
+
+@wp.func
+def thickness(s: Skin, P: wp.array(dtype=wp.float64), first: int, stride: int, a: int):
+    """Thickness of a triangle of the surface."""
+    out = s.own[a]
+    if out < scalar(0.0):
+        out = P[first + stride * s.home[a]]
     return out
 
 
@@ -182,7 +202,7 @@ def note(
     w: int,
 ):
     """Puts a pair into the list if it is near; returns the number of pairs that are."""
-    if distance >= offset + margin:
+    if offset < scalar(0.0) or distance >= offset + margin:
         return count
     if count < s.points.shape[0]:
         s.points[count, w] = points
@@ -263,7 +283,7 @@ def fit(
         i = last - row
         t = s.tree[i]
         if t >= 0:
-            room = scalar(0.5) * (P[first + stride * s.home[t]] + margin)
+            room = scalar(0.5) * (thickness(s, P, first, stride, t) + margin)
             around = wp.vec3d(room, room, room)
             a = s.built[s.corners[t][0], w]
             b = s.built[s.corners[t][1], w]
@@ -292,7 +312,7 @@ def listed(
             else:
                 b = s.tree[i]
                 if b > a:
-                    thick = scalar(0.5) * (P[first + stride * s.home[a]] + P[first + stride * s.home[b]])
+                    thick = scalar(0.5) * (thickness(s, P, first, stride, a) + thickness(s, P, first, stride, b))
                     if thick > scalar(0.0):
                         count = corners_of(s, a, b, thick, margin, count, w)
                         count = corners_of(s, b, a, thick, margin, count, w)
@@ -393,13 +413,13 @@ def node(s: Skin, k: int):
 def survey(
     s: Skin,
     X: wp.array2d(dtype=wp.vec3d),
-    thickness: wp.array(dtype=wp.float64),
+    thick: wp.array(dtype=wp.float64),
     distance: wp.array2d(dtype=wp.float64),
     inside: wp.array2d(dtype=wp.int32),
 ):
     """Lists the pairs of one world anew; their distances, and whether one lies over the inside of the other."""
     w = wp.tid()
-    renew(s, X, thickness, 0, 1, w)
+    renew(s, X, thick, 0, 1, w)
     for row in range(s.count[0, w]):
         p = s.points[row, w]
         a = s.built[p[0], w]
@@ -417,8 +437,8 @@ def survey(
 
 
 @wp.kernel(enable_backward=False)
-def clear(s: Skin, D: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float64)):
-    """Largest share of a move D of the points at which no pair of the list comes nearer than it may.
+def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float64)):
+    """Largest share of the straight way to positions X on which no pair of the list comes nearer than it may.
 
     Pairs may close to 0.9 of the distance at which they touch, or by a fifth from where they are (conservative
     advancement: Li, Kaufman & Jiang 2021, section 5).
@@ -429,11 +449,15 @@ def clear(s: Skin, D: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float
     b = s.built[p[1], 0]
     c = s.built[p[2], 0]
     d = s.built[p[3], 0]
-    mean = scalar(0.25) * (D[p[0], 0] + D[p[1], 0] + D[p[2], 0] + D[p[3], 0])
-    da = D[p[0], 0] - mean
-    db = D[p[1], 0] - mean
-    dc = D[p[2], 0] - mean
-    dd = D[p[3], 0] - mean
+    da = place(s, X, p[0], 0) - a
+    db = place(s, X, p[1], 0) - b
+    dc = place(s, X, p[2], 0) - c
+    dd = place(s, X, p[3], 0) - d
+    mean = scalar(0.25) * (da + db + dc + dd)
+    da = da - mean
+    db = db - mean
+    dc = dc - mean
+    dd = dd - mean
     speed = wp.length(da) + wp.max(wp.length(db), wp.max(wp.length(dc), wp.length(dd)))
     if s.kind[row, 0][0] == 1:
         speed = wp.max(wp.length(da), wp.length(db)) + wp.max(wp.length(dc), wp.length(dd))

@@ -11,6 +11,7 @@ from origami_sim import sheet as mesh
 from origami_sim.errors import InputError
 from origami_sim.materials import G
 from origami_sim.model import State, node_mass
+from origami_sim.results import load_run, save_run
 
 MM = 1e-3
 SMALL = [(0, 0), (20, 0), (20, 16), (0, 16)]
@@ -188,6 +189,36 @@ def test_a_miura_that_folds_flat_stops_at_its_thickness():
     least = apart(run.model, run.parameters, run.x[-1, :, 0])
     assert 0.72 * MM < least < 0.85 * MM
     assert apart(free.model, free.parameters, free.x[-1, :, 0]) < 0.4 * MM
+
+
+def patched():
+    """Two panels with patches on their inner side, 1.2 mm apart across the crease, which is turned shut."""
+    s = Sheet(strip([10 * MM, 10 * MM], 12 * MM), thickness=1 * MM, triangulation="center")
+    for panel in (0, 1):
+        s.patch(panel, thickness=1.6 * MM, size=(8.8 * MM, 10 * MM))
+    s.on("bar_viscosity", "panel_bending", "crease", "crease_drive").gravity((0, 0, 0)).touch(friction=0.0)
+    s.fix(panels=[0]).crease(stiffness=1e-5, loss_time=8e-3)
+    s.set("crease_drive", drive_stiffness=1e-5, target_angle=3.1)
+    return s.build()
+
+
+def closed_form(gap, height, thickness):
+    """Fold at which the rounded borders of two patches meet [rad]."""
+    across, up = 0.5 * (gap + thickness), 0.5 * (height + thickness)
+    return 2 * (math.acos(0.5 * thickness / math.hypot(across, up)) - math.atan2(up, across))
+
+
+def test_patches_inside_a_fold_close_to_their_stop(tmp_path):
+    expected = closed_form(1.2 * MM, 1 * MM, 1.6 * MM)
+    model, parameters = patched()
+    slow = quasistatic(model, parameters, Drive(load=ramp(1.0, 1.0)), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert not slow.failures
+    assert slow.creases[-1, 0, 0] == pytest.approx(expected, abs=0.01)
+    run = simulate(model, parameters, Drive(load=1.0), duration=0.02, rate=100, state=slow.state)
+    assert run.creases[-1, 0, 0] == pytest.approx(slow.creases[-1, 0, 0], abs=1e-6)
+    again = load_run(save_run(tmp_path / "run", run, scene="patches", replay=False).path).trajectory.model
+    assert again.hash == model.hash
+    assert np.array_equal(again.pad_weights, model.pad_weights)
 
 
 def letter():
