@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[1]
 FAMILIES = {
     "crease": "at creases", "bend": "within panels", "bar": "in bars", "triangle": "on panels", "node": "at nodes",
     "membrane": "in shells", "plate": "in shells", "contact": "on the ground", "tangent": "on the ground",
-    "coefficient": "on the ground", "drive": "of what is applied", "measurement": "of the measurement",
+    "coefficient": "on the ground", "pair": "between panels", "rub": "between panels",
+    "drive": "of what is applied", "measurement": "of the measurement",
 }  # fmt: skip
 
 

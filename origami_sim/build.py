@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from origami_sim.bodies import rigid
 from origami_sim.dielectric import Electrodes
+from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
@@ -16,9 +17,10 @@ from origami_sim.pattern import Pattern, triangulate
 from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, stated
 from origami_sim.statements import statement
+from origami_sim.touch import Touch, Touches, refuse_overlap
 
 
-class Sheet(Grounds, Electrodes):
+class Sheet(Grounds, Electrodes, Touches):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -93,6 +95,7 @@ class Sheet(Grounds, Electrodes):
         self._labels: dict[str, tuple[str, ...]] = {}
         self._contacts: list[Contact] = []
         self._ground: Ground | None = None
+        self._between: Touch | None = None
         self._settings: list[tuple[str, str, object, object]] = []
         self._effects = ["bars"]
         self._shell: Shell | None = None
@@ -346,14 +349,17 @@ class Sheet(Grounds, Electrodes):
         if "eccentric_weight" in self._effects:
             for t, (weight, offset) in self._off_plane().items():
                 p.set("eccentric_weight", "mass", weight, [t]).set("eccentric_weight", "offset", offset, [t])
-        model = self._stand(model, p, shares)
+        model = self._padded(self._stand(model, p, shares))
+        self._touching(p)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
+        if "touch" in self._effects:
+            refuse_overlap(model, p)
         return rigid(model, p) if self.panels == "rigid" else (model, p)
 
     def _family_counts(self) -> dict[str, int]:
         mesh = self.mesh
-        triangles = dict.fromkeys(("triangle", "membrane", "plate"), len(mesh.triangles))
+        triangles = dict.fromkeys(("triangle", "membrane", "plate", *PAIRS), len(mesh.triangles))
         hinges = {"bar": len(mesh.bars), "crease": len(mesh.creases), "bend": len(mesh.bends)}
         return {"node": len(mesh.vertices), **triangles, **hinges}
 

@@ -470,6 +470,7 @@ def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
                 "folder": None if folder is None else str(folder),
                 "dt": motion.dt,
                 "energy_error": accuracy.worst(motion.energy_error),
+                "crossing_pairs": int(motion.crossings().sum()),
                 "notes": motion.notes,
                 "failures": [str(f) for f in motion.failures],
             }
@@ -479,7 +480,8 @@ def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
         print(format_table(table, outcome.units or _units(outcome.tables)))
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
-    said = [str(motion.step), accuracy.sentence(motion.energy_error), f"{motion.wall:.1f} s of computing"]
+    through = f"{motion.crossings().sum()} pairs of triangles through each other"
+    said = [str(motion.step), accuracy.sentence(motion.energy_error), through, f"{motion.wall:.1f} s of computing"]
     print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 
 

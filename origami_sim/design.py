@@ -45,7 +45,7 @@ _ANGLES = ("gamma", "twist", "fold_angle", "fold_angles", "target_angle")
 _EDGES = ("fold_angles", "stiffness", "rest_angles")
 _STATEMENTS = (
     *("on", "set", "crease", "shell", "panel", "patch", "magnetise", "fix", "name"),
-    *("gravity", "body", "mass", "point_mass", "contact", "feet", "ground", "electrode"),
+    *("gravity", "body", "mass", "point_mass", "contact", "feet", "ground", "touch", "electrode"),
 )
 _WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Numbers of a rigid body: mass, centre of mass, inertia tensor about it."""
 
+PADS = ("pad_triangles", "pad_weights", "pad_heights", "pad_thickness")
+"""Attributes of a model that say where patches can touch; a model without them is stored as if there were none."""
+
 
 @dataclass(frozen=True, repr=False)
 class Model:
@@ -41,6 +44,9 @@ class Model:
         channels: recorded channels that errors of the measurement tell apart; 1: the same for all.
         panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, see `bodies.rigid`).
         carriers: panels of the last nodes, which stand for the mass of rigid panels and are corners of no triangle.
+        pad_triangles: [4 Q] triangles that carry the corners of patches, of those that can touch other parts.
+        pad_weights: [4 Q, 3] barycentric weights of these corners. pad_heights: [4 Q] of the patches' middle planes
+            above the panels' [m]. pad_thickness: [Q] [m].
     """
 
     position: np.ndarray
@@ -60,6 +66,10 @@ class Model:
     channels: int = 1
     panels: str = "elastic"
     carriers: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    pad_triangles: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    pad_weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    pad_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    pad_thickness: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import model_line  # only who looks pays for it
@@ -91,6 +101,8 @@ class Model:
                 "triangle": self.triangles,
                 "membrane": self.triangles,
                 "plate": self.triangles,
+                "pair": self.triangles,
+                "rub": self.triangles,
                 "node": self.position,
             }[family]
         )
@@ -104,6 +116,12 @@ class Model:
     def laws(self) -> tuple[str, ...]:
         """The effects that act as forces: all but the distortions of drive and measurement."""
         return tuple(n for n in self.effects if get(n).family not in DISTORTIONS)
+
+    @property
+    def memories(self) -> list[tuple[str, str, int]]:
+        """Effect, name and size of every memory of its laws, in their order in `State.memory`."""
+        laws = map(get, self.laws)
+        return [(e.name, m.name, m.base + m.size * self.count(e.family)) for e in laws for m in e.memory]
 
     def name(self, family: str, i: int) -> str:
         """Label of an entity."""
@@ -125,6 +143,8 @@ class Model:
         h = hashlib.sha256()
         for f in fields(self):
             if f.name == "channels" or (f.name in ("panels", "carriers") and self.panels == "elastic"):
+                continue
+            if f.name in PADS and not len(self.pad_triangles):
                 continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
@@ -300,7 +320,7 @@ class State:
         if len(model.carriers) and position is not None:
             _carry(model, x)
         effects = [get(e) for e in model.laws]
-        rows = sum(m.size * model.count(e.family) for e in effects for m in e.memory)
+        rows = sum(size for *_, size in model.memories)
         hinges = np.concatenate([model.creases, model.bends])
         angles = dihedral_angles(x, hinges)
         return cls(

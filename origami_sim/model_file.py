@@ -22,16 +22,17 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError, nearest
-from origami_sim.model import Model, Parameters
+from origami_sim.model import PADS, Model, Parameters
 
 _COLUMNS = {
     "position": 3, "free": 3, "bars": 2, "creases": 4, "bends": 4, "triangles": 3, "triangle_panel": 0,
     "contacts": 3, "contact_weights": 3, "contact_offsets": 0, "contact_axes": 3, "electrodes": 0, "carriers": 0,
+    "pad_triangles": 0, "pad_weights": 3, "pad_heights": 0, "pad_thickness": 0,
 }  # fmt: skip
 """Arrays of a model, with the length of their rows."""
 
 _NODES = ("bars", "creases", "bends", "triangles", "contacts")
-_WHOLE = (*_NODES, "triangle_panel", "electrodes", "carriers")
+_WHOLE = (*_NODES, "triangle_panel", "electrodes", "carriers", "pad_triangles")
 _WORDS = ("effects", "channels", "panels")
 
 
@@ -43,7 +44,8 @@ def model_tables(model: Model, parameters: Parameters) -> dict[str, dict[str, An
     """
     if parameters.worlds > 1:
         raise InputError("a design is one world", field="parameters", value=f"{parameters.worlds} worlds")
-    out: dict[str, dict[str, Any]] = {"model": {n: getattr(model, n) for n in (*_WORDS, *_COLUMNS)}}
+    kept = [n for n in (*_WORDS, *_COLUMNS) if n not in PADS or len(model.pad_triangles)]
+    out: dict[str, dict[str, Any]] = {"model": {n: getattr(model, n) for n in kept}}
     out["model"]["effects"] = list(model.effects)
     out["names"] = {family: list(labels) for family, labels in model.names.items()}
     default = Parameters(model)
@@ -73,7 +75,8 @@ def read_model(data: Mapping[str, Any], path: Path) -> tuple[Model, Parameters]:
             raise InputError("the model lacks an array", file=path, field=f"model.{name}")
     arrays = {n: _array(given[n], n, width, path) for n, width in _COLUMNS.items() if n in given}
     nodes, panels = len(arrays["position"]), int(arrays["triangle_panel"].max(initial=-1)) + 1
-    for name, most in (*((n, nodes) for n in _NODES), ("carriers", panels)):
+    triangles = len(arrays["triangles"])
+    for name, most in (*((n, nodes) for n in _NODES), ("carriers", panels), ("pad_triangles", triangles)):
         bad = arrays[name][(arrays[name] < 0) | (arrays[name] >= most)] if name in arrays else []
         if len(bad):
             raise InputError("points nowhere", file=path, field=f"model.{name}", value=int(bad[0]), allowed=f"< {most}")
@@ -82,6 +85,8 @@ def read_model(data: Mapping[str, Any], path: Path) -> tuple[Model, Parameters]:
         "contact_offsets": len(arrays["contacts"]), "contact_axes": len(arrays["contacts"]),
         "electrodes": len(arrays["creases"]) + len(arrays["bends"]),
     }  # fmt: skip
+    pads = 4 * len(arrays.get("pad_thickness", ()))
+    counts |= {n: pads for n in ("pad_triangles", "pad_weights", "pad_heights") if n in arrays}
     for name, count in counts.items():
         if len(arrays[name]) != count:
             raise InputError(

@@ -29,7 +29,7 @@ import pyarrow.parquet as pq
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError, unwritable
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import PADS, Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
@@ -45,7 +45,9 @@ MANIFEST, STATES, TABLES, REPLAY = "manifest.json", "states.npz", "tables", "rep
 _PACKAGES = ("origami-sim", "warp-lang", "numpy", "scipy", "rerun-sdk", "pyarrow")
 _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
-_MODEL = tuple(f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers"))
+_MODEL = tuple(
+    f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers", *PADS)
+)
 _REQUIRED = {
     "format": int,
     "scene": str,
@@ -258,6 +260,7 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
         "dt_reason": str(step),
         "time_step": {"limit": step.limit, "dt": step.dt, "node": step.node, "cause": step.cause},
         "energy_error": t.energy_error,
+        "crossing_pairs": t.crossings().tolist(),
         "wall": float(t.wall),
         "steps": t.state.step,
         "failures": [{"world": f.world, "time": f.time, "node": f.node, "cause": f.cause} for f in t.failures],
@@ -322,7 +325,7 @@ def _with_plain_names(model: Model) -> Model:
 def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
     out = {name: getattr(t, name) for name in _FRAMES}
     out |= {f"energies.{n}": v for n, v in t.energies.items()} | {f"work.{n}": v for n, v in t.work.items()}
-    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, "channels", "panels", "carriers")}
+    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, *PADS, "channels", "panels", "carriers")}
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
     for channel, signal in t.drive.signals.items():
         out |= {f"drive.{channel}.{n}": v for n in _SIGNAL if (v := getattr(signal, n)) is not None}
@@ -512,6 +515,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     given["channels"] = int(arrays.values.get("model.channels", 1))
     if "model.carriers" in arrays.values:  # runs with rigid panels have them
         given |= {"panels": str(arrays["model.panels"]), "carriers": arrays["model.carriers"]}
+    given |= {n: arrays[f"model.{n}"] for n in PADS if f"model.{n}" in arrays.values}
     model = _with_plain_names(Model(**given, effects=tuple(manifest["effects"]), names=manifest["names"]))
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:

@@ -10,6 +10,7 @@ from origami_sim.effects._effect import (
     DRIVES,
     FAMILIES,
     HINGES,
+    PAIRS,
     SHELLS,
     Effect,
     Memory,
@@ -19,8 +20,8 @@ from origami_sim.effects._effect import (
 from origami_sim.errors import InputError, nearest
 
 __all__ = [
-    "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "SHELLS", "Effect", "Memory", "Parameter",
-    "get", "scalar",
+    "CATALOGUE", "CONTACTS", "DISTORTIONS", "DRIVES", "FAMILIES", "HINGES", "PAIRS", "SHELLS", "Effect", "Memory",
+    "Parameter", "get", "scalar",
 ]  # fmt: skip
 
 

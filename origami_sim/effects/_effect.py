@@ -40,6 +40,11 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "coefficient": ("direction", "speed", "axis", "normal_load", "at", "dt"),
     # tangential force on the contact point; slip: its tangential displacement in this step
     "tangent": ("velocity", "slip", "normal", "normal_load", "coefficient", "dt"),
+    # parts of the surface that are near each other, a corner and a triangle or two edges: force between them, repulsion
+    # positive, and tangential force on the first of them; parameters are those of triangles, and a pair has their mean
+    # gap: distance less half of both thicknesses; velocity, slip: of the first against the second
+    "pair": ("gap", "rate", "dt"),
+    "rub": ("velocity", "slip", "normal", "normal_load", "dt"),
     # not forces: they change the drive that reaches the device, or what a tracker makes of its motion
     "drive": (),
     "measurement": (),
@@ -49,6 +54,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 HINGES = ("crease", "bend")
 SHELLS = ("membrane", "plate")
 CONTACTS = ("contact", "coefficient", "tangent")
+PAIRS = ("pair", "rub")
 DISTORTIONS = ("drive", "measurement")
 
 DRIVES = ("field", "gradient", "voltage", "temperature", "load", "time")
@@ -85,10 +91,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Memory:
-    """Extra state of a law, per entity and world: `size` numbers (3: passed as a vector), zero at the start."""
+    """Extra state of a law, per entity and world: `size` numbers (3: passed as a vector), zero at the start.
+
+    Args:
+        base: so many numbers more in each world, of a law whose pairs share the room.
+    """
 
     name: str
     size: int = 1
+    base: int = 0
 
 
 @dataclass(frozen=True)
@@ -204,7 +215,7 @@ class Effect:
     @property
     def dissipates(self) -> bool:
         """Whether it is a loss in a crease or in the air that goes with the rate and remembers nothing."""
-        return not (self.conservative or self.memory or self.drives or self.family in (*CONTACTS, *DISTORTIONS))
+        return not (self.conservative or self.memory or self.drives or self.family in (*CONTACTS, *PAIRS, *DISTORTIONS))
 
     @property
     def interacts(self) -> bool:

@@ -430,6 +430,7 @@ class _Search:
     def _factors(self, x: np.ndarray, alive: np.ndarray) -> tuple[list[Cholesky | Factor | None], np.ndarray]:
         """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
         y = self.system
+        y.follow(x)
         out: list[Cholesky | Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(alive):
@@ -446,8 +447,8 @@ class _Search:
 
     def _copies(self, w: int) -> Batch:
         """A batch of copies of a world, from whose differences its tangent comes."""
-        if w not in self._moved:
-            count = self.system.moves.shape[1]
+        count = self.system.moves.shape[1]
+        if w not in self._moved or self._moved[w].worlds != count:
             drive = self.drive.replace(**dict(zip(self.drive.signals, self.levels[:, w], strict=True)))
             threads = 1 if count * len(self.model.position) < THREADED else self.threads
             state = self.state.select(np.full(count, w))

@@ -14,7 +14,7 @@ from origami_sim.drive import CHANNELS, Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
-from origami_sim.solve import plates
+from origami_sim.solve import plates, skin
 from origami_sim.solve.compose import BITS, compose
 
 APART = 128
@@ -113,9 +113,8 @@ class Batch:
         hinges = np.concatenate([model.creases, model.bends]).reshape(-1, 4)
         buffer, layout = self._pack(parameters, drive)
         times, values = drive.samples()
-        sizes = [(e, m) for e in laws for m in e.memory]
-        rows = np.cumsum([0, *(m.size * model.count(e.family) for e, m in sizes)])
-        first = {(e.name, m.name): row for (e, m), row in zip(sizes, rows, strict=False)}
+        rows = np.cumsum([0, *(size for *_, size in model.memories)])
+        first = {(e, m): row for (e, m, _), row in zip(model.memories, rows, strict=False)}
         kept = [(e.name, m.name) for e in self.program.effects for m in e.memory]
         self._places = [self.program.effects.index(e) for e in laws]
         self._buffer = constant(buffer, wp.float64)
@@ -143,6 +142,8 @@ class Batch:
         if self.program.shells:
             moments = self._room(max(len(hinges), 1), dtype=wp.float64)
             self._constants.append(plates.upload(model, moments, self.device))
+        if self.program.touches:
+            self._constants.append(skin.upload(model, self._room, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)
         self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))
@@ -346,9 +347,7 @@ class Batch:
 
     def remembered(self) -> np.ndarray:
         """[M, W] what laws remember."""
-        m = self.model
-        rows = sum(d.size * m.count(get(e).family) for e in m.laws for d in get(e).memory)
-        return self._download(self._memory, rows)
+        return self._download(self._memory, sum(size for *_, size in self.model.memories))
 
     def status(self) -> np.ndarray:
         """[W] the step at which a world went unstable; -1: none."""
@@ -384,13 +383,13 @@ class Batch:
     def state(self) -> State:
         """The present state, copied to the host."""
         m = self.model
-        n, rows = len(m.position), sum(d.size * m.count(get(e).family) for e in m.laws for d in get(e).memory)
+        n = len(m.position)
         return State(
             x=self._download(self._x, n),
             v=self._download(self._v, n),
             a=self._download(self._a, n),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
-            memory=self._download(self._memory, rows),
+            memory=self.remembered(),
             work=self._download(self._work, len(self.program.effects))[self._places],
             power=self._download(self._power, len(self.program.effects))[self._places],
             step=self.step,

@@ -15,9 +15,10 @@ import numpy as np
 import warp as wp
 
 from origami_sim import kinematics, magnetostatics
-from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, SHELLS, Effect, get
-from origami_sim.solve import articulated, plates, runge_kutta, templates
+from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
+from origami_sim.solve import articulated, plates, runge_kutta, templates, touching
 from origami_sim.solve.compose_sheets import Sheets, Text
+from origami_sim.solve.compose_touch import Touching, pair_value
 from origami_sim.solve.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, ORIGIN, VOLTAGE = 0, 3, 12, 13, 14, 15
@@ -81,6 +82,11 @@ class Program:
         """Whether the kernels take the rows of curvature."""
         return any(e.family in SHELLS for e in self.effects)
 
+    @property
+    def touches(self) -> bool:
+        """Whether the kernels take the surface."""
+        return any(e.family in PAIRS for e in self.effects)
+
     @functools.cached_property
     def rollout(self) -> wp.Kernel:
         return self._kernel("rollout")
@@ -122,6 +128,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "articulated": articulated,
         "runge_kutta": runge_kutta,
         "shells": plates,
+        "touching": touching,
         "NATURAL": NATURAL,
     }
     for e in effects:
@@ -134,7 +141,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
     return scope[name]
 
 
-class _Composer(Sheets):
+class _Composer(Sheets, Touching):
     def __init__(self, effects: tuple[Effect, ...], shared: bool = False):
         self.effects, self.shared = effects, shared
         self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
@@ -167,6 +174,8 @@ class _Composer(Sheets):
             t(f"reach = {self.value('plane', 'reach', '0')}")
         for word in range(-(-len(self.effects) // BITS) if self.shared else 0):
             t(f"on{word} = active[{word}, w]")
+        if self.family("pair"):
+            t("pressed = int(-1)  # a node that is pressed too deep into the surface")
         return str(t)
 
     def channel(self, k: str) -> str:
@@ -182,7 +191,10 @@ class _Composer(Sheets):
             if name in own:
                 slot = self.index[effect.name, name]
                 table = own[name].knots > 1
-                given.append(f"o{slot} + {entity} * e{slot}" if table else self.value(effect.name, name, entity))
+                if effect.family in PAIRS:
+                    given.append(pair_value(*(self.value(effect.name, name, side) for side in ("ta", "tb"))))
+                else:
+                    given.append(f"o{slot} + {entity} * e{slot}" if table else self.value(effect.name, name, entity))
             elif name in memory:
                 given.append(f"{effect.name}_{name}")
             elif name == "buffer":
@@ -264,6 +276,7 @@ class _Composer(Sheets):
             self._sheets(t, mode)
         self._triangles(t, mode)
         self._contacts(t, mode)
+        self._pairs(t, mode)
         for i, e in enumerate(self.effects):
             if mode == "rollout" and e.exchanges_work:
                 with self.acting(t, e):
@@ -543,14 +556,15 @@ class _Composer(Sheets):
 
     def arguments(self) -> str:
         """What every kernel takes."""
-        return templates.arguments(bool(self.family(*SHELLS)))
+        return templates.arguments(bool(self.family(*SHELLS)), bool(self.family(*PAIRS)))
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
         mass = self.value("inertia", "total", "n")
+        halts = ["\n" + s for s in (templates.HALT, templates.HALT_RIGID)] if self.family("pair") else ["", ""]
         return {
-            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass),
-            "rigid": templates.RIGID.format(**given, body=self.body("rigid")),
+            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass, halt=halts[0]),
+            "rigid": templates.RIGID.format(**given, body=self.body("rigid"), halt=halts[1]),
             "evaluate": templates.EVALUATE.format(**given, body=self.body("evaluate")),
             "total": templates.TOTAL.format(**given, body=self.body("total")),
         }

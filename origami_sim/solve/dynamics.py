@@ -19,6 +19,7 @@ from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.implicit import TOLERANCE, Implicit
 from origami_sim.solve.rigid import TOLERANCE as RIGID
 from origami_sim.solve.rigid import batch_of
+from origami_sim.solve.skin import too_deep
 from origami_sim.solve.timestep import TimeStep, stable_step
 
 if TYPE_CHECKING:
@@ -106,6 +107,16 @@ class Trajectory:
         """[F, W, 3] [m]."""
         m = node_mass(self.model, self.parameters)[None, :, :, None]
         return (m * self.x).sum(1) / m.sum(1)
+
+    def crossings(self, frame: int = -1) -> np.ndarray:
+        """[W] pairs of triangles that pass through each other in a frame; of worlds that went unstable, 0."""
+        from origami_sim.folding.intersections import crossing_pairs  # only who asks waits for its imports
+
+        x = self.x[frame]
+        sound = np.all(np.isfinite(x), axis=(0, 2))
+        return np.array(
+            [len(crossing_pairs(x[:, w], self.model.triangles, 0.0)) if sound[w] else 0 for w in range(x.shape[1])]
+        )
 
     def energy_balance(self) -> np.ndarray:
         """Energy less the work that was fed in, [F, W] [J]; constant up to the integrator's error."""
@@ -277,7 +288,7 @@ def _simulated(
         Failure(w, time, int(n), cause)
         for w, (s, n) in enumerate(last.status.T)
         if s >= 0
-        for time, cause in [stopped.get(w) or (float(s * step), _cause(model, last, w, step, chosen))]
+        for time, cause in [stopped.get(w) or (float(s * step), _cause(model, parameters, last, w, step, chosen))]
     ]
     zero = np.zeros((len(model.position), last.worlds, 3))
     out = Trajectory(
@@ -339,7 +350,7 @@ def _accurate(
     return refined(run, accuracy, balanced=not implicit or options["spectral_radius"] == 1.0)
 
 
-def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) -> str:
+def _cause(model: Model, parameters: Parameters, state: State, world: int, dt: float, step: TimeStep) -> str:
     """Why a world failed: the most strained bar of the state in which it stopped."""
     x = state.x[:, world]
     now = np.linalg.norm(x[model.bars[:, 1]] - x[model.bars[:, 0]], axis=-1)
@@ -348,6 +359,8 @@ def _cause(model: Model, state: State, world: int, dt: float, step: TimeStep) ->
     margin = f"dt = {dt:.3g} s, limit {step.limit:.3g} s set by {step.cause} in the reference state"
     if not np.all(np.isfinite([x, state.v[:, world]])):
         return f"a position or a velocity is not a number ({margin})"
+    if "touch" in model.laws and (why := too_deep(model, parameters, x, world)):
+        return why
     if len(strain) and strain.max() > 0.05:
         worst = int(strain.argmax())
         return f"bar {worst} strained by {strain[worst]:.0%} ({margin}); take a smaller step or a smaller load"

@@ -213,11 +213,9 @@ class _World:
         self.free = self.system.free
         self.mass = np.broadcast_to(node_mass(model, parameters), (len(model.position), 1))
         self._ends = _Copies(model, parameters, drive, state, scheme, np.arange(3), 1)
-        self._colours = self.system._colours
-        self._steps = DIFFERENCE / STEP * self.system._steps
-        self._shape = (len(model.position), 2, int(self._colours.max(initial=0)) + 1, 3, 2, 3)
-        which = np.repeat([0, 1], math.prod(self._shape[2:5]))
-        self._moved = _Copies(model, parameters, drive, state, scheme, which, threads)
+        self._inputs = model, parameters, drive, state, scheme
+        self._threads = threads
+        self._couple()
         self._slopes: sp.csc_array | None = None
         self._factors, self._factored, self._scale = None, 0.0, 0.0
         self._past: list[tuple[float, np.ndarray]] = []
@@ -228,6 +226,13 @@ class _World:
         self.now = _Motion(
             time, s.x[:, 0], s.v[:, 0], a, s.angles[:, 0], s.memory[:, 0], s.work[:, 0], a * self.mass, s.power[:, 0]
         )
+
+    def _couple(self):
+        """Copies of the world, moved as the system's couplings ask."""
+        self._colours = self.system._colours
+        self._steps = DIFFERENCE / STEP * self.system._steps
+        self._shape = (len(self.model.position), 2, int(self._colours.max(initial=0)) + 1, 3, 2, 3)
+        self._moved = _Copies(*self._inputs, np.repeat([0, 1], math.prod(self._shape[2:5])), self._threads)
 
     # --- one step
 
@@ -256,6 +261,9 @@ class _World:
     def _difference(self, u: np.ndarray, h: float):
         """Renews the slopes -dF/du of the averaged force."""
         s, n, k = self.scheme, len(u), self.system
+        k.follow((self.now.x + u)[:, None])
+        if k._colours is not self._colours:
+            self._couple()
         moved = np.flatnonzero(self._colours >= 0)
         moves = np.zeros(self._shape)
         for axis in range(3):

@@ -6,6 +6,7 @@ from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import Topology
+from origami_sim.solve.skin import clear_share
 
 STEP = 1e-5
 """Change of a coordinate [rad] for central differences of the moments: rounding and curvature both below 1e-9."""
@@ -32,7 +33,7 @@ class RigidSystem:
     """
 
     def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State):
-        self.model, self.state = model, state
+        self.model, self.parameters, self.state = model, parameters, state
         self.tree = t = Topology(model)
         self.x = state.x[:, 0]
         self.size = float(np.ptp(self.x, axis=0).max(initial=0.0)) or 1.0
@@ -105,7 +106,8 @@ class RigidSystem:
             new = self._stepped(q, step, time)
             for _ in range(30):
                 # along the way the moment must not have turned against the step by half of what it was
-                if new is not None and (unstable or history[-1] <= target or self._ahead(new, step, work)):
+                ahead = unstable or history[-1] <= target
+                if new is not None and (ahead or self._ahead(new, step, work)) and self._clear(x, new[4]):
                     break
                 step = 0.5 * step
                 work *= 0.5
@@ -141,6 +143,10 @@ class RigidSystem:
             "reactions": np.full_like(x, np.nan),
             "message": message,
         }
+
+    def _clear(self, x: np.ndarray, new: np.ndarray) -> bool:
+        """Whether panels that touch come from positions x [N, 3] to new ones without passing through each other."""
+        return clear_share(self.model, self.parameters, x, new - x) >= 1.0
 
     @staticmethod
     def _ahead(new: tuple, step: np.ndarray, work: float) -> bool:

@@ -21,6 +21,7 @@ from origami_sim.solve.batch import Batch, Evaluation
 from origami_sim.solve.rigid import Topology
 from origami_sim.solve.rigid_statics import NEUTRAL, closed, loops_kept
 from origami_sim.solve.rigid_statics import STEP as TURN
+from origami_sim.solve.skin import clear_share
 from origami_sim.solve.statics import equilibrium
 from origami_sim.solve.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
 
@@ -168,9 +169,11 @@ class Settling(ABC):
                 large = np.abs(s).max(axis=0, initial=0.0)
                 going &= large < 0.5 * before  # else a new tangent serves better; false for nan
                 before = large
-                far = going & (large > self.far * self.size)
+                share = np.minimum(_over(np.full_like(large, self.far * self.size), large), 1.0)
+                share = self._clear(x, s * share, going) * np.where(large > 0, share, 1.0)
+                far = going & (share < 1.0)
                 if np.any(far):  # no further than this without a new tangent
-                    x = self._moved(x, np.where(far, s * _over(np.full_like(large, self.far * self.size), large), 0.0))
+                    x = self._moved(x, np.where(far, s * share, 0.0))
                     going &= ~far
                 x = self._moved(x, np.where(going, s, 0.0))
                 close = going & (large < CLOSE * self.size)
@@ -208,12 +211,21 @@ class Settling(ABC):
 
     def _copies(self, w: int, count: int) -> Held:
         """Copies of a world, from whose differences its tangent comes."""
-        if w not in self._copied:
+        if w not in self._copied or self._copied[w].batch.worlds != count:
             threads = 1 if count * len(self.model.position) < THREADED else self.threads
             drive, state = per_world(self.drive, self.levels[:, [w]]), self.start.select(np.full(count, w))
             self._copied[w] = Held(self.model, self.worlds[w][1], drive, state, among=self.among, threads=threads)
         self._copied[w].batch.hold(self.levels[:, [w]])
         return self._copied[w]
+
+    def _clear(self, x: np.ndarray, s: np.ndarray, going: np.ndarray) -> np.ndarray:
+        """[W] share of a change s [m, W] of the coordinates on which panels do not pass through each other."""
+        share = np.ones(len(going))
+        if "touch" in self.model.laws:
+            moved = self._moved(x, np.where(going, s, 0.0))
+            for w in np.flatnonzero(going & np.all(np.isfinite(s), axis=0)):
+                share[w] = clear_share(self.model, self.worlds[int(w)][1], x[:, w], moved[:, w] - x[:, w])
+        return share
 
     @property
     @abstractmethod
@@ -256,6 +268,7 @@ class SettlingBars(Settling):
 
     def _factors(self, x, wanted):
         y = self.system
+        y.follow(x)
         count = y.moves.shape[1]
         out: list[Cholesky | Factor | None] = [None] * x.shape[1]
         stable = np.zeros(x.shape[1], bool)

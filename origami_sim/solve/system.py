@@ -17,9 +17,10 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 
 from origami_sim import curvature
 from origami_sim.drive import Drive
-from origami_sim.effects import CONTACTS, get
+from origami_sim.effects import CONTACTS, PAIRS, get
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.skin import clear_share, near_pairs, surface
 from origami_sim.solve.timestep import gradient_norms
 
 STEP = 2e-4
@@ -47,6 +48,16 @@ THREADED = 20000
 
 SKEW = 1e-8
 """Share of the largest stiffness up to which a tangent counts as symmetric."""
+
+
+TOUCHING = 1e-4
+"""Largest step of the differences over the distance at which parts touch: what touches must not part within it."""
+
+
+def _every_two(groups: np.ndarray) -> np.ndarray:
+    """Every two nodes [2, P] of each group [G, k], each with itself."""
+    g = np.asarray(groups, np.int64)
+    return np.stack(np.broadcast_arrays(g[:, :, None], g[:, None, :])).reshape(2, -1)
 
 
 @dataclass
@@ -163,15 +174,32 @@ class System:
         self.model, self.state = model, resting(state, state.x[:, 0], state.angles[:, 0])
         self.free = np.flatnonzero(model.free.ravel())
         self._one = Batch(model, parameters, drive, self.state)
-        n = len(model.position)
-        rows, columns = self._couplings()
-        self._rows, self._columns = rows, columns
-        apart = rows < columns
-        self.edges = np.stack([rows[apart], columns[apart]], axis=1)
+        self._inputs = parameters, drive
+        self._bound = self._couplings()
+        apart = self._bound[0] < self._bound[1]
+        self.edges = self._bound[:, apart].T
         lengths = np.linalg.norm(np.diff(model.position[self.edges], axis=1)[:, 0], axis=-1)
         self.size = float(np.linalg.norm(np.ptp(model.position, axis=0))) or 1.0
         self.length = float(np.median(lengths[lengths > 0])) if np.any(lengths > 0) else self.size
-        self._steps = STEP * self._smallest(lengths)
+        self._finest = STEP * self._smallest(lengths)
+        self.touches = bool({get(e).family for e in model.laws} & set(PAIRS))
+        self.couple(self.state.x)
+
+    def couple(self, x: np.ndarray):
+        """Finds the couplings and the moves whose differences give the tangent, at positions x [N, W, 3] [m].
+
+        Nodes of pairs that are about to touch are coupled as well; `follow` renews them.
+        """
+        model, (parameters, drive), n = self.model, self._inputs, len(self.model.position)
+        self._steps, pairs = self._finest, [self._bound]
+        if self.touches:
+            self._margin, self._coupled = surface(model).margin, x.copy()
+            for w in range(x.shape[1]):
+                near = near_pairs(model, parameters, x[:, w], margin=self._margin)
+                pairs.append(_every_two(near.nodes))
+                self._steps = np.minimum(self._steps, TOUCHING * near.offset.min(initial=np.inf))
+        rows, columns = np.unique(np.concatenate(pairs, axis=1), axis=1)
+        self._rows, self._columns = rows, columns
         self._colours = self._colour(n)
         worlds = 3 * (self._colours.max(initial=0) + 1) * len(STENCIL)
         tiled = self.state.select(np.zeros(worlds, int))
@@ -189,6 +217,11 @@ class System:
         numbered = sp.csr_array((np.arange(1.0, len(self._row) + 1), (self._row, self._column)), shape=(3 * n, 3 * n))
         kept = sp.csc_array(numbered[self.free][:, self.free])
         self._pattern = kept.data.astype(int) - 1, kept.indices, kept.indptr
+
+    def follow(self, x: np.ndarray):
+        """Renews what positions x [N, W, 3] couple, if any node has moved so far that other parts may touch."""
+        if self.touches and (x.shape != self._coupled.shape or np.abs(x - self._coupled).max() > 0.25 * self._margin):
+            self.couple(x)
 
     # --- forces
 
@@ -209,8 +242,8 @@ class System:
 
     # --- tangent
 
-    def _couplings(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the pairs of nodes of which one feels the other, each node with itself."""
+    def _couplings(self) -> np.ndarray:
+        """Rows and columns [2, P] of nodes of which one feels the other wherever they are, each node with itself."""
         m, families = self.model, {get(e).family for e in self.model.laws}
         groups = [np.arange(len(m.position))[:, None]]
         for family, elements in (("bar", m.bars), ("crease", m.creases), ("bend", m.bends), ("triangle", m.triangles)):
@@ -224,9 +257,7 @@ class System:
             groups.append(m.contacts)
         if any(get(e).interacts for e in m.laws):
             groups.append(np.unique(m.triangles[self._one.magnets >= 0])[None])
-        pairs = [np.stack(np.broadcast_arrays(g[:, :, None], g[:, None, :])).reshape(2, -1) for g in groups]
-        both = np.unique(np.concatenate(pairs, axis=1).astype(np.int64), axis=1)
-        return both[0], both[1]
+        return np.unique(np.concatenate([_every_two(g) for g in groups], axis=1), axis=1)
 
     def _smallest(self, lengths: np.ndarray) -> np.ndarray:
         """Smallest edge or height of the elements at each node [N] [m]."""
@@ -258,6 +289,7 @@ class System:
     def tangent(self, x: np.ndarray, angles: np.ndarray, time: float) -> sp.csr_array:
         """K = -dF/dx [3 N, 3 N] [N/m]."""
         n = len(x)
+        self.follow(x[:, None])
         self._many.place(x[:, None] + self.moves, np.repeat(angles[:, None], self.moves.shape[1], axis=1))
         blocks = self._blocks(self._many.total_force(time))
         k = sp.csr_array((blocks.ravel(), (self._row, self._column)), shape=(3 * n, 3 * n))
@@ -319,11 +351,16 @@ class System:
     # --- equilibrium
 
     def reach(self, x: np.ndarray, d: np.ndarray) -> float:
-        """Largest share of a move d [N, 3] that turns and strains no element by more than a half."""
+        """Largest share of a move d [N, 3] that turns and strains no element by half, nor passes panels through."""
         apart = np.linalg.norm(x[self.edges[:, 1]] - x[self.edges[:, 0]], axis=-1)
         change = np.linalg.norm(d[self.edges[:, 1]] - d[self.edges[:, 0]], axis=-1)
         share = min(1.0, float(np.min(0.5 * apart / np.maximum(change, 1e-300), initial=1.0)))
-        return min(share, self.size / max(float(np.linalg.norm(d, axis=-1).max()), 1e-300))
+        share = min(share, self.size / max(float(np.linalg.norm(d, axis=-1).max()), 1e-300))
+        return share * self.clear(x, share * d)
+
+    def clear(self, x: np.ndarray, d: np.ndarray) -> float:
+        """Largest share of a move d [N, 3] from x [N, 3] on which panels come no nearer than they may."""
+        return clear_share(self.model, self._inputs[0], x, d) if self.touches else 1.0
 
     def spread(self, p: np.ndarray) -> np.ndarray:
         """A vector on the free axes as [N, 3]."""

@@ -8,15 +8,25 @@ _ARGUMENTS = """
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
     series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{plates}
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{plates}{skin}
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
 """
 
 
-def arguments(shells: bool) -> str:
-    """Arguments that all kernels begin with; those of sheets have the rows of curvature among them."""
-    return _ARGUMENTS.format(plates="\n    plates: shells.Plates," if shells else "")
+HALT = """        if pressed >= 0 and limit < scalar(wp.inf):  # without a limit nothing stops a world
+            fastest = pressed"""
+
+HALT_RIGID = """        if pressed >= 0:
+            status[0, w] = first_step + s + 1
+            status[1, w] = pressed"""
+
+
+def arguments(shells: bool, touches: bool) -> str:
+    """Arguments that all kernels begin with; rows of curvature of sheets, the surface of what touches among them."""
+    return _ARGUMENTS.format(
+        plates="\n    plates: shells.Plates," if shells else "", skin="\n    skin: touching.Skin," if touches else ""
+    )
 
 
 ROLLOUT = """
@@ -69,7 +79,7 @@ def rollout({arguments}
             speed = wp.dot(V[n, w], V[n, w])
             if not (speed <= limit):  # also true for nan
                 fastest = n
-                limit = wp.max(speed, limit)  # so that the fastest is named
+                limit = wp.max(speed, limit)  # so that the fastest is named{halt}
         if fastest >= 0:
             status[0, w] = start + s + 1
             status[1, w] = fastest
@@ -177,7 +187,7 @@ def rigid({arguments}
             if longer < finest:
                 status[0, w] = first_step + s + 1
                 status[1, w] = runge_kutta.fastest(V, w)
-                going = int(0)
+                going = int(0){halt}
         if status[0, w] >= 0:
             break
         if s >= 0 and every > 0:

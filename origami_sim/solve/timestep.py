@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from origami_sim import curvature
-from origami_sim.effects import CONTACTS, HINGES, Effect, get
+from origami_sim.effects import CONTACTS, HINGES, PAIRS, Effect, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, node_mass
 
@@ -18,6 +18,14 @@ RIGID = "rigid panels"
 
 AT_REST = "equilibria along time"
 """Likewise, of a quasi-static motion."""
+
+CROWD = 8.0 / 3.0
+"""Square of what stands for the gradients of all pairs that touch at once at a corner of a triangle.
+
+Six triangles meet at a node inside a mesh, and 48 times a pair's stiffness is what can push it: on both of its sides
+twelve pairs of a corner with the triangles around another corner. Half of it suffices for sheets that touch on one
+side only.
+"""
 
 SCALINGS, SETTLED = 20, 0.01
 """Scalings of the nodes that are tried at most for a closer bound; relative gain below which there are enough."""
@@ -72,6 +80,8 @@ def gradient_norms(model: Model, family: str) -> tuple[np.ndarray, np.ndarray]:
         return model.triangles, np.stack([np.linalg.norm(s, axis=-1) / twice for s in (c - b, a - c, b - a)], axis=1)
     if family == "plate":
         return _plate_norms(model)
+    if family in PAIRS:
+        return model.triangles, np.full(model.triangles.shape, np.sqrt(CROWD))
     if family in CONTACTS:
         a, b, c = (x[model.contacts[:, i]] for i in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=-1)

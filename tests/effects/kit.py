@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from origami_sim.effects import CATALOGUE, DISTORTIONS, SHELLS
+from origami_sim.effects import CATALOGUE, DISTORTIONS, PAIRS, SHELLS
 from origami_sim.model import Model, Parameters, State
 
 ALL = tuple(n for n, e in CATALOGUE.items() if e.family not in DISTORTIONS)
 """Every effect that acts as a force."""
 
-INTERNAL = ("bar", "crease", "bend", *SHELLS)
+INTERNAL = ("bar", "crease", "bend", *SHELLS, *PAIRS)
 """Families whose forces act between nodes: no net force, no net torque."""
 
 

@@ -11,7 +11,7 @@ from effects.kit import ALL, INTERNAL, hinge_positions, make_model, quiet, rando
 
 import origami_sim.effects
 from origami_sim.drive import Drive
-from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES, SHELLS
+from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES, PAIRS, SHELLS
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, node_mass
 from origami_sim.solve.batch import Batch
@@ -22,7 +22,7 @@ ACT_BY_DEFAULT = {"gravity", "ground"}
 """Effects that do something as soon as they are switched on; all others wait for a parameter."""
 
 RATE_LAWS = {"coefficient", "damping", "decay_rate", "drag_coefficient", "film", "fading_speed", "impact_damping"}
-RATE_LAWS |= {"missing_moment", "viscosity"}
+RATE_LAWS |= {"loss_time", "missing_moment", "viscosity"}
 """Parameters that, at zero or at their default, make a law blind to rates."""
 
 EPS = 1e-6
@@ -99,6 +99,11 @@ def setting(name, kind="random", seed=0):
     parameters = quiet(model)
     give(parameters, model, name, rng)
     parameters.set("inertia", "mass", rng.uniform(0.5, 1.5, len(model.position)))
+    if CATALOGUE[name].family in PAIRS:
+        if kind == "folded":  # layers in one plane have no direction in which to part
+            state.x[:, :, 2] += 0.02 * np.arange(len(state.x))[:, None]
+        if CATALOGUE[name].family == "rub":  # needs a load
+            parameters.set("touch", "stiffness", 700.0).set("touch", "thickness", 1.0)
     if CATALOGUE[name].family in CONTACTS:
         on_ground(parameters, model, state, 2e-5 if seed % 2 else -1e-5)
         if CATALOGUE[name].family != "contact":  # friction needs a load, and coefficients need friction
@@ -333,6 +338,14 @@ def test_declared_stiffness_bounds_the_slope_of_the_force(name):
         model = make_model(np.zeros((4, 3)), **{effect.family + "s": [(0, 1, 2, 3)]})
         angles = q = np.linspace(-1.1 * math.pi, 1.1 * math.pi, 4001)
         x = np.stack([hinge_positions(a, (0.5, 1.0), (0.5, 1.0)) for a in q], axis=1)
+    elif effect.family in PAIRS:  # a corner of another body over a triangle
+        gap = None
+        x = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0], [0.3, 0.3, 2], [0.4, 0.3, 2]]
+        model = make_model(x, triangles=[(0, 1, 2), (3, 4, 5)])
+        q = np.linspace(0.05, 0.15, 401)
+        x = np.repeat(model.position[:, None], len(q), 1)
+        x[3, :, 2] = q
+        angles = None
     else:
         gap = q = np.linspace(-1e-4, 1e-4, 401)
         model = make_model([[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles=[(0, 1, 2)], contacts=[(0, 1, 2)])
@@ -341,11 +354,13 @@ def test_declared_stiffness_bounds_the_slope_of_the_force(name):
         angles = None
     parameters = quiet(model, {("plane", "reach"): 1.0})
     give(parameters, model, name, np.random.default_rng(2))
+    if effect.family in PAIRS:
+        parameters.set("touch", "thickness", 0.1)
     state = start(model, len(q), x=x)
     if angles is not None:
         state.angles[0] = angles
     f = Batch(model, parameters, the_drive(), state).evaluate(NOW).forces[name]
-    along = f[0, :, 0] if effect.family == "bar" else f[0, :, 2]
+    along = f[0, :, 0] if effect.family == "bar" else f[3 if effect.family in PAIRS else 0, :, 2]
     if angles is not None:  # the node l turns about a lever of one
         along = -f[3, :, 1] * np.sin(q) + f[3, :, 2] * np.cos(q)
     steepest = np.abs(np.diff(along) / np.diff(q)).max()

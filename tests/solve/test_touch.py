@@ -1,0 +1,275 @@
+"""Panels that touch: stacks, closed folds, rolls, what is kept and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from effects.kit import random_rotation
+
+from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, simulate, strip
+from origami_sim import sheet as mesh
+from origami_sim.errors import InputError
+from origami_sim.materials import G
+from origami_sim.model import State, node_mass
+from origami_sim.results import load_run, save_run
+
+MM = 1e-3
+SMALL = [(0, 0), (20, 0), (20, 16), (0, 16)]
+LARGE = [(-28, -26), (48, -26), (48, 42), (-28, 42)]
+
+
+def made(pattern, *, thickness=1 * MM, stiffness=2e-3, rest_angle=None, loss_time=0.0, gravity=(0, 0, 0), held=(),
+         touch=True, membrane_damping=0.02, **options):  # fmt: skip
+    """A sheet with one set of effects, so that all tests share their kernels."""
+    s = Sheet(pattern, thickness=thickness, triangulation="center", membrane_damping=membrane_damping)
+    s.on("bar_viscosity", "panel_bending", "crease", "crease_drive").gravity(gravity).touch(**options).fix(panels=held)
+    s.crease(stiffness=stiffness, rest_angle=rest_angle, loss_time=loss_time)
+    model, parameters = s.build()
+    if not touch:
+        parameters.set("touch", "stiffness", 0.0)
+    return model, parameters
+
+
+def plates(*heights, sizes=None):
+    """Rectangles at these heights [mm], the first of them large unless `sizes` says otherwise."""
+    sizes = sizes or [LARGE, *[SMALL] * (len(heights) - 1)]
+    corners = [(x + 0.7 * k, y + 0.4 * k, z) for k, (z, c) in enumerate(zip(heights, sizes, strict=True)) for x, y in c]
+    return mesh(np.array(corners) * MM, [tuple(range(4 * k, 4 * k + 4)) for k in range(len(heights))])
+
+
+def of_panel(model, p):
+    return np.unique(model.triangles[model.triangle_panel == p])
+
+
+def apart(model, parameters, x):
+    """Least distance of two triangles of different panels that share no node, by points spread over both [m]."""
+    share = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
+    points = np.einsum("sc,tca->tsa", share, x[model.triangles])
+    least = np.inf
+    for a in range(len(points)):
+        for b in range(a + 1, len(points)):
+            if not set(model.triangles[a]) & set(model.triangles[b]):
+                least = min(least, np.linalg.norm(points[a][:, None] - points[b], axis=-1).min())
+    return float(least)
+
+
+@pytest.mark.parametrize("ratio", [0.85, 1.15])
+def test_a_plate_that_falls_on_a_plate_sticks_below_the_friction_angle_and_slides_above_it(ratio):
+    mu = 0.5
+    tilt = math.atan(ratio * mu)
+    g = (G * math.sin(tilt), 0, -G * math.cos(tilt))
+    model, parameters = made(plates(0, 1.3), gravity=g, held=[0], friction=mu)
+    run = simulate(model, parameters, duration=0.08, rate=200)
+    assert not run.failures
+    x = run.x[:, of_panel(model, 1), 0].mean(axis=1)
+    pressed = 0.3e-3 - (x[0, 2] - x[-1, 2])
+    assert -0.02 * MM < pressed < 0.0 + 1e-9  # it rests on the other's surface
+    speed = (x[-1, 0] - x[-2, 0]) * 200
+    if ratio < 1:
+        assert abs(speed) < 1e-7  # true stick: no creep
+    else:
+        expected = G * (math.sin(tilt) - mu * math.cos(tilt))
+        v = np.diff(x[:, 0]) * 200
+        assert (v[-1] - v[-9]) * 25 == pytest.approx(expected, rel=0.03)
+
+
+def test_a_stack_of_plates_comes_to_rest_on_each_other():
+    model, parameters = made(plates(0, 1.2, 2.4), gravity=(0, 0, -G), held=[0])
+    run = simulate(model, parameters, duration=0.06, rate=100)
+    heights = [run.x[-1, of_panel(model, p), 0, 2] for p in range(3)]
+    for p, h in enumerate(heights):
+        assert h == pytest.approx(p * MM, abs=0.01 * MM)
+    assert np.abs(run.v[-1]).max() < 1e-4
+    assert run.crossings() == [0]
+
+
+def flying():
+    """Two plates that meet at an angle, edges and corners first, without anything that loses energy."""
+    model, parameters = made(
+        plates(0, 2.0, sizes=[SMALL, SMALL]), membrane_damping=0.0, friction=0.0, damping_ratio=0.0
+    )
+    state = State.at_rest(model)
+    upper = of_panel(model, 1)
+    x = state.x[upper, 0] - state.x[upper, 0].mean(axis=0)
+    a, b = 0.3, 0.5
+    turn = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
+    turn = turn @ np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+    state.x[upper, 0] = x @ turn.T + np.array([12, 10, 9.0]) * MM
+    state.v[upper, 0] = np.array([0.05, 0.02, -0.4]) + np.cross([3.0, -2.0, 5.0], state.x[upper, 0] - 0.01)
+    return model, parameters, state
+
+
+def test_energy_and_momentum_are_kept_where_nothing_is_lost():
+    model, parameters, state = flying()
+    mass = node_mass(model, parameters)
+    errors = []
+    for finer in (1, 2):
+        run = simulate(model, parameters, duration=0.03, rate=100, state=state, dt=4e-6 / finer)
+        m, x, v = mass[:, :, None], run.x, run.v
+        assert np.ptp(v[:, of_panel(model, 0), 0, 2].mean(axis=1)) > 0.05  # they met
+        impulse, spin = (m * v).sum(axis=1)[:, 0], (m * np.cross(x, v)).sum(axis=1)[:, 0]
+        assert np.ptp(impulse, axis=0).max() < 1e-12 * np.abs(m * v).sum()
+        assert np.ptp(spin, axis=0).max() < 1e-12 * np.abs(m * np.cross(x, v)).sum()
+        total = run.energies["kinetic"] + sum(run.energies[n] for n in ("bars", "panel_bending", "touch"))
+        errors.append(np.ptp(total) / run.energies["kinetic"].max())
+    assert errors[0] < 2e-3
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_friction_between_bodies_keeps_momentum_and_turns_with_them():
+    model, parameters, state = flying()
+    parameters.set("touch_friction", "friction_coefficient", 0.6)
+    r = random_rotation(np.random.default_rng(3))
+    turned = state.copy()
+    turned.x, turned.v = state.x @ r.T, state.v @ r.T
+    run, other = (simulate(model, parameters, duration=0.03, rate=100, state=s, dt=1e-5) for s in (state, turned))
+    m = node_mass(model, parameters)[:, :, None]
+    spin = (m * np.cross(run.x, run.v)).sum(axis=1)[:, 0]
+    assert run.work["touch_friction"].min() < -1e-8
+    assert np.ptp(spin, axis=0).max() < 1e-11 * np.abs(m * np.cross(run.x, run.v)).sum()
+    assert np.abs(run.x @ r.T - other.x).max() < 1e-9
+    assert run.energy_error[0] < 1e-3
+
+
+def test_worlds_do_not_depend_on_the_batch_and_a_run_may_be_continued():
+    model, parameters, state = flying()
+    parameters.set("touch_friction", "friction_coefficient", np.array([[0.0, 0.6]] * len(model.triangles)))
+    both = simulate(model, parameters, duration=0.02, rate=100, state=state.select(np.zeros(2, int)), dt=4e-6)
+    alone = simulate(model, parameters.world(1), duration=0.02, rate=100, state=state, dt=4e-6)
+    assert np.array_equal(both.x[:, :, 1], alone.x[:, :, 0])
+    assert np.abs(both.x[-1, :, 0] - both.x[-1, :, 1]).max() > 1e-5
+    half = simulate(model, parameters.world(1), duration=0.01, rate=100, state=state, dt=4e-6)
+    rest = simulate(model, parameters.world(1), duration=0.01, rate=100, state=half.state, dt=4e-6)
+    assert np.array_equal(rest.x[-1], alone.x[-1])
+
+
+def test_nothing_changes_where_nothing_touches():
+    model, parameters, _ = flying()
+    bare = model.with_effects(without=("touch", "touch_friction"))
+    runs = [
+        simulate(m, p, duration=0.01, rate=100, dt=4e-6, state=State.at_rest(m))
+        for m, p in ((model, parameters), (bare, parameters.for_model(bare)))
+    ]
+    assert np.array_equal(runs[0].x, runs[1].x)
+    assert not np.any(runs[0].work["touch"])
+
+
+def rolled(touch):
+    """A strip of twelve panels whose creases ask for 540 degrees together."""
+    model, parameters = made(
+        strip([8 * MM] * 12, 10 * MM), thickness=0.5 * MM, stiffness=2e-3, rest_angle=math.radians(540 / 11),
+        loss_time=20e-3, held=[11], touch=touch,
+    )  # fmt: skip
+    return simulate(model, parameters, duration=0.18, rate=50)
+
+
+def test_a_strip_that_rolls_up_by_540_degrees_does_not_pass_itself():
+    free, run = rolled(False), rolled(True)
+    frames = range(len(run.times))
+    assert any(free.crossings(f)[0] for f in frames)
+    assert not run.failures
+    assert not any(run.crossings(f)[0] for f in frames)
+    assert run.work["touch"].min() < 0
+    assert np.degrees(run.creases[-1, :, 0].sum()) > 500
+    assert apart(run.model, run.parameters, run.x[-1, :, 0]) > 0.4 * MM
+
+
+def folded_miura(touch=True):
+    cell = miura(1, 1, 12 * MM, 12 * MM, math.radians(60), fold_angle=math.radians(60))
+    model, parameters = made(cell, thickness=0.8 * MM, stiffness=5e-5, loss_time=20e-3, touch=touch)
+    sign = np.sign(parameters["crease", "rest_angle"])
+    parameters.set("crease", "rest_angle", sign * math.radians(179))
+    return simulate(model, parameters, duration=0.2, rate=50)
+
+
+def test_a_miura_that_folds_flat_stops_at_its_thickness():
+    run, free = folded_miura(), folded_miura(False)
+    assert not run.failures
+    assert run.crossings() == [0]
+    least = apart(run.model, run.parameters, run.x[-1, :, 0])
+    assert 0.72 * MM < least < 0.85 * MM
+    assert apart(free.model, free.parameters, free.x[-1, :, 0]) < 0.4 * MM
+
+
+def patched():
+    """Two panels with patches on their inner side, 1.2 mm apart across the crease, which is turned shut."""
+    s = Sheet(strip([10 * MM, 10 * MM], 12 * MM), thickness=1 * MM, triangulation="center")
+    for panel in (0, 1):
+        s.patch(panel, thickness=1.6 * MM, size=(8.8 * MM, 10 * MM))
+    s.on("bar_viscosity", "panel_bending", "crease", "crease_drive").gravity((0, 0, 0)).touch(friction=0.0)
+    s.fix(panels=[0]).crease(stiffness=1e-5, loss_time=8e-3)
+    s.set("crease_drive", drive_stiffness=1e-5, target_angle=3.1)
+    return s.build()
+
+
+def closed_form(gap, height, thickness):
+    """Fold at which the rounded borders of two patches meet [rad]."""
+    across, up = 0.5 * (gap + thickness), 0.5 * (height + thickness)
+    return 2 * (math.acos(0.5 * thickness / math.hypot(across, up)) - math.atan2(up, across))
+
+
+def test_patches_inside_a_fold_close_to_their_stop(tmp_path):
+    expected = closed_form(1.2 * MM, 1 * MM, 1.6 * MM)
+    model, parameters = patched()
+    slow = quasistatic(model, parameters, Drive(load=ramp(1.0, 1.0)), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert not slow.failures
+    assert slow.creases[-1, 0, 0] == pytest.approx(expected, abs=0.01)
+    run = simulate(model, parameters, Drive(load=1.0), duration=0.02, rate=100, state=slow.state)
+    assert run.creases[-1, 0, 0] == pytest.approx(slow.creases[-1, 0, 0], abs=1e-6)
+    again = load_run(save_run(tmp_path / "run", run, scene="patches", replay=False).path).trajectory.model
+    assert again.hash == model.hash
+    assert np.array_equal(again.pad_weights, model.pad_weights)
+
+
+def letter():
+    """A panel on which two flaps are turned shut by a load factor of 1."""
+    model, parameters = made(strip([9 * MM, 21 * MM, 8 * MM], 12 * MM), stiffness=1e-4, held=[1], friction=0.0,
+                             loss_time=4e-3)  # fmt: skip
+    return model, parameters.set("crease_drive", "drive_stiffness", 1e-4).set(
+        "crease_drive", "target_angle", np.array([3.05, 3.14])
+    )
+
+
+def test_dynamics_statics_and_slow_motions_rest_on_the_same_contact():
+    model, parameters = letter()
+    slow = quasistatic(model, parameters, Drive(load=ramp(1.0, 1.0)), np.linspace(0.0, 1.0, 11))
+    assert not slow.failures
+    assert slow.crossings() == [0]
+    end = slow.x[-1, :, 0]
+    assert 0.85 * MM < apart(model, parameters, end) < MM
+    found = equilibrium(model, parameters, Drive(load=1.0), state=slow.state)
+    assert found.converged and found.stable
+    assert np.abs(found.x - end).max() < 1e-7
+    run = simulate(model, parameters, Drive(load=1.0), duration=0.3, rate=10, state=slow.state)
+    assert np.abs(run.x[-1, :, 0] - end).max() < 1e-6
+
+
+@pytest.mark.slow
+def test_implicit_steps_come_to_rest_on_the_same_contact():
+    model, parameters = letter()
+    drive = Drive(load=ramp(1.0, 0.2))
+    runs = [
+        simulate(model, parameters, drive, duration=0.5, rate=10, **how)
+        for how in ({}, {"method": "implicit", "spectral_radius": 0.5})
+    ]
+    assert np.abs(runs[0].x[-1] - runs[1].x[-1]).max() < 1e-6
+
+
+def test_what_is_pressed_through_stops_the_world_with_a_reason():
+    model, parameters = made(plates(0, 1.05), gravity=(0, 0, -G), held=[0])
+    parameters.set("touch", "stiffness", 1e-3)
+    run = simulate(model, parameters, duration=0.1, rate=20)
+    assert len(run.failures) == 1
+    assert "panel 0 and panel 1 are pressed" in str(run.failures[0])
+    assert "stiffer" in str(run.failures[0])
+
+
+def test_bad_input_is_refused_in_a_sentence():
+    with pytest.raises(InputError, match="thickness cannot touch"):
+        Sheet(plates(0, 2), thickness=1 * MM).touch(thickness=0.0)
+    with pytest.raises(InputError, match=r"not negative.*friction"):
+        Sheet(plates(0, 2), thickness=1 * MM).touch(friction=-1.0)
+    with pytest.raises(InputError, match=r"panel 0 and panel 1 lie 0\.4 mm inside each other at the start"):
+        made(plates(0, 0.6))
+    with pytest.raises(InputError, match="panel 0 and panel 1 overlap at the start"):
+        made(plates(0, 0))
