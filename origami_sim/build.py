@@ -145,6 +145,53 @@ class Sheet(Grounds, Electrodes):
             self.on("crease_viscosity")
         return self
 
+    @statement(moment="N m", viscosity="N m s/rad")
+    def yields(
+        self,
+        creases=None,
+        *,
+        moment: ArrayLike | None = None,
+        hardening: ArrayLike = 0.0,
+        isotropic: ArrayLike = 0.0,
+        viscosity: ArrayLike = 0.0,
+        panels=None,
+    ) -> "Sheet":
+        """Creases that yield and keep part of their fold: of stiffness K up to a moment, then of `hardening` K.
+
+        Released from the angle a they stay at a - M / K, M = moment + hardening (K a - moment), as long as the way
+        back does not yield. Formula and sources: effect `crease_yield`.
+
+        Args:
+            creases: indices (default: all). moment: [N m] of the whole crease at which it yields first (default: at
+                which the sheet beside it is plastic through and through, sigma w h^2 / 4, if its material yields).
+            hardening: share of the stiffness that is left while it yields, 0 <= hardening < 1.
+            isotropic: share of the hardening by which the moment grows on both sides; the rest moves them along.
+            viscosity: excess moment per rate of flow [N m s/rad]; 0: it yields at once.
+
+        Raises:
+            InputError: panels, which do not yield; no such crease; a material without yield stress; a value out of its
+                bounds.
+        """
+        if panels is not None:
+            raise InputError(
+                "panels stay elastic, only creases yield",
+                field="panels",
+                value=panels,
+                allowed="a crease in the pattern along every line where a panel is bent beyond its yield",
+            )
+        index = self._index("crease", creases)
+        share = np.asarray(hardening, float)
+        if not np.all((share >= 0) & (share < 1)):
+            raise InputError("no such hardening", field="hardening", value=hardening, allowed="0 <= hardening < 1")
+        return self.set(
+            "crease_yield",
+            index,
+            yield_moment=self._plastic_moments(index) if moment is None else moment,
+            softening=1.0 - share,
+            isotropic=isotropic,
+            viscosity=viscosity,
+        )
+
     @statement(elasticity="Pa", membrane="N/m", bending="N m")
     def shell(
         self,
@@ -338,6 +385,8 @@ class Sheet(Grounds, Electrodes):
             p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))
         if "crease" in self._effects:
             p.set("crease", "stiffness", self._crease_stiffness).set("crease", "rest_angle", self._rest)
+        if "crease_yield" in self._effects:
+            p.set("crease_yield", "stiffness", self._crease_stiffness).set("crease_yield", "rest_angle", self._rest)
         if any(self._viscous_creases):
             p.set("crease_viscosity", "viscosity", self._crease_viscosity(mass))
         if len(mesh.bends) and "panel_bending" in self._effects:
@@ -406,6 +455,26 @@ class Sheet(Grounds, Electrodes):
             pair = by_edge[min(j, k), max(j, k)]
             span = np.linalg.norm(mesh.vertices[k] - mesh.vertices[j])
             out[q] = self.rigidity(int(mesh.bend_face[q])) * span**2 / self.area[pair].sum()
+        return out
+
+    def _plastic_moments(self, creases: np.ndarray) -> np.ndarray:
+        """Moments [N m] at which the thinner panel beside each crease is plastic through and through."""
+        mesh, out = self.mesh, np.zeros(len(creases))
+        for n, c in enumerate(creases):
+            axis = mesh.creases[c, 1:3]
+            beside = {int(mesh.triangle_face[t]) for t, nodes in enumerate(mesh.triangles) if {*axis} <= {*nodes}}
+            thin = min(beside, key=lambda p: self.thickness[p])
+            stress = material(self._names[thin]).yield_stress
+            if not stress > 0:
+                allowed = ", ".join(m.name for m in MATERIALS.values() if m.yield_stress > 0)
+                raise InputError(
+                    "the material has no yield stress: state the moment",
+                    field="material",
+                    value=self._names[thin],
+                    allowed=f"moment=..., or {allowed}",
+                )
+            width = np.linalg.norm(np.diff(mesh.vertices[axis], axis=0))
+            out[n] = stress * width * self.thickness[thin] ** 2 / 4
         return out
 
     def _crease_viscosity(self, mass: np.ndarray) -> np.ndarray:
