@@ -10,7 +10,7 @@ from origami_sim.dielectric import Electrodes
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
-from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, layered_rigidity, material
+from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.quantities import converted
@@ -307,6 +307,50 @@ class Sheet(Grounds, Electrodes):
             )
         return self
 
+    @statement(size="m", saturation="T")
+    def soften(
+        self,
+        panel: int,
+        *,
+        susceptibility: float,
+        size: ArrayLike,
+        axis: ArrayLike = (1, 0, 0),
+        saturation: float | None = None,
+    ) -> "Sheet":
+        """A patch that the field magnetises (effect `soft_magnet`), such as iron, or the soft filler of an elastomer.
+
+        Only its magnetism is stated here: its mass and stiffness are those of `patch` or `mass`.
+
+        Args:
+            susceptibility: of its material at small fields, the relative permeability less one.
+            size: [3] length along `axis`, width across it and thickness [m]; volume and demagnetising factors follow.
+            axis: along its length in the reference state. saturation: polarisation [T] (default: iron, 2.15 T).
+        """
+        edges = np.asarray(size, float)
+        if edges.shape != (3,):
+            raise InputError("a patch has three edges", field="size", value=edges.tolist(), allowed="3 lengths")
+        first, across, _ = demagnetising_factors(*edges.tolist())
+        d = np.asarray(axis, float)
+        for t in self._triangles_of(panel):
+            normal = self._area_vector[t] / self.area[t]
+            flat = d - normal * (d @ normal)
+            if not np.linalg.norm(flat) > 1e-6 * np.linalg.norm(d):
+                raise InputError("the axis of a patch lies in its panel", field="axis", value=d.tolist())
+            a, b = self._edge_weights(t, flat / np.linalg.norm(flat))
+            given = {} if saturation is None else {"saturation": saturation}
+            self.set(
+                "soft_magnet",
+                [t],
+                susceptibility=susceptibility,
+                volume=float(edges.prod()) * self._share(panel, t),
+                poling_1=a,
+                poling_2=b,
+                demagnetising_1=first,
+                demagnetising_2=across,
+                **given,
+            )
+        return self
+
     @statement()
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
         """Holds panels or nodes along the named axes."""
@@ -398,7 +442,18 @@ class Sheet(Grounds, Electrodes):
         model = self._stand(model, p, shares)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
+        self._share_magnets(p)
         return rigid(model, p) if self.panels == "rigid" else (model, p)
+
+    def _share_magnets(self, p: Parameters) -> None:
+        """Gives effects of remanent panels that were only switched on the magnets of `magnetic_torque`."""
+        if "magnetic_torque" not in self._effects:
+            return
+        own = {effect for effect, *_ in self._settings}
+        magnet = p.of("magnetic_torque")
+        for name in (e for e in self._effects if e not in own and "remanence" in p.of(e)):
+            for key in magnet.keys() & p.of(name).keys():
+                p.set(name, key, magnet[key])
 
     def _family_counts(self) -> dict[str, int]:
         mesh = self.mesh

@@ -1,5 +1,6 @@
 """Materials of active origami, and the stiffness of layered panels and of elastomer bridges."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -121,3 +122,33 @@ def yielding_crease(
             raise InputError("a crease needs positive numbers", field=name, value=value, allowed="> 0")
     stiffness = modulus / (1 - poisson**2) * width * thickness**3 / (12 * length)
     return stiffness, yield_stress * width * thickness**2 / 4
+
+
+def demagnetising_factors(length: float, width: float, thickness: float) -> tuple[float, float, float]:
+    """Demagnetising factors of a rectangular prism along its three edges; they sum to 1 (Aharoni 1998, eq. 1).
+
+    They are means over the prism for an even magnetisation, right for a small susceptibility; of a thin patch of a
+    strong one the edges are magnetised less than the middle.
+    """
+    sides = (length, width, thickness)
+    for name, value in zip(("length", "width", "thickness"), sides, strict=True):
+        if not value > 0:
+            raise InputError("a prism needs positive edges", field=name, value=value, allowed="> 0 m")
+
+    def along(a: float, b: float, c: float) -> float:
+        """Along c of a prism 2 a x 2 b x 2 c."""
+        ab, bc, ca, abc = math.hypot(a, b), math.hypot(b, c), math.hypot(c, a), math.sqrt(a * a + b * b + c * c)
+
+        def log(root: float, side: float) -> float:  # of (root - side) / (root + side)
+            return -2.0 * math.atanh(side / root)
+
+        out = (b * b - c * c) / (2 * b * c) * log(abc, a) + (a * a - c * c) / (2 * a * c) * log(abc, b)
+        out += (
+            -b / (2 * c) * log(ab, a) - a / (2 * c) * log(ab, b) + c / (2 * a) * log(bc, b) + c / (2 * b) * log(ca, a)
+        )
+        out += 2 * math.atan(a * b / (c * abc)) + (a**3 + b**3 - 2 * c**3) / (3 * a * b * c)
+        out += (a * a + b * b - 2 * c * c) / (3 * a * b * c) * abc + c / (a * b) * (ca + bc)
+        return (out - (ab**3 + bc**3 + ca**3) / (3 * a * b * c)) / math.pi
+
+    a, b, c = (s / max(sides) for s in sides)
+    return along(b, c, a), along(c, a, b), along(a, b, c)

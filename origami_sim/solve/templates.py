@@ -8,15 +8,21 @@ _ARGUMENTS = """
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
     series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{plates}
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{sources}{plates}
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
 """
 
 
-def arguments(shells: bool) -> str:
-    """Arguments that all kernels begin with; those of sheets have the rows of curvature among them."""
-    return _ARGUMENTS.format(plates="\n    plates: shells.Plates," if shells else "")
+def arguments(shells: bool, sources: bool) -> str:
+    """Arguments that all kernels begin with; those of sheets have the rows of curvature among them.
+
+    Those of laws that ask for the gradient of the field have its sources.
+    """
+    return _ARGUMENTS.format(
+        plates="\n    plates: shells.Plates," if shells else "",
+        sources="\n    sources: fields.Sources," if sources else "",
+    )
 
 
 ROLLOUT = """
