@@ -511,7 +511,7 @@ class _Arrays:
         return {n.removeprefix(prefix): v for n, v in self.values.items() if n.startswith(prefix)}
 
 
-def _table(given: dict[str, np.ndarray]) -> FieldTable | None:
+def _field_table(given: dict[str, np.ndarray]) -> FieldTable | None:
     return FieldTable(given["x"], given["y"], given["z"], given["values"]) if given else None
 
 
@@ -547,7 +547,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     drive = Drive()
     drive.signals = {c: _signal(arrays.under(f"drive.{c}.")) for c in manifest["drive"]}
     tables = [arrays.under(f"table.{k}.") for k in range(len(manifest.get("sources", ())))]
-    drive.placed = tuple(zip(manifest.get("sources", ()), (_table(t) for t in tables), strict=True))
+    drive.placed = tuple(zip(manifest.get("sources", ()), (_field_table(t) for t in tables), strict=True))
     frames = {n: arrays[n] for n in _FRAMES}
     count = len(frames["times"])
     energies, work = arrays.under("energies."), arrays.under("work.")
