@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from origami_sim.effects import CATALOGUE
     from origami_sim.errors import InputError
     from origami_sim.explore import Found, Way, gradient, optimise, solve_for, sweep
+    from origami_sim.gridded import FieldTable
     from origami_sim.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
     from origami_sim.model import Model, Parameters, State
     from origami_sim.pattern import (
@@ -45,8 +46,10 @@ if TYPE_CHECKING:
     from origami_sim.shell import isotropic, orthotropic
     from origami_sim.solve.dynamics import Trajectory, simulate
     from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
+    from origami_sim.solve.sources import field_at
     from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
     from origami_sim.solve.timestep import stable_step
+    from origami_sim.sources import coil, coil_pair, dipole, field_table, magnet
 
 __version__ = "0.1.0"
 
@@ -71,6 +74,9 @@ _HOMES = {
     "results": "format_table load_run save_run",
     "scene": "read_calibration scene_module",
     "shell": "isotropic orthotropic",
+    "gridded": "FieldTable",
+    "sources": "coil coil_pair dipole field_table magnet",
+    "solve.sources": "field_at",
     "solve.dynamics": "Trajectory simulate",
     "solve.quasistatic": "QuasiStatic quasistatic",
     "solve.statics": "Equilibrium Path continuation equilibrium",
@@ -85,6 +91,7 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     "Sheet", "si", "Stack", "isotropic", "orthotropic", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
     # a model and what drives it
     "Model", "Parameters", "State", "rigid", "Drive", "Signal", "ramp", "series", "sine", "CATALOGUE",
+    "magnet", "coil", "coil_pair", "dipole", "field_table", "FieldTable", "field_at",
     # solutions
     "simulate", "Trajectory", "stable_step", "quasistatic", "QuasiStatic",
     "equilibrium", "Equilibrium", "continuation", "Path",

@@ -11,7 +11,7 @@ from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
-from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, layered_rigidity, material
+from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.quantities import converted
@@ -148,6 +148,53 @@ class Sheet(Grounds, Electrodes, Touches):
             self.on("crease_viscosity")
         return self
 
+    @statement(moment="N m", viscosity="N m s/rad")
+    def yields(
+        self,
+        creases=None,
+        *,
+        moment: ArrayLike | None = None,
+        hardening: ArrayLike = 0.0,
+        isotropic: ArrayLike = 0.0,
+        viscosity: ArrayLike = 0.0,
+        panels=None,
+    ) -> "Sheet":
+        """Creases that yield and keep part of their fold: of stiffness K up to a moment, then of `hardening` K.
+
+        Released from the angle a they stay at a - M / K, M = moment + hardening (K a - moment), as long as the way
+        back does not yield. Formula and sources: effect `crease_yield`.
+
+        Args:
+            creases: indices (default: all). moment: [N m] of the whole crease at which it yields first (default: at
+                which the sheet beside it is plastic through and through, sigma w h^2 / 4, if its material yields).
+            hardening: share of the stiffness that is left while it yields, 0 <= hardening < 1.
+            isotropic: share of the hardening by which the moment grows on both sides; the rest moves them along.
+            viscosity: excess moment per rate of flow [N m s/rad]; 0: it yields at once.
+
+        Raises:
+            InputError: panels, which do not yield; no such crease; a material without yield stress; a value out of its
+                bounds.
+        """
+        if panels is not None:
+            raise InputError(
+                "panels stay elastic, only creases yield",
+                field="panels",
+                value=panels,
+                allowed="a crease in the pattern along every line where a panel is bent beyond its yield",
+            )
+        index = self._index("crease", creases)
+        share = np.asarray(hardening, float)
+        if not np.all((share >= 0) & (share < 1)):
+            raise InputError("no such hardening", field="hardening", value=hardening, allowed="0 <= hardening < 1")
+        return self.set(
+            "crease_yield",
+            index,
+            yield_moment=self._plastic_moments(index) if moment is None else moment,
+            softening=1.0 - share,
+            isotropic=isotropic,
+            viscosity=viscosity,
+        )
+
     @statement(elasticity="Pa", membrane="N/m", bending="N m")
     def shell(
         self,
@@ -263,6 +310,50 @@ class Sheet(Grounds, Electrodes, Touches):
             )
         return self
 
+    @statement(size="m", saturation="T")
+    def soften(
+        self,
+        panel: int,
+        *,
+        susceptibility: float,
+        size: ArrayLike,
+        axis: ArrayLike = (1, 0, 0),
+        saturation: float | None = None,
+    ) -> "Sheet":
+        """A patch that the field magnetises (effect `soft_magnet`), such as iron, or the soft filler of an elastomer.
+
+        Only its magnetism is stated here: its mass and stiffness are those of `patch` or `mass`.
+
+        Args:
+            susceptibility: of its material at small fields, the relative permeability less one.
+            size: [3] length along `axis`, width across it and thickness [m]; volume and demagnetising factors follow.
+            axis: along its length in the reference state. saturation: polarisation [T] (default: iron, 2.15 T).
+        """
+        edges = np.asarray(size, float)
+        if edges.shape != (3,):
+            raise InputError("a patch has three edges", field="size", value=edges.tolist(), allowed="3 lengths")
+        first, across, _ = demagnetising_factors(*edges.tolist())
+        d = np.asarray(axis, float)
+        for t in self._triangles_of(panel):
+            normal = self._area_vector[t] / self.area[t]
+            flat = d - normal * (d @ normal)
+            if not np.linalg.norm(flat) > 1e-6 * np.linalg.norm(d):
+                raise InputError("the axis of a patch lies in its panel", field="axis", value=d.tolist())
+            a, b = self._edge_weights(t, flat / np.linalg.norm(flat))
+            given = {} if saturation is None else {"saturation": saturation}
+            self.set(
+                "soft_magnet",
+                [t],
+                susceptibility=susceptibility,
+                volume=float(edges.prod()) * self._share(panel, t),
+                poling_1=a,
+                poling_2=b,
+                demagnetising_1=first,
+                demagnetising_2=across,
+                **given,
+            )
+        return self
+
     @statement()
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
         """Holds panels or nodes along the named axes."""
@@ -341,6 +432,8 @@ class Sheet(Grounds, Electrodes, Touches):
             p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))
         if "crease" in self._effects:
             p.set("crease", "stiffness", self._crease_stiffness).set("crease", "rest_angle", self._rest)
+        if "crease_yield" in self._effects:
+            p.set("crease_yield", "stiffness", self._crease_stiffness).set("crease_yield", "rest_angle", self._rest)
         if any(self._viscous_creases):
             p.set("crease_viscosity", "viscosity", self._crease_viscosity(mass))
         if len(mesh.bends) and "panel_bending" in self._effects:
@@ -353,9 +446,20 @@ class Sheet(Grounds, Electrodes, Touches):
         self._touching(p)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
+        self._share_magnets(p)
         if "touch" in self._effects:
             refuse_overlap(model, p)
         return rigid(model, p) if self.panels == "rigid" else (model, p)
+
+    def _share_magnets(self, p: Parameters) -> None:
+        """Gives effects of remanent panels that were only switched on the magnets of `magnetic_torque`."""
+        if "magnetic_torque" not in self._effects:
+            return
+        own = {effect for effect, *_ in self._settings}
+        magnet = p.of("magnetic_torque")
+        for name in (e for e in self._effects if e not in own and "remanence" in p.of(e)):
+            for key in magnet.keys() & p.of(name).keys():
+                p.set(name, key, magnet[key])
 
     def _family_counts(self) -> dict[str, int]:
         mesh = self.mesh
@@ -412,6 +516,26 @@ class Sheet(Grounds, Electrodes, Touches):
             pair = by_edge[min(j, k), max(j, k)]
             span = np.linalg.norm(mesh.vertices[k] - mesh.vertices[j])
             out[q] = self.rigidity(int(mesh.bend_face[q])) * span**2 / self.area[pair].sum()
+        return out
+
+    def _plastic_moments(self, creases: np.ndarray) -> np.ndarray:
+        """Moments [N m] at which the thinner panel beside each crease is plastic through and through."""
+        mesh, out = self.mesh, np.zeros(len(creases))
+        for n, c in enumerate(creases):
+            axis = mesh.creases[c, 1:3]
+            beside = {int(mesh.triangle_face[t]) for t, nodes in enumerate(mesh.triangles) if {*axis} <= {*nodes}}
+            thin = min(beside, key=lambda p: self.thickness[p])
+            stress = material(self._names[thin]).yield_stress
+            if not stress > 0:
+                allowed = ", ".join(m.name for m in MATERIALS.values() if m.yield_stress > 0)
+                raise InputError(
+                    "the material has no yield stress: state the moment",
+                    field="material",
+                    value=self._names[thin],
+                    allowed=f"moment=..., or {allowed}",
+                )
+            width = np.linalg.norm(np.diff(mesh.vertices[axis], axis=0))
+            out[n] = stress * width * self.thickness[thin] ** 2 / 4
         return out
 
     def _crease_viscosity(self, mass: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@
     ]
     [drive]                                                                     # channels of a Drive
     field_z = { ramp = "50 mT", duration = "1 s" }          # or a number, { sine = ..., frequency = ... },
+    sources = [ { coil = { current = "2 A", radius = "50 mm", turns = 100, position = [0, 0, "40 mm"] } } ]
     [run]                                                   # or { times = [...], values = [...] }
     duration = "2 s"
 
@@ -36,6 +37,7 @@ from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.quantities import converted
+from origami_sim.sources import NUMBERS, STRENGTHS, coil, coil_pair, dipole, field_table, magnet
 
 _KEYS = ("about", "pattern", "sheet", "statements", "model", "names", "parameters", "drive", "run")
 _BUILDERS: dict[str, Callable[..., Pattern]] = {
@@ -44,7 +46,7 @@ _BUILDERS: dict[str, Callable[..., Pattern]] = {
 _ANGLES = ("gamma", "twist", "fold_angle", "fold_angles", "target_angle")
 _EDGES = ("fold_angles", "stiffness", "rest_angles")
 _STATEMENTS = (
-    *("on", "set", "crease", "shell", "panel", "patch", "magnetise", "fix", "name"),
+    *("on", "set", "crease", "yields", "shell", "panel", "patch", "magnetise", "soften", "fix", "name"),
     *("gravity", "body", "mass", "point_mass", "contact", "feet", "ground", "touch", "electrode"),
 )
 _WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
@@ -147,7 +149,10 @@ def write_design(
         lines += [f"  {_toml({name: arguments})}," for name, arguments in source.statements]
         lines += ["]"]
     lines += ["", "[run]", f"duration = {_toml(duration)}", f"rate = {_toml(rate)}", "", "[drive]"]
-    signals = (drive or Drive()).signals
+    drive = drive or Drive()
+    signals = {n: s for n, s in drive.signals.items() if not n.startswith("source_")}
+    if drive.placed:
+        lines += ["sources = [", *(f"  {_toml(s)}," for s in _sources(drive)), "]"]
     for name, s in signals.items():
         if s.worlds > 1:
             raise InputError("a design has one drive", field=name, value=f"{s.worlds} worlds", allowed="one world")
@@ -259,9 +264,37 @@ def _check_all(given: Mapping[str, Any], known: tuple[str, ...], path: Path) -> 
         _check(name, known, "pattern", path)
 
 
+_SOURCES = {"dipole": dipole, "coil": coil, "coil_pair": coil_pair, "magnet": magnet, "table": field_table}
+
+
+def _source(entry: Any, number: int, path: Path) -> Any:
+    """One source, { coil = { ... } }; the file of a table is beside the design."""
+    field = f"drive.sources[{number}]"
+    if not isinstance(entry, dict) or len(entry) != 1:
+        raise InputError("is no source", file=path, field=field, value=entry, allowed="{ coil = { ... } }")
+    kind, arguments = next(iter(entry.items()))
+    _check(kind, _SOURCES, field, path)
+    given = dict(_table(arguments, f"{field}.{kind}", path))
+    strength, unit = STRENGTHS.get(kind, ("current", "A"))
+    units = {strength: unit, "position": "m", "radius": "m", "length": "m", "axis": "1"}
+    for name, unit in units.items():
+        if isinstance(given.get(name), list):
+            given[name] = [_wave(v, unit, f"{field}.{name}", path) for v in given[name]]
+        elif isinstance(given.get(name), dict):
+            given[name] = _wave(given[name], unit, f"{field}.{name}", path)
+    if "file" in given:
+        given["table"] = path.parent / str(given.pop("file"))
+    return _called(_SOURCES[kind], given, f"{field}.{kind}", path)
+
+
 def _drive(given: dict[str, Any], path: Path) -> Drive:
+    listed = given.get("sources", [])
+    if not isinstance(listed, list):
+        raise InputError("sources are a list", file=path, field="drive.sources", allowed="[ { coil = { ... } }, ... ]")
+    sources = [_source(entry, n, path) for n, entry in enumerate(listed, 1)]
+    given = {n: v for n, v in given.items() if n != "sources"}
     groups = [int(n.removeprefix("voltage_")) for n in given if n.removeprefix("voltage_").isdecimal()]
-    drive = Drive(voltage=[0.0] * (max(groups, default=0) + 1))
+    drive = Drive(voltage=[0.0] * (max(groups, default=0) + 1), sources=sources)
     units = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1"}
     signals = {}
     for name, value in given.items():
@@ -304,6 +337,28 @@ def _signal(s: Signal) -> Any:
         return s.offset
     names = ("offset", "amplitude", "frequency", "phase", "times", "values", "scale")
     return {n: getattr(s, n) for n in names}
+
+
+def _sources(drive: Drive) -> list[dict[str, Any]]:
+    """The sources of a drive as the file states them."""
+    out = []
+    for k, (kind, table) in enumerate(drive.placed):
+        numbers = {n: drive[f"source_{k}_{n}"] for n in NUMBERS}
+        if any(s.worlds > 1 for s in numbers.values()):
+            raise InputError("a design has one drive", field=f"source {k}", value="several worlds", allowed="one world")
+        stated: dict[str, Any] = {STRENGTHS[kind][0]: _signal(numbers["strength"])}
+        stated["position"] = [_signal(numbers[n]) for n in "xyz"]
+        if kind == "table":
+            if table is None or table.file is None:
+                raise InputError(
+                    "a table of a field needs a file", field=f"source {k}", allowed="FieldTable.write(path)"
+                )
+            stated["file"] = str(Path(table.file).resolve())
+        else:
+            stated["axis"] = [_signal(numbers[f"axis_{n}"]) for n in "xyz"]
+            stated |= {n: _signal(numbers[n]) for n in ("radius", "length") if kind != "dipole"}
+        out.append({kind: stated})
+    return out
 
 
 def _pattern_table(p: Pattern) -> dict[str, Any]:

@@ -1,13 +1,18 @@
 """The drive: fields, voltages and loads as functions of time, as data."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.quantities import ANY, converted
+
+if TYPE_CHECKING:
+    from origami_sim.gridded import FieldTable
+    from origami_sim.sources import Source
 
 CHANNELS = (
     "field_x",
@@ -18,7 +23,8 @@ CHANNELS = (
     "load",
     "origin",
 )
-"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow.
+"""Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow, and after them
+the numbers of the sources, `source_0_strength`, `source_0_x`, ...
 
 The origin is the age [s] of the device at the start: laws of time count from it.
 """
@@ -162,6 +168,7 @@ class Drive:
         gradient: 3 x 3 nested numbers or signals, dB_i/dx_j [T/m].
         voltage: a number or signal [V], or one for each electrode group.
         temperature: rise above the rest state [K]. load: load factor [-]. origin: age of the device at the start [s].
+        sources: magnets, coils and tables around the device (`sources`), whose field is added at every place.
 
     Raises:
         InputError: wrong number of components, times that do not increase, values that are not finite.
@@ -176,6 +183,7 @@ class Drive:
         temperature: Value = 0.0,
         load: Value = 0.0,
         origin: Value = 0.0,
+        sources: Sequence["Source | Sequence[Source]"] = (),
     ):
         if len(field) != 3:
             raise InputError("a field has three components", field="field", value=len(field), allowed="3")
@@ -187,6 +195,16 @@ class Drive:
         units = [*["T"] * 3, *["T/m"] * 9, "K", "1", "s", *["V"] * len(voltages)]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
         self.signals = {n: as_signal(v, u) for n, v, u in zip(names, values, units, strict=True)}
+        if sources:
+            from origami_sim.sources import NUMBERS, flattened  # which need signals
+
+            found = flattened(sources)
+            self.placed = tuple((s.kind, s.table) for s in found)
+            for k, source in enumerate(found):
+                self.signals |= {f"source_{k}_{n}": s for n, s in zip(NUMBERS, source.numbers, strict=True)}
+
+    placed: tuple[tuple[str, "FieldTable | None"], ...] = ()
+    """Kind and table of each source."""
 
     grid: np.ndarray | None = None
     """Instants at which what distorts the drive samples it [s]; None: as finely as a motion asks for."""
@@ -197,6 +215,25 @@ class Drive:
         fine = np.interp(np.arange(8 * (len(grid) - 1) + 1) / 8, np.arange(len(grid)), grid)
         out.grid = fine if len(fine) > 1 else np.array([grid[0], grid[0] + 1.0])
         return out
+
+    def with_signals(self, signals: Mapping[str, Signal]) -> "Drive":
+        """The same sources with these signals for channels."""
+        out = object.__new__(Drive)
+        out.signals, out.grid, out.placed = dict(signals), self.grid, self.placed
+        return out
+
+    @property
+    def fingerprint(self) -> bytes:
+        """What its sources are, besides their signals."""
+        return b"".join(
+            kind.encode() + (b"" if t is None else b"".join(a.tobytes() for a in (*t.axes, t.values)))
+            for kind, t in self.placed
+        )
+
+    @property
+    def groups(self) -> int:
+        """Number of electrode groups."""
+        return sum(n.startswith("voltage_") for n in self.signals)
 
     def __getitem__(self, channel: str) -> Signal:
         return self.signals[channel]
@@ -228,13 +265,10 @@ class Drive:
         Raises:
             InputError: there is no such channel.
         """
-        out = object.__new__(Drive)
         for name in signals:
             if name not in self.signals:
                 raise InputError("no such drive channel", field="channel", value=name, allowed=", ".join(self.signals))
-        out.signals = {n: as_signal(signals.get(n, s)) for n, s in self.signals.items()}
-        out.grid = self.grid
-        return out
+        return self.with_signals({n: as_signal(signals.get(n, s)) for n, s in self.signals.items()})
 
     @property
     def end(self) -> float:

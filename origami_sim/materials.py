@@ -1,5 +1,6 @@
 """Materials of active origami, and the stiffness of layered panels and of elastomer bridges."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,6 +26,7 @@ class Material:
     Attributes:
         modulus: Young's modulus [Pa]. density: [kg/m^3]. poisson: Poisson's ratio [-].
         remanence: remanent flux density of the poled material [T]. source: where the numbers come from.
+        yield_stress: at which it keeps a bend [Pa]; 0: elastic, or not known.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Material:
     poisson: float
     remanence: float = 0.0
     source: str = ""
+    yield_stress: float = 0.0
 
     @property
     def plane_modulus(self) -> float:
@@ -49,10 +52,17 @@ MATERIALS = {
         Material("mae", 0.78e6, 2800.0, 0.49, 0.130, source="seed paper Table 2: 6 (C10 + C01) with 90 and 40 kPa"),
         Material("vhb", 0.19e6, 960.0, 0.49, source="3M F9473PC (seed paper)"),
         Material("tape", 1.6e9, 1063.0, 0.30, source="3M Magic tape, measured in the seed paper"),
-        Material("paper", 3.0e9, 800.0, 0.30, source="copier paper, handbook value"),
+        Material(
+            "paper", 3.0e9, 800.0, 0.30, source="copier paper, handbook values; yield 10 to 40 MPa by direction and "
+            "moisture", yield_stress=20e6,
+        ),
+        Material(
+            "pet", 4.8e9, 1390.0, 0.38, source="polyester film: DuPont Teijin Films, Mylar bulletin H-37232-3 (92A): "
+            "modulus 490 kg/mm^2, strength at 5 % elongation 10 kg/mm^2", yield_stress=98e6,
+        ),
         Material("aluminium", 69e9, 2700.0, 0.33, source="handbook value"),
     )
-}
+}  # fmt: skip
 """Materials by name."""
 
 
@@ -92,3 +102,53 @@ def bridge_stiffness(
         if not value > 0:
             raise InputError("a bridge needs positive dimensions", field=name, value=value, allowed="> 0")
     return modulus / (1 - poisson**2) * width * thickness**3 / (12 * (gap + 2 * end_correction * thickness))
+
+
+def yielding_crease(
+    modulus: float, yield_stress: float, width: float, thickness: float, length: float, *, poisson: float = 0.0
+) -> tuple[float, float]:
+    """Stiffness [N m/rad] and fully plastic moment [N m] of a crease that is a short strip of its sheet.
+
+    K = E w h^3 / (12 (1 - nu^2) L) and M = sigma w h^2 / 4 of a rectangle without hardening (Hill 1950, ch. 4).
+
+    Args:
+        modulus, yield_stress: of the sheet [Pa]. width: of the crease, along its axis [m].
+        thickness: of the sheet [m]. length: of the strip that bends, across the crease [m]: what the fold's radius
+            leaves, for a sharp fold by an angle of pi twice to five times the thickness.
+    """
+    given = {"modulus": modulus, "yield_stress": yield_stress, "width": width, "thickness": thickness, "length": length}
+    for name, value in given.items():
+        if not value > 0:
+            raise InputError("a crease needs positive numbers", field=name, value=value, allowed="> 0")
+    stiffness = modulus / (1 - poisson**2) * width * thickness**3 / (12 * length)
+    return stiffness, yield_stress * width * thickness**2 / 4
+
+
+def demagnetising_factors(length: float, width: float, thickness: float) -> tuple[float, float, float]:
+    """Demagnetising factors of a rectangular prism along its three edges; they sum to 1 (Aharoni 1998, eq. 1).
+
+    They are means over the prism for an even magnetisation, right for a small susceptibility; of a thin patch of a
+    strong one the edges are magnetised less than the middle.
+    """
+    sides = (length, width, thickness)
+    for name, value in zip(("length", "width", "thickness"), sides, strict=True):
+        if not value > 0:
+            raise InputError("a prism needs positive edges", field=name, value=value, allowed="> 0 m")
+
+    def along(a: float, b: float, c: float) -> float:
+        """Along c of a prism 2 a x 2 b x 2 c."""
+        ab, bc, ca, abc = math.hypot(a, b), math.hypot(b, c), math.hypot(c, a), math.sqrt(a * a + b * b + c * c)
+
+        def log(root: float, side: float) -> float:  # of (root - side) / (root + side)
+            return -2.0 * math.atanh(side / root)
+
+        out = (b * b - c * c) / (2 * b * c) * log(abc, a) + (a * a - c * c) / (2 * a * c) * log(abc, b)
+        out += (
+            -b / (2 * c) * log(ab, a) - a / (2 * c) * log(ab, b) + c / (2 * a) * log(bc, b) + c / (2 * b) * log(ca, a)
+        )
+        out += 2 * math.atan(a * b / (c * abc)) + (a**3 + b**3 - 2 * c**3) / (3 * a * b * c)
+        out += (a * a + b * b - 2 * c * c) / (3 * a * b * c) * abc + c / (a * b) * (ca + bc)
+        return (out - (ab**3 + bc**3 + ca**3) / (3 * a * b * c)) / math.pi
+
+    a, b, c = (s / max(sides) for s in sides)
+    return along(b, c, a), along(c, a, b), along(a, b, c)

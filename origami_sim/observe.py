@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from origami_sim.distort import distorted
-from origami_sim.drive import Drive, series
+from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
@@ -486,18 +486,17 @@ def _frames(trajectory: Trajectory, world: int) -> tuple[State, Drive]:
     for name, signal in drive.signals.items():
         of_worlds = np.asarray(signal(trajectory.times[:, None])).reshape(len(trajectory.times), -1)
         values[name] = of_worlds[:, world if of_worlds.shape[1] > 1 else 0]
-    return state, _of_values(values)
+    return state, _of_values(drive, values)
 
 
 def _held(drives: Sequence[Drive]) -> Drive:
     """One drive of as many worlds, each holding the value at time 0 of its own."""
-    return _of_values({n: np.array([np.ravel(d[n](0.0))[0] for d in drives]) for n in drives[0].signals})
+    return _of_values(drives[0], {n: np.array([np.ravel(d[n](0.0))[0] for d in drives]) for n in drives[0].signals})
 
 
-def _of_values(values: dict[str, np.ndarray]) -> Drive:
-    """The drive that holds these values (F,) by channel, one world each."""
-    groups = sum(name.startswith("voltage_") for name in values)
-    return Drive(voltage=[0.0] * groups).replace(**values)
+def _of_values(drive: Drive, values: dict[str, np.ndarray]) -> Drive:
+    """The drive, held at these values (F,) by channel, one world each."""
+    return drive.with_signals({n: Signal(offset=v) for n, v in values.items()})
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:

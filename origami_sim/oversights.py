@@ -23,7 +23,13 @@ A sheet on `Sheet.ground` sinks by 1e-4, on single points by some 1e-3. Half not
 centimetre pass on a device of five.
 """
 
-_CHANNELS = {"field": "field_", "voltage": "voltage_", "temperature": "temperature", "load": "load"}
+_CHANNELS = {
+    "field": "field_",
+    "gradient": "source_",
+    "voltage": "voltage_",
+    "temperature": "temperature",
+    "load": "load",
+}
 
 
 def idle_drives(model: Model, parameters: Parameters, drive: Drive) -> list[str]:
@@ -31,6 +37,8 @@ def idle_drives(model: Model, parameters: Parameters, drive: Drive) -> list[str]
     notes = []
     for kind, prefix in _CHANNELS.items():
         channels = [n for n, s in drive.signals.items() if n.startswith(prefix) and not s.is_zero]
+        if prefix == "source_" and not any(n.endswith("_strength") for n in channels):
+            continue
         if not channels:
             continue
         acting = [e for e in map(get, model.laws) if kind in e.drives and _acts(model, parameters, e.name)]
@@ -45,6 +53,8 @@ def idle_drives(model: Model, parameters: Parameters, drive: Drive) -> list[str]
 
 _IDLE = {
     "field": "The drive has a field, and nothing here is magnetic: state it with Sheet.patch(..., poling=...).",
+    "gradient": "There are magnets or coils, and nothing here feels them: Sheet.patch(..., poling=...) with "
+    "Sheet.on('field_gradient'), or Sheet.soften(...).",
     "voltage": "The drive has a voltage, and nothing here has electrodes: state them with Sheet.electrode(...).",
     "temperature": "The drive has a temperature, and nothing here depends on it: Sheet.set('crease_thermal', ...).",
     "load": "The drive has a load factor, and nothing here is loaded: Sheet.set('load', ...) or 'crease_drive'.",
@@ -73,6 +83,55 @@ def _electroded(model: Model, parameters: Parameters) -> np.ndarray:
             out[part] |= np.any(on, axis=1)
         else:
             out[:] = True
+    return out
+
+
+def refuse_start_outside_tables(
+    model: Model, parameters: Parameters, drive: Drive, x: np.ndarray, time: float = 0.0
+) -> None:
+    """Refuses a start at which a magnet lies outside of a table of the field.
+
+    Args:
+        x: [N, W, 3] positions at the start [m]. time: of the start [s].
+
+    Raises:
+        InputError: naming the panel and where the table ends.
+    """
+    for t, w, k in outside_tables(model, parameters, drive, x, time)[:1]:
+        table = drive.placed[k][1]
+        assert table is not None
+        at = x[model.triangles[t], w].mean(axis=0)
+        raise InputError(
+            "a magnet starts outside the table of the field",
+            file=table.file,
+            field=model.name("panel", int(model.triangle_panel[t])),
+            value=f"({', '.join(f'{v * 1e3:.4g}' for v in at)}) mm",
+            allowed=" x ".join(f"{a[0] * 1e3:.4g} to {a[-1] * 1e3:.4g}" for a in table.axes)
+            + " mm, shifted by its position",
+        )
+
+
+def outside_tables(
+    model: Model, parameters: Parameters, drive: Drive, x: np.ndarray, time: float
+) -> list[tuple[int, int, int]]:
+    """Triangles with a magnet that are outside of a table, with the world and the table's number."""
+    magnetic = np.zeros(len(model.triangles), bool)
+    for name in model.laws:
+        own = parameters.of(name)
+        if get(name).family == "triangle" and "volume" in own:
+            magnetic |= np.broadcast_to(np.any(own["volume"] > 0, axis=1), magnetic.shape)
+    out = []
+    for k, (_, table) in enumerate(drive.placed):
+        if table is None or not np.any(magnetic):
+            continue
+        shift = np.stack(
+            [np.broadcast_to(np.ravel(drive[f"source_{k}_{a}"](time)), x.shape[1]) for a in "xyz"], axis=-1
+        )
+        at = x[model.triangles].mean(axis=1) - shift  # [T, W, 3]
+        low, high = (np.array([a[e] for a in table.axes]) for e in (0, -1))
+        slack = 1e-9 * (high - low)
+        off = ~np.all((at >= low - slack) & (at <= high + slack), axis=-1) & magnetic[:, None]
+        out += [(int(t), int(w), k) for t, w in np.argwhere(off)]
     return out
 
 

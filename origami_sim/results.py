@@ -29,6 +29,7 @@ import pyarrow.parquet as pq
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError, unwritable
+from origami_sim.gridded import FieldTable
 from origami_sim.model import PADS, Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory
@@ -254,6 +255,7 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
         "effects": list(t.model.effects),
         "names": {k: list(v) for k, v in t.model.names.items()},
         "drive": list(t.drive.signals),
+        **({"sources": [kind for kind, _ in t.drive.placed]} if t.drive.placed else {}),
         "worlds": t.state.worlds,
         "frames": len(t.times),
         "dt": float(t.dt),
@@ -329,6 +331,8 @@ def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
     for channel, signal in t.drive.signals.items():
         out |= {f"drive.{channel}.{n}": v for n in _SIGNAL if (v := getattr(signal, n)) is not None}
+    for k, (_, table) in enumerate(t.drive.placed):
+        out |= {f"table.{k}.{n}": getattr(table, n) for n in ("x", "y", "z", "values") if table is not None}
     out |= {f"state.{f.name}": getattr(t.state, f.name) for f in fields(State)}
     return {n: np.asarray(v) for n, v in out.items()}
 
@@ -510,6 +514,10 @@ class _Arrays:
         return {n.removeprefix(prefix): v for n, v in self.values.items() if n.startswith(prefix)}
 
 
+def _field_table(given: dict[str, np.ndarray]) -> FieldTable | None:
+    return FieldTable(given["x"], given["y"], given["z"], given["values"]) if given else None
+
+
 def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     given: dict[str, Any] = {n: arrays[f"model.{n}"] for n in _MODEL}
     given["channels"] = int(arrays.values.get("model.channels", 1))
@@ -542,6 +550,8 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
         )
     drive = Drive()
     drive.signals = {c: _signal(arrays.under(f"drive.{c}.")) for c in manifest["drive"]}
+    tables = [arrays.under(f"table.{k}.") for k in range(len(manifest.get("sources", ())))]
+    drive.placed = tuple(zip(manifest.get("sources", ()), (_field_table(t) for t in tables), strict=True))
     frames = {n: arrays[n] for n in _FRAMES}
     count = len(frames["times"])
     energies, work = arrays.under("energies."), arrays.under("work.")

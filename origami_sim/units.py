@@ -14,6 +14,7 @@ UNITS: dict[str, dict[str, float]] = {
     "flux density gradient": {"T/m": 1.0, "mT/m": 1e-3, "mT/mm": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "kV": 1e3},
     "current": {"A": 1.0, "mA": 1e-3},
+    "magnetic moment": {"A m^2": 1.0, "mA m^2": 1e-3},
     "acceleration": {"m/s^2": 1.0, "g0": 9.80665},
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
     "temperature": {"K": 1.0},

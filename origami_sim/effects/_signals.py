@@ -46,6 +46,11 @@ def voltages(drive: Drive) -> list[str]:
     return [c for c in drive.signals if c.startswith("voltage_")]
 
 
+def strengths(drive: Drive) -> list[str]:
+    """Names of the channels of the strengths of its magnets and coils."""
+    return [f"source_{k}_strength" for k in range(len(drive.placed))]
+
+
 def at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
     """Samples [n, W or 1] at other times [n, W], linearly; the first and last values hold beyond the ends."""
     columns, when = np.broadcast_arrays(values, when)

@@ -4,11 +4,12 @@ import numpy as np
 
 from origami_sim.drive import CHANNELS, Drive
 from origami_sim.effects._effect import Effect, Parameter
-from origami_sim.effects._signals import lagging, sampled
+from origami_sim.effects._signals import lagging, sampled, strengths
 
 
 def apply(drive: Drive, duration: float, lag: np.ndarray) -> Drive:
-    return sampled(drive, CHANNELS[:12], duration, lambda times, values: lagging(times, values, lag), when=lag)
+    channels = [*CHANNELS[:12], *strengths(drive)]
+    return sampled(drive, channels, duration, lambda times, values: lagging(times, values, lag), when=lag)
 
 
 EFFECT = Effect(

@@ -203,6 +203,7 @@ def _alike(d: Device) -> str:
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
     for name, s in d.drive.signals.items():
         h.update(name.encode() + (b"" if s.times is None else s.times.tobytes()))
+    h.update(d.drive.fingerprint)
     return h.hexdigest()
 
 

@@ -188,6 +188,7 @@ def _key(build: Build, point: Mapping[str, Any], measures: Mapping[str, Measure]
         h.update(name.encode() + repr(s).encode())
         for samples in (s.times, s.values):
             h.update(b"" if samples is None else np.asarray(samples).tobytes())
+    h.update(d.drive.fingerprint)
     for name, m in measures.items():
         code = getattr(m, "__code__", None)
         inside = [c.cell_contents for c in getattr(m, "__closure__", None) or ()]

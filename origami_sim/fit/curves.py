@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from origami_sim.distort import distorted
-from origami_sim.drive import CHANNELS, Drive
+from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.channels import angle_mask, stacked
@@ -270,8 +270,7 @@ class Static(Curves):
     def _system(self, model: Model, worlds) -> System:
         """Couplings and colours of a model, which depend on its effects only."""
         if model.effects not in self._systems:
-            groups = np.zeros(len(self.drives[0].signals) - len(CHANNELS))
-            drive = Drive(voltage=list(groups))
+            drive = Drive(voltage=[0.0] * self.drives[0].groups)
             self._systems[model.effects] = System(model, worlds[0][1], drive, State.at_rest(model))
         return self._systems[model.effects]
 

@@ -336,7 +336,9 @@ def suspects(
             continue
         if effect.family == "drive" and not any(n.split("_")[0] in driven for n in (name, *effect.channels)):
             continue
-        if not set(effect.drives) - {"time"} <= driven:
+        # the pull of a gradient comes beside the torque of a field, if there is one
+        alone = {"time"} | ({"gradient"} if "field" in effect.drives else set())
+        if not set(effect.drives) - alone <= driven:
             continue
         if effect.interacts and not (parameters and _several_magnets(model, parameters)):
             continue
@@ -403,6 +405,8 @@ def _off(parameters: Parameters, name: str) -> bool:
 def _driven(recordings: Sequence[Recording], drive: Drive) -> set[str]:
     names = {n for n, s in drive.signals.items() if not s.is_zero}
     names |= {n for r in recordings for n, c in r.drive.items() if np.any(c.values)}
+    if drive.placed:  # magnets and coils make a field
+        names |= {"field", "gradient"}
     return {n.split("_")[0] for n in names} | ({"drive"} if names else set())
 
 

@@ -97,6 +97,7 @@ class Worlds(ABC):
             for name, signal in drive.signals.items():
                 yield name.encode()
                 yield from (None if v is None else np.asarray(v, float) for v in vars(signal).values())
+            yield drive.fingerprint
 
     @abstractmethod
     def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from origami_sim.drive import CHANNELS, Drive
+from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
-from origami_sim.solve import plates, skin
+from origami_sim.solve import plates, skin, sources
 from origami_sim.solve.compose import BITS, compose
 
 APART = 128
@@ -89,7 +89,7 @@ class Batch:
         def constant(a, dtype):
             return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
-        groups = len(drive.signals) - len(CHANNELS)
+        groups = drive.groups
         if len(model.electrodes) and model.electrodes.max(initial=0) >= groups:
             raise InputError(
                 "the drive has too few electrode groups",
@@ -105,6 +105,13 @@ class Batch:
                 "the drive has a field gradient that no effect of the model uses",
                 field="gradient",
                 allowed="switch on field_gradient",
+            )
+        if drive.placed and not uses_gradient:
+            raise InputError(
+                "the field differs from place to place, and no effect of the model feels its pull",
+                field="sources",
+                value=", ".join(kind for kind, _ in drive.placed),
+                allowed="switch on field_gradient for remanent panels, or soft_magnet",
             )
         interacting = next((e.name for e in laws if e.interacts), None)
         none = np.full(len(model.triangles), -1, np.int32)
@@ -139,6 +146,9 @@ class Batch:
             constant([first.get(k, 0) for k in kept] or [0], wp.int32),
             self._upload(self._acting(parameters) if among else np.zeros((1, self.worlds), np.int64), wp.int64),
         ]
+        if self.program.sources_of_field:
+            numbers = self._room(max(len(sources.NUMBERS) * len(drive.placed), 1), dtype=wp.float64)
+            self._constants.append(sources.upload(drive, numbers, self.device))
         if self.program.shells:
             moments = self._room(max(len(hinges), 1), dtype=wp.float64)
             self._constants.append(plates.upload(model, moments, self.device))

@@ -16,7 +16,7 @@ import warp as wp
 
 from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
-from origami_sim.solve import articulated, plates, runge_kutta, templates, touching
+from origami_sim.solve import articulated, plates, runge_kutta, sources, templates, touching
 from origami_sim.solve.compose_sheets import Sheets, Text
 from origami_sim.solve.compose_touch import Touching, pair_value
 from origami_sim.solve.wave import wave
@@ -87,6 +87,11 @@ class Program:
         """Whether the kernels take the surface."""
         return any(e.family in PAIRS for e in self.effects)
 
+    @property
+    def sources_of_field(self) -> bool:
+        """Whether the kernels take the sources of a field that differs from place to place."""
+        return any("gradient" in e.drives for e in self.effects)
+
     @functools.cached_property
     def rollout(self) -> wp.Kernel:
         return self._kernel("rollout")
@@ -129,6 +134,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "runge_kutta": runge_kutta,
         "shells": plates,
         "touching": touching,
+        "fields": sources,
         "NATURAL": NATURAL,
     }
     for e in effects:
@@ -255,10 +261,12 @@ class _Composer(Sheets, Touching):
     def body(self, mode: str) -> str:
         """The force evaluation. Modes: 'rollout', 'rigid', 'total' (summed) and 'evaluate' (by effect)."""
         t = Text({"rollout": 2, "rigid": 4}.get(mode, 1))
-        if "field" in self.drives:
+        if {"field", "gradient"} & self.drives:
             t(f"uniform_field = vec3({', '.join(self.channel(str(FIELD + i)) for i in range(3))})")
         if "gradient" in self.drives:
-            t(f"gradient = wp.mat33d({', '.join(self.channel(str(GRADIENT + i)) for i in range(9))})")
+            t(f"uniform_gradient = wp.mat33d({', '.join(self.channel(str(GRADIENT + i)) for i in range(9))})")
+            with t.block("for n in range(sources.kind.shape[0] * fields.SIZE):"):
+                t(f"sources.now[n, w] = {self.channel('sources.first + n')}")
         if "temperature" in self.drives:
             t(f"temperature = {self.channel(str(TEMPERATURE))}")
         if "load" in self.drives:
@@ -379,10 +387,7 @@ class _Composer(Sheets, Touching):
         if any("voltage" in e.drives for e in effects):
             t(f"voltage = {self.channel(f'{VOLTAGE} + electrodes[r]')}")
         if any("field" in e.drives for e in effects):  # in the middle of the axis
-            local = "uniform_field"
-            if "gradient" in self.drives:
-                local += " + gradient * (scalar(0.5) * (X[j, w] + X[k, w]))"
-            t(f"field = {local}")
+            self._field(t, "scalar(0.5) * (X[j, w] + X[k, w])")
         if mode != "evaluate":
             t("moment = scalar(0.0)")
         for e in effects:
@@ -406,6 +411,16 @@ class _Composer(Sheets, Touching):
                 t(f"F[{node}, w] = F[{node}, w] + moment * g.g{node}")
         t.depth -= 1
 
+    def _field(self, t: Text, place: str):
+        """The field at a place and its gradient, if any law asks for that."""
+        if "gradient" not in self.drives:
+            t("field = uniform_field")
+            return
+        t(f"place = {place}")
+        t("near = fields.near(sources, place, w)")
+        t("field = uniform_field + uniform_gradient * place + near.field")
+        t("gradient = uniform_gradient + near.gradient")
+
     def _fold(self, t: Text):
         """A hinge's angle, continued from its last one, and its gradients."""
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")
@@ -422,11 +437,8 @@ class _Composer(Sheets, Touching):
             t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
             t(f"x{i} = X[n{i}, w]")
             t(f"v{i} = V[n{i}, w]")
-        if "field" in self.drives:
-            local = "uniform_field"
-            if "gradient" in self.drives:
-                local += " + gradient * ((x1 + x2 + x3) / scalar(3.0))"
-            t(f"field = {local}")
+        if {"field", "gradient"} & self.drives:
+            self._field(t, "(x1 + x2 + x3) / scalar(3.0)")
         for e in effects:
             i = self.number(e)
             with self.acting(t, e):
@@ -556,7 +568,7 @@ class _Composer(Sheets, Touching):
 
     def arguments(self) -> str:
         """What every kernel takes."""
-        return templates.arguments(bool(self.family(*SHELLS)), bool(self.family(*PAIRS)))
+        return templates.arguments(bool(self.family(*SHELLS)), "gradient" in self.drives, bool(self.family(*PAIRS)))
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}

@@ -12,7 +12,13 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
-from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_inside_the_ground
+from origami_sim.oversights import (
+    below_the_ground,
+    idle_drives,
+    outside_tables,
+    refuse_start_inside_the_ground,
+    refuse_start_outside_tables,
+)
 from origami_sim.quantities import converted
 from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
@@ -253,6 +259,7 @@ def _simulated(
     drive_end = (first * step if state.step > 0 else 0.0) + frames * frame_time
     drive.require(drive_end)
     applied = distorted(model, parameters, drive, drive_end)
+    refuse_start_outside_tables(model, parameters, applied, state.x, first * step)
     if implicit:
         batch = Implicit(
             model,
@@ -289,6 +296,7 @@ def _simulated(
         for w, (s, n) in enumerate(last.status.T)
         if s >= 0
         for time, cause in [stopped.get(w) or (float(s * step), _cause(model, parameters, last, w, step, chosen))]
+        for cause in [_left(model, parameters, applied, last, w, time) or cause]
     ]
     zero = np.zeros((len(model.position), last.worlds, 3))
     out = Trajectory(
@@ -348,6 +356,13 @@ def _accurate(
         return out
 
     return refined(run, accuracy, balanced=not implicit or options["spectral_radius"] == 1.0)
+
+
+def _left(model: Model, parameters: Parameters, drive: Drive, state: State, world: int, time: float) -> str:
+    """The panel that left a table of the field, if that is why a world failed."""
+    off = outside_tables(model, parameters, drive, state.x, time) if drive.placed else []
+    panels = [model.name("panel", int(model.triangle_panel[t])) for t, w, _ in off if w == world]
+    return f"{panels[0]} left the table of the field; take a larger table" if panels else ""
 
 
 def _cause(model: Model, parameters: Parameters, state: State, world: int, dt: float, step: TimeStep) -> str:

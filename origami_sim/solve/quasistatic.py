@@ -21,7 +21,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
-from origami_sim.oversights import below_the_ground, idle_drives
+from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
 from origami_sim.solve.settling import Settling, levels, settling
@@ -144,6 +144,7 @@ def quasistatic(
     began = clock.perf_counter()
     instants = np.unique(np.concatenate([at, knots(drive, at)]))
     applied = distorted(model, parameters, drive.on(instants), float(at[-1]))
+    refuse_start_outside_tables(model, parameters, applied, start.x, float(at[0]))
     one = [parameters.world(w if parameters.worlds > 1 else 0) for w in range(count)]
     search = settling([(model, p) for p in one], applied, start, threads=threads)
     march = March(search, applied, tolerance if search.held.remembers else None)

@@ -19,6 +19,7 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid_statics import RigidSystem
 from origami_sim.solve.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
 
@@ -204,30 +205,34 @@ def _one_world(model, parameters, drive, time, state, world, fixed=None) -> tupl
         raise InputError("a position must be finite", field="state.x", value=float("nan"))
     if not np.any(model.free):
         raise InputError("statics needs a node that is free to move", field="free", value=0)
-    return (
-        model,
-        parameters.world(world if parameters.worlds > 1 else 0),
-        fixed or _fixed(distorted(model, parameters, drive, time), time, world),
-        one,
-    )
+    alone = parameters.world(world if parameters.worlds > 1 else 0)
+    held = fixed or _fixed(distorted(model, parameters, drive, time), time, world)
+    refuse_start_outside_tables(model, alone, held, one.x)
+    return model, alone, held, one
 
 
 def _fixed(drive: Drive, time: float, world: int) -> Drive:
     """The drive of one world, held at its value at one instant."""
-    out = Drive()
     values = {n: np.atleast_1d(s(time)) for n, s in drive.signals.items()}
-    out.signals = {n: Signal(offset=float(v[world if len(v) > 1 else 0])) for n, v in values.items()}
-    return out
+    return drive.with_signals({n: Signal(offset=float(v[world if len(v) > 1 else 0])) for n, v in values.items()})
 
 
 def _line(base: Drive, drive: Drive) -> Drive:
     """base + t (drive - base), for t within +-FURTHEST."""
     t = np.array([-FURTHEST, 0.0, FURTHEST])
-    out, zero = Drive(), Signal()
-    names = dict.fromkeys([*base.signals, *drive.signals])
-    ends = {n: tuple(d.signals.get(n, zero).offset for d in (base, drive)) for n in names}
-    out.signals = {n: Signal(offset=a, times=t, values=t, scale=b - a) for n, (a, b) in ends.items()}
-    return out
+    if base.placed and drive.placed and base.placed != drive.placed:
+        raise InputError("both ends of a path need the same sources of a field", field="base")
+    fuller = drive if drive.placed else base
+    names = sorted(dict.fromkeys([*base.signals, *drive.signals]), key=lambda n: n.startswith("source_"))
+
+    def end(d: Drive, name: str) -> float | np.ndarray:
+        if name in d.signals:
+            return d.signals[name].offset
+        there = name.startswith("source_") and not name.endswith("_strength")  # where it will be, but switched off
+        return fuller.signals[name].offset if there else 0.0
+
+    ends = {n: (end(base, n), end(drive, n)) for n in names}
+    return fuller.with_signals({n: Signal(offset=a, times=t, values=t, scale=b - a) for n, (a, b) in ends.items()})
 
 
 @dataclass

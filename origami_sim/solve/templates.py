@@ -8,7 +8,7 @@ _ARGUMENTS = """
     axes: wp.array(dtype=vec3), crease_count: int,
     P: wp.array(dtype=scalar), layout: wp.array2d(dtype=wp.int32),
     series_times: wp.array(dtype=scalar), series_values: wp.array3d(dtype=scalar),
-    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{plates}{skin}
+    memory_rows: wp.array(dtype=wp.int32), active: wp.array2d(dtype=wp.int64),{sources}{plates}{skin}
     X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), angles: wp.array2d(dtype=scalar),
     memory: wp.array2d(dtype=scalar),
 """
@@ -22,10 +22,15 @@ HALT_RIGID = """        if pressed >= 0:
             status[1, w] = pressed"""
 
 
-def arguments(shells: bool, touches: bool) -> str:
-    """Arguments that all kernels begin with; rows of curvature of sheets, the surface of what touches among them."""
+def arguments(shells: bool, sources: bool, touches: bool) -> str:
+    """Arguments that all kernels begin with; rows of curvature of sheets, the surface of what touches among them.
+
+    Those of laws that ask for the gradient of the field have its sources.
+    """
     return _ARGUMENTS.format(
-        plates="\n    plates: shells.Plates," if shells else "", skin="\n    skin: touching.Skin," if touches else ""
+        plates="\n    plates: shells.Plates," if shells else "",
+        sources="\n    sources: fields.Sources," if sources else "",
+        skin="\n    skin: touching.Skin," if touches else "",
     )
 
 

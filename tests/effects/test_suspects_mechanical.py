@@ -427,10 +427,11 @@ def test_suspects_of_creases_are_stable_and_keep_the_energy_balance_at_their_typ
             ("inertia", "mass"): 5e-4,
         },
     )
+    own = {q.name: p["crease", q.name][0, 0] for q in CATALOGUE["crease"].parameters}
     for i, name in enumerate(names):
         for q in CATALOGUE[name].parameters:
             values = np.full((1, w), q.default)
-            values[0, i] = q.default if q.typical is None else q.typical
+            values[0, i] = own.get(q.name, q.default) if q.typical is None else q.typical  # as a suspect takes it over
             p.set(name, q.name, values)
     run = simulate(model, p, Drive(), duration=1.0, rate=100, state=start(model, w), dt=0.2 * stable_step(model, p).dt)
     assert not run.failures
