@@ -245,33 +245,40 @@ class Topology:
     def positions(self, start: np.ndarray, q: np.ndarray, points=None, bodies=None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
 
-        Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size) and turns of the root, then
-        changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that `bodies` [N] carry (-1: none).
+        Coordinates are zero at `start` [N, 3], or [N, W, 3] of each world: shifts (in units of the device's size) and
+        turns of the root, then changes of fold angles [rad]. In place of the nodes, other `points` that `bodies` [N]
+        carry (-1: none).
         """
-        points, bodies = (start, self.body_of) if points is None or bodies is None else (points, np.asarray(bodies))
-        w, roots, size = q.shape[1], len(self.turns), float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
-        centre = start[self.root_nodes].mean(axis=0)
-        pivots = np.tile(centre, (roots, 1)) if self.follows else self.pivots
-        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w, 1))
-        for n in range(w):
-            twist = np.zeros((4, 4))
+        begin = start if start.ndim == 3 else start[:, None]
+        points, bodies = (begin, self.body_of) if points is None or bodies is None else (points, np.asarray(bodies))
+        points = points if points.ndim == 3 else points[:, None]
+        w, roots = q.shape[1], len(self.turns)
+        size = float(np.ptp(begin[:, 0], axis=0).max(initial=0.0)) or 1.0
+        centre = begin[self.root_nodes].mean(axis=0)
+        pivots = np.broadcast_to(centre if self.follows else self.pivots[:, None], (roots, len(centre), 3))
+        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w // len(centre), 1))
+        if roots:
+            twist = np.zeros((w, 4, 4))
             for k in range(roots):
-                twist[:3, :3] += q[k, n] * np.cross(np.eye(3), self.turns[k])
-                twist[:3, 3] += q[k, n] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
+                twist[:, :3, :3] += q[k][:, None, None] * np.cross(np.eye(3), self.turns[k])
+                twist[:, :3, 3] += q[k][:, None] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
             moved = expm(twist)
-            turn[n], shift[n] = moved[:3, :3], centre + moved[:3, 3]
-        turns, places, axes, joints = [turn], [shift - turn @ centre], [], []
+            turn, shift = moved[:, :3, :3], shift + moved[:, :3, 3]
+        turns, places, axes, joints = [turn], [shift - np.einsum("wab,wb->wa", turn, _each(centre, w))], [], []
         for j, (c, sign) in enumerate(self.joints):
-            first, last = start[self._creases[c, 1]], start[self._creases[c, 2]]
-            axis, p = sign * (last - first) / np.linalg.norm(last - first), self.parent[j + 1]
-            axes.append(turns[p] @ axis)
-            joints.append(turns[p] @ first + places[p])
-            angle, k = q[roots + j][:, None, None], np.cross(np.eye(3), axis)
+            first, last = (_each(begin[self._creases[c, k]], w) for k in (1, 2))
+            axis, p = sign * (last - first) / np.linalg.norm(last - first, axis=1, keepdims=True), self.parent[j + 1]
+            axes.append(np.einsum("wab,wb->wa", turns[p], axis))
+            joints.append(np.einsum("wab,wb->wa", turns[p], first) + places[p])
+            angle, k = q[roots + j][:, None, None], np.cross(np.eye(3), axis[:, None])
             turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
-            places.append(joints[-1] - turns[-1] @ first)
+            places.append(joints[-1] - np.einsum("wab,wb->wa", turns[-1], first))
         turns.append(np.tile(np.eye(3), (w, 1, 1)))  # of what no body carries
         places.append(np.zeros((w, 3)))
-        x = np.stack([turns[b] @ r + places[b] for b, r in zip(bodies, points, strict=True)])
+        x = np.empty((len(points), w, 3))
+        for b in np.unique(bodies):
+            mine = bodies == b
+            x[mine] = np.einsum("wab,nwb->nwa", turns[b], np.broadcast_to(points[mine], (mine.sum(), w, 3))) + places[b]
         by = np.zeros((roots + len(self.joints), *x.shape))
         for k in range(roots):
             by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
@@ -375,6 +382,11 @@ class Topology:
             np.array(pairs, np.int32).reshape(-1, 2),
             np.array(axes, float).reshape(-1, 3),
         )
+
+
+def _each(a: np.ndarray, worlds: int) -> np.ndarray:
+    """Vectors [1 or W, 3] as one for each world."""
+    return np.broadcast_to(a, (worlds, 3))
 
 
 def _within(basis: np.ndarray, points: np.ndarray, held: np.ndarray) -> np.ndarray:
