@@ -3,6 +3,7 @@
     name = "double pendulum, run 1"     # the file's stem when left out
     description = "..."                 # also licence: free text, kept in the metadata
     allow_gaps = false                  # true: missing values and time gaps become notes instead of errors
+    motion = "quasistatic"              # optional: inertia does not count, such as in ramps and holds; or "dynamic"
     allow_swaps = false                 # true: markers that seem to exchange names become notes instead of errors
 
     [source]                            # optional; or source = "free text"
@@ -90,7 +91,7 @@ from origami_sim.files import read_toml
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
-from origami_sim.recording.stated import Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
+from origami_sim.recording.stated import MOTIONS, Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
 from origami_sim.recording.table import Table
 from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
@@ -102,6 +103,7 @@ _TOP_KEYS = (
     "licence",
     "allow_gaps",
     "allow_swaps",
+    "motion",
     "select",
     "time",
     "channels",
@@ -152,6 +154,7 @@ class Sidecar:
     priors: dict[str, float | str]
     gravity: Gravity | None
     start: Start | None
+    motion: str | None
 
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
@@ -189,6 +192,7 @@ class Sidecar:
             priors={name: prior_spec(top, name) for name in top.table("priors")},
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
+            motion=top.choice("motion", dict.fromkeys(MOTIONS)) if "motion" in tree else None,
         )
 
     @property

@@ -178,6 +178,8 @@ class March:
     def __init__(self, search: Settling, drive: Drive, tolerance: float | None, *, shortest: float = SHORTEST):
         self.search, self.drive, self.tolerance, self.shortest = search, drive, tolerance, shortest
         self._before: tuple[State, float] | None = None
+        self._constant = [s.constant for s in drive.signals.values()]
+        self._known: np.ndarray | None = None
         self.model = search.model
         self.size = float(np.ptp(self.model.position, axis=0).max()) or 1.0
         self.jumps: list[Jump] = []
@@ -267,8 +269,17 @@ class March:
 
     def _settle(self, state: State, ahead: np.ndarray | None, dt: float, to: float) -> tuple[State, np.ndarray]:
         self.steps += 1
-        level, guess = levels(self.drive, to, state.worlds), state.x if ahead is None else ahead
+        level, guess = self._levels(to, state.worlds), state.x if ahead is None else ahead
         return self.search.settle(level, state, guess, self.alive, dt=dt, time=to, search=False)
+
+    def _levels(self, time: float, worlds: int) -> np.ndarray:
+        """Levels of the drive at a time [channels, W]; only what varies is asked again."""
+        if self._known is None:
+            self._known = levels(self.drive, time, worlds)
+        for k, s in enumerate(self.drive.signals.values()):
+            if not self._constant[k]:
+                self._known[k] = np.squeeze(s(time))
+        return self._known.copy()
 
     def _apart(self, one: State, other: State) -> np.ndarray:
         """Largest distance of a node, or change of an angle times the size, between two states [W] [m]."""

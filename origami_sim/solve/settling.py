@@ -70,23 +70,23 @@ class Held:
         """
         b = self.batch
         if self.remembers:
-            self.lead(start, x, dt)
-            b._overwrite(b._x, x)  # without the rounding of the way there
+            b.place(start.x, start.angles, start.memory)
+            b.lead(x, dt)
         else:
             b.place(x, start.angles)
-        if moving:
-            b._overwrite(b._v, (x - start.x) / dt)
+        b._overwrite(b._v, (x - start.x) / dt if moving else np.zeros_like(x))
         return b.total_force(time)
 
-    def lead(self, start: State, x: np.ndarray, dt: float):
-        """Leads the nodes from a state to positions within dt [s]; memory advances, and they are then at rest."""
+    def after(self, start: State, x: np.ndarray, dt: float, time: float) -> State:
+        """The state at positions x [N, W, 3], reached from another within dt [s], at a time [s]."""
         b = self.batch
-        b.place(start.x, start.angles, start.memory)
-        b._overwrite(b._v, (x - start.x) / dt)
-        b._a.zero_()
-        b._status.fill_(-1)
-        b.advance(1, dt, np.inf)
-        b._v.zero_()
+        if self.remembers:
+            b.place(start.x, start.angles, start.memory)
+            b.lead(x, dt)
+        else:
+            b.place(x, start.angles)
+            b.total_force(time)  # which also goes on with the angles
+        return b.state()
 
     def at(self, state: State, time: float, velocity: np.ndarray | None = None) -> Evaluation:
         """Forces and energies by effect in a state, at rest or at a velocity [N, W, 3]."""
@@ -107,7 +107,7 @@ class Settling(ABC):
         keeping: whether a step begins with the tangents of the one before, which is many times faster.
     """
 
-    far, iterations = FAR, ITERATIONS
+    far, iterations, close = FAR, ITERATIONS, CLOSE
 
     def __init__(
         self,
@@ -166,9 +166,7 @@ class Settling(ABC):
                 x, found = self._newton(x, found, ROUNDS)
             done |= found
         done &= wanted
-        self.moving = False
-        self._force(np.where(done[None, :, None], x, start.x))
-        out = self.held.batch.state()
+        out = self.held.after(start, np.where(done[None, :, None], x, start.x), dt, time)
         out.v[:], out.a[:] = 0.0, 0.0
         out.step, out.status = -1, np.full_like(out.status, -1)
         return out, done
@@ -180,6 +178,8 @@ class Settling(ABC):
             known = np.array([f is not None for f in self._kept])
             x, done = self._with(self._kept, x, wanted & known, KEPT)
         for _ in range(rounds):
+            if not np.any(wanted & ~done):
+                break
             factors, stable = self._factors(x, wanted & ~done)
             going = np.array([f is not None for f in factors])
             if not np.any(going):
@@ -197,8 +197,8 @@ class Settling(ABC):
         if not np.any(going):
             return x, done
         s = self._solved(factors, x, going)
-        past, before = [s], np.full(len(going), np.inf)
-        for _ in range(self.iterations):
+        past, before, worst = [s], np.full(len(going), np.inf), np.zeros(len(going))
+        for n in range(self.iterations):
             large = np.abs(s).max(axis=0, initial=0.0)
             going &= large < part * before  # else a new tangent serves better; false for nan
             far = going & (large > self.far * self.size)
@@ -206,9 +206,10 @@ class Settling(ABC):
                 x = self._moved(x, np.where(far, s * _over(np.full_like(large, self.far * self.size), large), 0.0))
                 going &= ~far
             x = self._moved(x, np.where(going, s, 0.0))
-            # the next iteration would be smaller by the same ratio again, or more
-            next_one = large * np.where(np.isfinite(before), _over(large, before), 1.0)
-            close = going & (next_one < CLOSE * self.size)
+            if n:
+                worst = np.maximum(worst, _over(large, before))
+            # the next iteration would be smaller again; not always by the same ratio, as bars relax what turns stretch
+            close = going & (large * np.sqrt(worst if n else 1.0) < self.close * self.size)
             before = large
             done |= close
             going &= ~close
@@ -354,24 +355,23 @@ class SettlingPanels(Settling):
         return 1.0
 
     def _unbalanced(self, x):
-        by = self.tree.positions(x, np.zeros((self.count, x.shape[1])))[1]
-        return np.einsum("mnwa,nwa->mw", by, self._force(x))
+        return np.einsum("mnwa,nwa->mw", self.tree.rates(x), self._force(x))
 
     def _moved(self, x, s):
         if not self.loops:
-            return self.tree.positions(x, s)[0]
+            return self.tree.moved(x, s)
         out = x.copy()
         for w in np.flatnonzero(np.any(s != 0.0, axis=0)):
             q = closed(self.tree, x[:, w], s[:, w])
             if q is not None:
-                out[:, w] = self.tree.positions(x[:, w], q[:, None])[0][:, 0]
+                out[:, w] = self.tree.moved(x[:, w], q[:, None])[:, 0]
         return out
 
     def ahead(self, before: State, now: State, ratio: float) -> np.ndarray:
         if self.loops or len(self.tree.turns):
             return now.x
         turned = now.angles - before.angles
-        return self.tree.positions(now.x, ratio * np.stack([turned[c] for c, _ in self.tree.joints]))[0]
+        return self.tree.moved(now.x, ratio * np.stack([turned[c] for c, _ in self.tree.joints]))
 
     def _factors(self, x, wanted):
         m, worlds = self.count, x.shape[1]
@@ -414,7 +414,7 @@ def coupled(model: Model, parameters: Parameters, drive: Drive) -> System:
 
 def levels(drive: Drive, time: float, worlds: int) -> np.ndarray:
     """What a drive gives at a time in each world [channels, W]; of the first world where fewer are asked for."""
-    values = [np.atleast_1d(np.squeeze(s(time))) for s in drive.signals.values()]
+    values = [np.atleast_1d(s.offset if s.constant else np.squeeze(s(time))) for s in drive.signals.values()]
     return np.stack([np.broadcast_to(v if len(v) in (1, worlds) else v[:worlds], (worlds,)) for v in values])
 
 
