@@ -14,7 +14,15 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.channels import angle_mask, stacked
 from origami_sim.fit.drives import drive_of
-from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect, along_every_axis, at_several_times, told_apart
+from origami_sim.fit.hypothesis import (
+    PLAUSIBLE,
+    Hypothesis,
+    Subject,
+    Suspect,
+    along_every_axis,
+    at_several_times,
+    told_apart,
+)
 from origami_sim.fit.measured import at_channel, continuous
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.rollouts import distinct_motions
@@ -126,7 +134,8 @@ class Curves(Worlds, ABC):
         """The suspects that curves can be asked about.
 
         Load steps have no clock: what needs one is left out. In time, an effect with a time constant is suspected with
-        several, spread over the recording, because its signature changes with it altogether. See also `told_apart`.
+        several, spread over the recording, because its signature changes with it altogether; relaxation also with
+        several at once. See also `told_apart`.
         """
         every = [s for s in told_apart(every, len(self.components)) if self.turning or not get(s.effect).on_body]
         every = along_every_axis(every)
@@ -134,7 +143,7 @@ class Curves(Worlds, ABC):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]
         low, high = min(float(t[2]) for t in spans), max(float(t[-1]) for t in spans)
-        return at_several_times(every, low, high)
+        return with_spectra(at_several_times(every, low, high), low, high)
 
     @abstractmethod
     def _curve(self, r: int, worlds: list[tuple[Model, Parameters]]) -> np.ndarray:
@@ -291,6 +300,36 @@ class Static(Curves):
 def clocked(effect: str) -> bool:
     """Whether an effect depends on how fast things happen: a parameter's unit has seconds in it (but for s^2)."""
     return effect in TIMED or any(re.search(r"(?<![A-Za-z])s(?![A-Za-z^])", p.unit) for p in get(effect).parameters)
+
+
+def with_spectra(every: Sequence[Suspect], shortest: float, longest: float) -> list[Suspect]:
+    """The suspects, and those that relax with a Prony series of two and more branches, which is one law.
+
+    Args:
+        shortest, longest: between which the time constants of a series begin, evenly in their logarithm [s].
+    """
+    out, done = list(every), set()
+    for s in every:
+        place = s.effect, s.entities, s.more
+        branches = [n for n in (1, 2, 3) if _has_branch(s.effect, n)]
+        if place in done or s.more or len(branches) < 2:
+            continue
+        done.add(place)
+        stiffness, time = s.free
+        for count in branches[1:]:
+            times = np.geomspace(shortest, longest, count + 2)[1:-1]
+            for lead in range(count):  # that of which the signature is looked at first
+                free = []
+                for n, t in enumerate(np.roll(times, -lead), 1):
+                    free.append(replace(stiffness, name=f"stiffness_{n}"))
+                    given = {"start": float(t), "scale": float(t), "spread": PLAUSIBLE * float(t)}
+                    free.append(replace(time, name=f"time_{n}", **given))
+                out.append(replace(s, free=tuple(free)))
+    return out
+
+
+def _has_branch(effect: str, n: int) -> bool:
+    return {f"stiffness_{n}", f"time_{n}"} <= {p.name for p in get(effect).parameters}
 
 
 def measures_force(recording: Recording) -> bool:
