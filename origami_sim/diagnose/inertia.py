@@ -22,6 +22,12 @@ from origami_sim.weight import weighed
 INSTANTS = 5
 """Instants of a recording at which the model's lowest frequency is asked: its start, its end, and a few between."""
 
+APART = 3.0
+"""Half a swing, in radians: second differences over as much show swings, and a quarter of the noise."""
+
+FEWEST = 8
+"""Frames so far apart that a recording has at least if inertia is not to show."""
+
 STEP = 1e-4
 """Change of a fold for differences of moments [rad]."""
 
@@ -42,10 +48,18 @@ def inertia(subject: Subject, recordings: Sequence[Recording]) -> float:
         return np.inf
     total, count = 0.0, 0
     for r in recordings:
-        few = calmer(r)
+        few = _paced(r, slowest)
+        if len(few.times) < FEWEST:
+            return np.inf
         moved, seen = _by_acceleration(few, slowest)
         total, count = total + moved + _hidden(r, few) * len(few.times), count + seen
     return float(np.sqrt(max(total, 0.0) / max(count, 1)))
+
+
+def _paced(recording: Recording, slowest: float) -> Recording:
+    """The recording thinned as `calmer` does, and to frames that are apart by `APART` over the frequency [rad/s]."""
+    step = float(np.median(np.diff(recording.times)))
+    return thinned(recording, max(1, len(recording.times) // FRAMES, round(APART / (slowest * step))))
 
 
 def calmer(recording: Recording) -> Recording:

@@ -39,9 +39,9 @@ MOVING = {"rate", "v", "v1", "v2", "v3", "speed", "velocity"}
 class Slow(Curves):
     """A `Predictor` of motions so slow that inertia does not show: equilibria along time.
 
-    Laws with memory advance exactly between frames, laws of the rate act with the mean velocity of a step, and steps
-    are cut until their error is small against the noise, in all worlds of a batch alike. A recording begins where the
-    device had rested for ever without a drive, which comes on at the first frame; or, if its start is stated as
+    Laws with memory advance exactly between frames, laws of the rate act with the velocity at the end of a step, and
+    steps are cut until their error is small against the noise, in all worlds of a batch alike. A recording begins where
+    the device had rested for ever without a drive, which comes on at the first frame; or, if its start is stated as
     "equilibrium", in the drive of the first frame.
 
     Args:
@@ -167,7 +167,7 @@ class Slow(Curves):
         pose = arm.moved(arm.reference(frames * worlds), q.reshape(m, -1) - arm.reference().angles)
         x = arm.positions(pose)
         by = arm.jacobian(pose, x).reshape(m, -1, frames, worlds, 3)
-        x = x.reshape(-1, frames, worlds, 3)
+        x, rate = x.reshape(-1, frames, worlds, 3), np.gradient(q, at, axis=1)
         drive = distorted(model, parameters, self.drives[r].on(at), float(at[-1]))
         state = State.at_rest(model, worlds, position=x[:, 0])
         every = per_world(drive, levels(drive, 0.0, worlds))
@@ -176,7 +176,8 @@ class Slow(Curves):
         for k in range(frames):
             held.batch.hold(levels(drive, float(at[k]), worlds))
             dt = float(at[k] - at[k - 1]) if k else 1.0
-            force = held.force(state, x[:, k], dt, float(at[k]), moving=k > 0)
+            velocity = np.einsum("mnwa,mw->nwa", by[:, :, k], rate[:, k])
+            force = held.force(state, x[:, k], dt, float(at[k]), velocity)
             out[:, k] = -np.einsum("mnwa,nwa->mw", by[:, :, k], force)
             state = held.batch.state()
         return out, drive

@@ -214,19 +214,17 @@ class March:
             dt = to - self.time
             last = 0.5 * dt < shortest
             ahead = self._ahead(self._before, self.state, dt)
-            whole, found = self._settle(self.state, ahead, dt, to)
+            whole, found = self._settle(self.state, self._before, dt, to)
             move = self._apart(self.state, whole)
             good, sudden = np.all(found | ~self.alive), np.zeros(len(found), bool)
             far = move > LARGE * self.size
             asked = np.any(far & self.alive) or (self.tolerance is not None and not self._straight(ahead, whole, dt))
             if good and asked:
-                ahead = self._ahead(self._before, self.state, 0.5 * dt)
-                half, first = self._settle(self.state, ahead, 0.5 * dt, to - 0.5 * dt)
-                ahead = self._ahead((self.state, 0.5 * dt), half, 0.5 * dt)
-                whole_again, second = self._settle(half, ahead, 0.5 * dt, to)
+                half, first = self._settle(self.state, self._before, 0.5 * dt, to - 0.5 * dt)
+                whole_again, second = self._settle(half, (self.state, 0.5 * dt), 0.5 * dt, to)
                 good = np.all((first & second) | ~self.alive)
                 if good:
-                    error = self._apart(whole, whole_again) / (1.0 if self.search.viscous else 3.0)
+                    error = self._apart(whole, whole_again) / 3.0
                     larger = np.maximum(self._apart(self.state, half), self._apart(half, whole_again))
                     sudden = self.alive & far & (larger > SUDDEN * move)
                     good = not np.any(sudden)
@@ -258,19 +256,21 @@ class March:
     def _straight(self, ahead: np.ndarray | None, new: State, dt: float) -> bool:
         """Whether the way within a step departs from a straight one by less than the tolerance, in all worlds.
 
-        The second difference with the step before gives the curvature; of laws of the rate the whole change of the
-        velocity counts, of those that remember the sag of the way.
+        The second difference with the step before gives the curvature, and that how far the way sags.
         """
         if ahead is None or self._before is None or self.tolerance is None:
             return False
-        part = dt / (dt + self._before[1]) * (1.0 if self.search.viscous else 0.25)
+        part = 0.25 * dt / (dt + self._before[1])
         off = part * np.linalg.norm(new.x - ahead, axis=-1).max(axis=0)
         return not np.any(self.alive & (off > self.tolerance * self.size))
 
-    def _settle(self, state: State, ahead: np.ndarray | None, dt: float, to: float) -> tuple[State, np.ndarray]:
+    def _settle(self, state: State, past: tuple[State, float] | None, dt: float, to: float):
+        """The state after a step from another, and which worlds have one; `past` is where the step before began."""
         self.steps += 1
+        ahead = self._ahead(past, state, dt)
         level, guess = self._levels(to, state.worlds), state.x if ahead is None else ahead
-        return self.search.settle(level, state, guess, self.alive, dt=dt, time=to, search=False)
+        past = None if ahead is None else past
+        return self.search.settle(level, state, guess, self.alive, dt=dt, time=to, search=False, past=past)
 
     def _levels(self, time: float, worlds: int) -> np.ndarray:
         """Levels of the drive at a time [channels, W]; only what varies is asked again."""

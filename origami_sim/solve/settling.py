@@ -63,10 +63,12 @@ class Held:
         self.batch = Batch(still, parameters, drive, state, among=among, threads=threads)
         self.remembers = any(get(e).memory for e in model.laws)
 
-    def force(self, start: State, x: np.ndarray, dt: float, time: float, *, moving: bool = False) -> np.ndarray:
+    def force(
+        self, start: State, x: np.ndarray, dt: float, time: float, velocity: np.ndarray | None = None
+    ) -> np.ndarray:
         """Forces [N, W, 3] at positions x [N, W, 3], reached from a state within dt [s], at a time [s].
 
-        They are those at rest, or, if `moving`, at the mean velocity of the way there.
+        They are those at rest, or at a velocity [N, W, 3].
         """
         b = self.batch
         if self.remembers:
@@ -74,7 +76,7 @@ class Held:
             b.lead(x, dt)
         else:
             b.place(x, start.angles)
-        b._overwrite(b._v, (x - start.x) / dt if moving else np.zeros_like(x))
+        b._overwrite(b._v, np.zeros_like(x) if velocity is None else velocity)
         return b.total_force(time)
 
     def after(self, start: State, x: np.ndarray, dt: float, time: float) -> State:
@@ -103,7 +105,7 @@ class Settling(ABC):
         model: for the couplings. worlds: model and parameters of each world, alike but for geometry and numbers.
         drive: one level of every channel for each world. state: one world each, for their number and memory.
         among: effects of the program, see `Batch`.
-        viscous: whether laws of the rate act, with the mean velocity of a step (of first order in it).
+        viscous: whether laws of the rate act, with the velocity at the end of a step.
         keeping: whether a step begins with the tangents of the one before, which is many times faster.
     """
 
@@ -122,6 +124,7 @@ class Settling(ABC):
     ):
         self.worlds, self.among, self.threads, self.viscous = worlds, among, threads, viscous
         self.keeping, self._kept = keeping, [None] * len(worlds)
+        self.past: tuple[State, float] | None = None
         self.moving = False
         self.model = worlds[0][0]
         self.drive, self.start, self.dt, self.time = drive, state, 1.0, 0.0
@@ -142,6 +145,7 @@ class Settling(ABC):
         time: float,
         search: bool = True,
         gradual: bool = True,
+        past: tuple[State, float] | None = None,
     ) -> tuple[State, np.ndarray]:
         """The state at the equilibria at the end of a step, and which of the worlds wanted have one [W].
 
@@ -150,9 +154,10 @@ class Settling(ABC):
             dt: length of the step [s]. time: its end [s].
             search: also look far away for worlds whose equilibrium ceased to exist.
             gradual: whether the device moves for as long as the step lasts; else laws of the rate are silent.
+            past: where the step before this one began, and its length [s], if the motion goes on from there.
         """
         self.start, self.dt, self.time, self.levels = start, dt, time, level
-        self.moving = self.viscous and gradual
+        self.moving, self.past = self.viscous and gradual, past
         self.held.batch.hold(level)
         x, done = self._newton(guess, wanted, ROUNDS)
         lost = wanted & ~done
@@ -238,7 +243,22 @@ class Settling(ABC):
 
     def _force(self, x: np.ndarray) -> np.ndarray:
         """Forces [N, W, 3] at positions [N, W, 3] at the end of the step."""
-        return self.held.force(self.start, x, self.dt, self.time, moving=self.moving)
+        return self.held.force(self.start, x, self.dt, self.time, self._velocity(x))
+
+    def _velocity(self, x: np.ndarray, of: np.ndarray | None = None) -> np.ndarray | None:
+        """Velocities at the end of the step at positions [N, K, 3] of worlds `of` (K,); None: at rest.
+
+        Backward differences of second order, where the step before is known (Curtiss & Hirschfelder 1952).
+        """
+        if not self.moving:
+            return None
+        worlds = slice(None) if of is None else of
+        begin = self.start.x[:, worlds]
+        rate = (x - begin) / self.dt
+        if self.past is None:
+            return rate
+        before, dt = self.past
+        return rate + (rate - (begin - before.x[:, worlds]) / dt) * (self.dt / (self.dt + dt))
 
     def ahead(self, before: State, now: State, ratio: float) -> np.ndarray:
         """Positions [N, W, 3] to which worlds go on as they went between two states, `ratio` times as far."""
@@ -306,7 +326,8 @@ class SettlingBars(Settling):
         for w in np.flatnonzero(wanted):
             start = self.start.select(np.full(count, w))
             copies = self._copies(int(w), count)
-            forces = copies.force(start, x[:, w, None] + y.moves, self.dt, self.time, moving=self.moving)
+            moved = x[:, w, None] + y.moves
+            forces = copies.force(start, moved, self.dt, self.time, self._velocity(moved, np.full(count, w)))
             k = y.assembled(forces)
             if not np.all(np.isfinite(k.data)):
                 continue
@@ -384,7 +405,7 @@ class SettlingPanels(Settling):
             drive, state = per_world(self.drive, self.levels[:, each]), self.start.select(each)
             self._every = Held(self.model, parameters, drive, state, among=self.among, threads=threads)
         self._every.batch.hold(self.levels[:, each])
-        f = self._every.force(self.start.select(each), moved, self.dt, self.time, moving=self.moving)
+        f = self._every.force(self.start.select(each), moved, self.dt, self.time, self._velocity(moved, each))
         moments = np.einsum("mnwa,nwa->mw", by, f).reshape(m, worlds, copies)
         out: list[_Small | None] = [None] * worlds
         stable = np.zeros(worlds, bool)
