@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose import Diagnosis, Subject, diagnose
-from origami_sim.fit.curves import sign_changes
+from origami_sim.diagnose.locate_curves import sign_changes
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scene import read_calibration, recordings_folder, scene_module, scene_settings
@@ -90,7 +90,7 @@ def show(d: Diagnosis):
     print(d.verdict, f"p = {d.probability:.3f}:", d.sentence)
     for c in d.candidates:
         numbers = ", ".join(f"{n.label} {n.value:.4g} [{n.low:.4g}, {n.high:.4g}] {n.unit}" for n in c.numbers)
-        print(f"  {c.label}: p {c.probability:.3f}, held-out rms {c.rms}, gain {c.gain:.1f} +- {c.error:.1f}")
+        print(f"  {c.label}: p {c.probability:.3f}, held-out rms {c.rms}")
         print(f"    {numbers}; {c.why}{'; ' + c.distrust if c.distrust else ''}{c.failed}")
     print("  rms as given", d.error_before, "refitted", d.error_refitted, "after", d.error_after, "noise", d.noise)
     for s in d.screening[:8]:

@@ -180,6 +180,12 @@ def _parser() -> argparse.ArgumentParser:
         default="auto",
         help="rigid bodies, or bars that bend (default: rigid where bending could not show)",
     )
+    p.add_argument(
+        "--motion",
+        choices=("auto", "dynamic", "quasistatic"),
+        default="auto",
+        help="with inertia, or equilibria along time (default: as stated, or the latter where inertia could not show)",
+    )
     p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
 
     p = command(

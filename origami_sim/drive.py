@@ -85,6 +85,11 @@ class Signal:
         sampled = self.values is not None and np.any(self.scale) and np.any(self.values)
         return not (np.any(self.offset) or np.any(self.amplitude) or sampled)
 
+    @property
+    def constant(self) -> bool:
+        """Whether it is the offset alone."""
+        return self.times is None and not np.any(self.amplitude)
+
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """The signal at times t [s]; arrays of worlds and of times broadcast."""
         value = self.offset + self.amplitude * np.sin(2 * math.pi * np.asarray(self.frequency) * t + self.phase)

@@ -10,10 +10,11 @@ from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.rigid_reactions import held_nodes, support_of_all
 from origami_sim.solve.statics import Equilibrium, equilibrium
 
 FAR = 5.0
@@ -288,17 +289,16 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     a load cell that is not set to zero). Axes that are free count nothing. The ground's force is the sum of all contact
     effects. The drive is taken at each frame; memory at its value of the state.
 
+    Of rigid panels only the force of all supports together is determined (`solve.rigid_reactions`): how held nodes
+    share it is not.
+
     Raises:
         InputError: nodes of which no axis is held, a ground without contact effects; in a run, an effect with memory
-            that acts there, because a trajectory keeps no memory.
+            that acts there, because a trajectory keeps no memory; some only of the nodes that hold rigid panels.
     """
     model = poses.model
     field = f"channels.{channel.name}"
     ground = bool(channel.attachment.get("ground", False))
-    if model.panels == "rigid" and not ground:
-        raise InputError(
-            "rigid panels do not tell the force of a support", field=field, value="force", allowed="panels = 'elastic'"
-        )
     many = channel.attachment.get("nodes")
     names = [channel.attachment.get("node")] if many is None else many
     nodes = [] if ground else [_find(model, channel, "node", one, len(model.position)) for one in names]
@@ -308,20 +308,34 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     held = 1.0 - model.free[nodes]
     if not ground and not held.any():
         raise InputError("no axis of these nodes is held", field=field, value=nodes, allowed="supported nodes")
+    together = model.panels == "rigid" and not ground
+    missing = sorted(set(held_nodes(model).tolist()) - set(nodes)) if together else []
+    if missing:
+        raise InputError(
+            "how the nodes that hold rigid panels share their force is not determined: a channel has to read all",
+            field=f"{field}.nodes",
+            value=nodes,
+            allowed=f"nodes {held_nodes(model).tolist()}, or panels = 'elastic'",
+        )
     if poses.state is None or poses.drive is None:
         raise InputError("a force needs states and a drive", field=field)
     batch = Batch(model, poses.parameters, poses.drive, poses.state)
 
     def acting(time: float) -> np.ndarray:
-        """Forces [nodes, F, 3] of contacts or of all effects, the drive being held in every frame."""
-        if ground:
-            forces = batch.evaluate(time).forces
-            return sum((forces[n] for n in contacts), np.zeros_like(forces[contacts[0]]))
-        return -held[:, None] * batch.total_force(time)[nodes]
+        """Forces [N, F, 3] of contacts or of all effects, the drive being held in every frame."""
+        if not ground:
+            return batch.total_force(time)
+        forces = batch.evaluate(time).forces
+        return sum((forces[n] for n in contacts), np.zeros_like(forces[contacts[0]]))
 
     if any("time" in get(n).drives for n in model.laws):  # such a law sees the time of its own frame
-        return np.stack([acting(float(time))[:, frame].sum(axis=0) for frame, time in enumerate(poses.times)])
-    return acting(0.0).sum(axis=0)
+        force = np.stack([acting(float(time))[:, frame] for frame, time in enumerate(poses.times)], axis=1)
+    else:
+        force = acting(0.0)
+    if together:
+        mass = np.broadcast_to(node_mass(model, poses.parameters), (len(model.position), 1))[:, 0]
+        return support_of_all(model, mass, poses.state.x, poses.state.v, force)
+    return force.sum(axis=0) if ground else -(held[:, None] * force[nodes]).sum(axis=0)
 
 
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:

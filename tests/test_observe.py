@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from origami_sim import Sheet, miura, simulate, strip
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.materials import G
+from origami_sim.model import Model, Parameters, node_mass
 from origami_sim.observe import body_point, channel_frames, check_scene, follow, observe, observe_equilibria
 from origami_sim.recording import Camera, Channel, Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import pendulum_chain
+from origami_sim.solve.rigid_reactions import held_nodes
 
 
 @pytest.fixture(scope="module")
@@ -322,3 +325,52 @@ def test_a_marker_measured_from_a_hinge_does_not_move_when_the_length_is_refitte
     far = replace(given, attachment=given.attachment | {"distance": 45.0})
     with pytest.raises(InputError, match=r"off the middle of a panel.*channels\.c\.distance.*45"):
         check_scene(recording([0.0, 0.1], far), model)
+
+
+# --- supports of rigid panels
+
+
+def test_the_supports_of_rigid_panels_carry_weight_and_momentum():
+    """A swinging double chain: force of all supports against the derivative of the momentum that the run has."""
+    s = read_calibration(pendulum_chain.CALIBRATION).replace(duration=0.3).with_panels("rigid")
+    fine = pendulum_chain.swing(s, rate=2000.0)
+    model, mass = fine.model, node_mass(fine.model, fine.parameters)[:, 0]
+    held = held_nodes(model).tolist()
+    force = channel_frames(fine, channel("force", np.zeros((2, 3)), unit="N", nodes=held))
+    weight = mass.sum() * np.array([0.0, 0.0, -s.gravity])
+    momentum = CubicSpline(fine.times, np.einsum("n,fnc->fc", mass, fine.v[:, :, 0]))
+    inner = slice(20, -20)  # where the spline's ends are far
+    expected = momentum(fine.times, 1)[inner] - weight
+    np.testing.assert_allclose(force[inner], expected, atol=1e-5 * np.abs(expected).max())
+    with pytest.raises(InputError, match="share their force is not determined"):
+        channel_frames(fine, channel("force", np.zeros((2, 3)), unit="N", nodes=held[:1]))
+
+
+def test_the_support_of_a_falling_plate_follows_the_closed_form():
+    """A rod let go horizontally, when it has fallen by a: 5/2 W sin a along it, 1/4 W cos a across it."""
+    density, thickness = 1000.0, 1e-5
+    sheet = Sheet(strip([0.02, 0.05], 0.02), thickness=thickness, density=density, panels="rigid").fix(panels=[0])
+    model, parameters = sheet.crease(stiffness=0.0).gravity().build()
+    run = simulate(model, parameters, duration=0.08, rate=500.0)
+    a = np.abs(run.creases[:, 0, 0])
+    given = channel("force", np.zeros((2, 3)), unit="N", nodes=held_nodes(model).tolist())
+    held, falls = (density * thickness * 0.02 * length * G for length in (0.02, 0.05))
+    expected = held + falls * (2.5 * np.sin(a) ** 2 + 0.25 * np.cos(a) ** 2)
+    assert a[-1] > 0.8
+    np.testing.assert_allclose(channel_frames(run, given)[:, 2], expected, rtol=1e-7)
+
+
+def test_the_supports_of_a_loop_of_rigid_panels():
+    """Panels around one vertex, thrown: the momentum changes by what supports and weight give."""
+    sheet = Sheet(miura(1, 1, 0.02, 0.02, np.pi / 3, fold_angle=np.pi / 4), thickness=1e-3, panels="rigid")
+    model, parameters = sheet.fix(panels=[0]).crease(stiffness=2e-3).gravity().build()
+    parameters.set("crease", "rest_angle", 1.2, entities=0)
+    run = simulate(model, parameters, duration=0.02, rate=20_000.0)
+    given = channel("force", np.zeros((2, 3)), unit="N", nodes=held_nodes(model).tolist())
+    mass = node_mass(model, parameters)[:, 0]
+    momentum = CubicSpline(run.times, np.einsum("n,fnc->fc", mass, run.v[:, :, 0]))
+    weight = mass.sum() * np.array([0.0, 0.0, -G])
+    inner = slice(20, -20)
+    expected = momentum(run.times, 1)[inner] - weight
+    assert np.abs(expected + weight).max() > 0.3 * np.abs(weight).max()
+    np.testing.assert_allclose(channel_frames(run, given)[inner], expected, atol=1e-4 * np.abs(expected).max())

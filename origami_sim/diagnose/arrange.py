@@ -1,10 +1,11 @@
-"""How recordings are predicted: as curves, by rigid panels, or by bars where panels visibly bend."""
+"""How recordings are predicted: as curves, as slow motions, by rigid panels, or by bars where panels visibly bend."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from origami_sim.articulation import Articulation
+from origami_sim.diagnose.inertia import calmer, inertia
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
 from origami_sim.fit.bars import BarRollouts
@@ -15,6 +16,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.prescribed import curves
 from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.rollouts import Rollouts
+from origami_sim.fit.slow import Slow, restless
 from origami_sim.fit.starts import channel_tangent, local_line, spans
 from origami_sim.fit.weights import Weights
 from origami_sim.recording import Recording
@@ -40,6 +42,17 @@ FEWEST = 8
 BENDING = 0.3
 """Change by the bending of panels, over the noise, up to which they are taken as rigid."""
 
+BENT = (
+    "Panels are taken as rigid: with those of the model, bending would change what is measured by {:.2g} times its "
+    "noise."
+)
+
+INERT = 0.3
+"""Change by inertia, over the noise, up to which a motion is taken as quasi-static."""
+
+LOOKED_AT = 16
+"""Frames of a slow motion in which bending is looked for."""
+
 JOINTS = 16
 """Creases of rigid panels beyond which their dense equations are slower than bars."""
 
@@ -59,6 +72,9 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> tuple
     curve = curves(subject, recordings, o.threads)
     if curve is not None:
         return curve, []
+    slow = slowly(subject, recordings, o)
+    if slow is not None:
+        return slow
     shortest = 8 * max(float(np.median(np.diff(r.times))) for r in recordings)
     if o.segment is not None and not shortest <= o.segment < np.inf:
         raise InputError(
@@ -79,6 +95,76 @@ def arranged(subject: Subject, recordings: list[Recording], o: Options) -> tuple
     return bar_rollouts(subject, recordings, o), []
 
 
+def slowly(subject: Subject, recordings: list[Recording], o: Options) -> tuple[Predictor, list[str]] | None:
+    """Predictions by equilibria along time; None unless that is stated, or inertia could not show.
+
+    Raises:
+        InputError: recordings that state different motions; what `Slow` refuses where it was asked for.
+    """
+    stated = {r.motion for r in recordings} - {None}
+    if len(stated) > 1:
+        raise InputError(
+            "recordings that move quasi-statically and others cannot be diagnosed together",
+            field="motion",
+            value=", ".join(f"{r.name}: {r.motion}" for r in recordings),
+        )
+    asked = o.motion if o.motion != "auto" else next(iter(stated), "auto")
+    if asked == "dynamic" or (asked == "auto" and (o.segment is not None or o.start is not None)):
+        return None
+    notes = ["The motion is quasi-static, as stated: inertia is left out."]
+    if asked == "auto":
+        if any(r.start is not None and r.start.state != "equilibrium" for r in recordings):
+            return None
+        shows = inertia(subject, recordings)
+        if shows > INERT:
+            return None
+        notes = [
+            "The motion is taken as quasi-static: its accelerations would change what is measured by "
+            f"{shows:.2g} times its noise. What is simulated are equilibria along time, with losses and memory."
+        ]
+    for what, value in (("segment", o.segment), ("start-at", o.start)):
+        if value is not None:
+            raise InputError("a quasi-static motion has no such start", field=what, value=value, allowed="none")
+    few = [calmer(r) for r in recordings]
+    if sum(len(r.times) for r in few) < sum(len(r.times) for r in recordings):
+        notes.append(f"Frames are averaged to {sum(len(r.times) for r in few):,}, in which what is slow shows.")
+    out, more = _slow_panels(subject, few, o)
+    if asked == "auto":
+        nominal = np.array([f.start for f in out.subject.nominals])
+        if not all(np.all(np.isfinite(v)) for v in out.predict(Hypothesis(), nominal[None])):
+            return None
+    return out, [*notes, *more, *restless(few, out.drives)]
+
+
+def _slow_panels(subject: Subject, recordings: list[Recording], o: Options) -> tuple[Slow, list[str]]:
+    """Slow motions of rigid panels, or of bars where they visibly bend."""
+    given = subject.build({f.name: f.start for f in subject.nominals})[0].panels
+    if o.panels == "elastic" or given == "rigid":
+        return Slow(subject, recordings, threads=o.threads), []
+    try:
+        rigid = Slow(subject, recordings, panels="rigid", threads=o.threads)
+        if o.panels == "rigid":
+            return rigid, []
+        bent = np.inf
+        if len(rigid.articulation.creases) <= JOINTS:
+            bent = slow_bending(subject, recordings, o)
+    except InputError:
+        if o.panels == "rigid":
+            raise
+        return Slow(subject, recordings, threads=o.threads), []
+    if bent > BENDING:
+        return Slow(subject, recordings, threads=o.threads), []
+    return rigid, [BENT.format(bent)]
+
+
+def slow_bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
+    """Root mean square change by the bending of panels, over the noise, in a few frames of a slow motion."""
+    few = [r.only(np.unique(np.linspace(0, len(r.times) - 1, LOOKED_AT).round().astype(int))) for r in recordings]
+    bars = Slow(subject, few, pieces=1, threads=o.threads)
+    rigid = Slow(subject, few, pieces=1, panels="rigid", threads=o.threads)
+    return _absorbed(bars, rigid, np.zeros((len(rigid.blocks), 0)))
+
+
 def rigid_rollouts(
     subject: Subject, recordings: list[Recording], o: Options, *, forced: bool
 ) -> tuple[Predictor, list[str]] | None:
@@ -97,10 +183,7 @@ def rigid_rollouts(
         bent = bending(subject, recordings, o)
         if bent > BENDING:
             return None
-        notes.append(
-            f"Panels are taken as rigid: with those of the model, bending would change what is measured by {bent:.2g} "
-            "times its noise."
-        )
+        notes.append(BENT.format(bent))
     if touching:  # a contact is no smooth function of a start
         start = o.start or starting(subject, recordings)
         return RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads), notes
@@ -121,9 +204,14 @@ def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
         return np.inf
     rigid = RigidRollouts(subject, recordings, segment=length, tied=False, threads=o.threads)
     rigid.blocks = [replace(rigid.segment(b.recording, b.first, len(b.times)), values=b.values) for b in bars.blocks]
-    free, every = subject.nominals, list(range(len(bars.blocks)))
-    theta, local = np.array([f.start for f in free]), np.zeros((len(every), rigid.local))
-    weights = Weights(bars.blocks[0].noise)
+    return _absorbed(bars, rigid, np.zeros((len(rigid.blocks), rigid.local)))
+
+
+def _absorbed(bars: Predictor, rigid: Predictor, local: np.ndarray) -> float:
+    """Root mean square change from rigid panels to bars, in noise, beyond what numbers and starts could absorb."""
+    free, every = rigid.subject.nominals, list(range(len(rigid.blocks)))
+    theta = np.array([f.start for f in free])
+    weights = Weights(rigid.blocks[0].noise)
     line = linearise(rigid, Hypothesis(), free, theta, local, every, weights)
     gaps = []
     for n, (one, other) in enumerate(

@@ -85,7 +85,7 @@ def run(args: Namespace) -> int:
     subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
-    options = replace(_options(args), possible=getattr(module, "POSSIBLE", None))
+    options = replace(_options(args, settings), possible=getattr(module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
     keep, progress = Keep(folder / RESUME), Progress()
     files = keep.write = Files(folder, settings, name, keep)
@@ -192,7 +192,8 @@ def _assigned(settings: Settings, assignments: Sequence[str], source: object) ->
     if not assignments:
         return settings
     changed = Settings(list(settings.values()), Path(str(source)), settings.effects).override(assignments)
-    return Settings(list(changed.values()), settings.file, settings.effects)
+    out = Settings(list(changed.values()), settings.file, settings.effects, accuracy=settings.accuracy)
+    return out.with_panels(settings.panels).with_motion(settings.motion, settings.until)
 
 
 @contextmanager
@@ -229,13 +230,14 @@ def _priors(
     return out | spreads(settings, own, source="--prior"), tuned, aligned
 
 
-def _options(args: Namespace) -> Options:
+def _options(args: Namespace, settings: Settings) -> Options:
     if args.segment is not None and not args.segment > 0:
         raise InputError("must be positive", field="--segment", value=args.segment, allowed="> 0 s")
     if args.start_at == "rest" and args.segment is not None:
         raise InputError("segments have starts of their own", field="--start-at", value="rest", allowed="no --segment")
     options = THOROUGH if args.thorough else Options()
-    return replace(options, panels=args.panels, segment=args.segment, start=args.start_at)
+    motion = args.motion if args.motion != "auto" else settings.motion or "auto"
+    return replace(options, motion=motion, panels=args.panels, segment=args.segment, start=args.start_at)
 
 
 def _check_folder(folder: Path, model: str) -> None:

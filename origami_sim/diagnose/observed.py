@@ -112,7 +112,7 @@ def check_recording(recording: Recording, model: Model, step: float = np.inf) ->
         return []
     return [
         f"A frame of '{recording.name}' lasts {frame:.3g} s, {frame / step:.2g} steps of the solver, which takes long: "
-        "are the times in ms? Slow loads are better given as load steps."
+        "are the times in ms? A slow motion is followed along equilibria: motion = 'quasistatic' in the sidecar."
     ]
 
 

@@ -11,6 +11,8 @@ class Options:
     """How a diagnosis looks; the defaults are what an experimenter wants.
 
     Attributes:
+        motion: "dynamic", "quasistatic" (equilibria along time), or "auto": as stated, or quasi-static where inertia
+            could not show.
         panels: "rigid", "elastic", or "auto": rigid where bending could not show.
         segment: length of a segment [s], each with a start of its own; None: what can be predicted.
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
@@ -20,6 +22,7 @@ class Options:
             sidecar states goes before either.
     """
 
+    motion: str = "auto"
     panels: str = "auto"
     segment: float | None = None
     start: str | None = None

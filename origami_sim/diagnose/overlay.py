@@ -26,6 +26,7 @@ SHOWN = ("before", "after")
 """Fits that are shown: the model as given, and the best explanation."""
 
 STEPS = "Seconds are load steps."
+SLOW = "Every frame is an equilibrium, as time goes on."
 SEGMENTS = "Every segment of the recording is simulated from a start of its own: there both meet again."
 
 MOST = 6
@@ -79,7 +80,7 @@ def film(forward: Predictor, fits: dict[str, Fit], r: int) -> Overlay:
         films,
         {n: _crease_gaps(model, x, recorded) for n, x in films.items()},
         {n: _panel_gaps(model, x, recorded) for n, x in films.items()},
-        STEPS if recording.by_step else SEGMENTS,
+        STEPS if recording.by_step else SLOW if forward.curve else SEGMENTS,
     )
 
 

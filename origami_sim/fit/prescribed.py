@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import warp as wp
 
 from origami_sim.articulation import Articulation
 from origami_sim.distort import distorted
 from origami_sim.errors import InputError
-from origami_sim.fit.curves import HOLD, PIECES, Balance, Curves, Static, onward
+from origami_sim.fit.curves import HOLD, PIECES, Balance, Curves, Static
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.observe import _index
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.settling import levels, per_world
 
 PATH = "crease_angle"
 """Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
@@ -83,14 +83,15 @@ class Prescribed(Curves):
         drive = distorted(model, parameters, self.drives[r], float(times[-1]))
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
-        batch = Batch(still, parameters, drive, state, threads=self.threads, among=self.shared)
+        every = per_world(drive, levels(drive, 0.0, count))
+        batch = Batch(still, parameters, every, state, threads=self.threads, among=self.shared)
         moments = np.empty((len(q), frames, count))
         for k in range(frames):
+            batch.hold(levels(drive, float(times[k]), count))
             if k:
-                dt = HOLD if recording.by_step else float(times[k] - times[k - 1])
-                onward(batch, (x[:, k] - x[:, k - 1]) / dt, dt)
+                batch.lead(x[:, k], HOLD if recording.by_step else float(times[k] - times[k - 1]))
             velocity = np.einsum("mnwa,m->nwa", jacobian[:, :, k], rate[:, k])
-            batch._v.assign(batch._upload(velocity, wp.vec3d))
+            batch._overwrite(batch._v, velocity)
             force = batch.total_force(float(times[k]))
             moments[:, k] = -np.einsum("mnwa,nwa->mw", jacobian[:, :, k], force)
         rows = [self._row(c) for c in recording.channels.values()]

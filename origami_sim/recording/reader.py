@@ -45,6 +45,8 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
     times = side.times(table)
     if side.start is not None and side.time_base(table) == "step":
         raise InputError("a quasi-static curve has no start", file=description, field="start", value=side.start.state)
+    if side.motion == "dynamic" and side.time_base(table) == "step":
+        raise InputError("load steps have no clock", file=description, field="motion", value=side.motion)
     specs = {name: _with_unit(name, spec, table, side) for name, spec in side.channels.items()}
     cameras = {name: _camera(name, spec, side) for name, spec in specs.items() if spec["camera"] is not None}
     specs = {name: _with_noise(spec, cameras.get(name)) for name, spec in specs.items()}
@@ -90,6 +92,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
         },
         gravity=side.gravity,
         start=side.start,
+        motion=side.motion,
     )
 
 

@@ -123,6 +123,7 @@ class Recording:
         metadata: source file and checksum, scene, notes of the lint, and what else the sidecar tells.
         gravity: which way it pointed; None: as the model has it.
         start: how the motion begins at the first frame; None if that is not stated.
+        motion: "dynamic", or "quasistatic" where inertia does not count; None if that is not stated.
     """
 
     name: str
@@ -132,6 +133,7 @@ class Recording:
     metadata: dict = field(default_factory=dict)
     gravity: "Gravity | None" = None
     start: "Start | None" = None
+    motion: str | None = None
 
     def __post_init__(self) -> None:
         for what, text in (("name", self.name), *(("channels", name) for name in self.channels)):

@@ -3,6 +3,7 @@
     name = "double pendulum, run 1"     # the file's stem when left out
     description = "..."                 # also licence: free text, kept in the metadata
     allow_gaps = false                  # true: missing values and time gaps become notes instead of errors
+    motion = "quasistatic"              # optional: inertia does not count, such as in ramps and holds; or "dynamic"
     allow_swaps = false                 # true: markers that seem to exchange names become notes instead of errors
 
     [source]                            # optional; or source = "free text"
@@ -102,7 +103,7 @@ from origami_sim.possible import Possible
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
-from origami_sim.recording.stated import Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
+from origami_sim.recording.stated import MOTIONS, Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
 from origami_sim.recording.table import Table
 from origami_sim.recording.trackers import FORMATS
 from origami_sim.recording.units import unit_factor
@@ -114,6 +115,7 @@ _TOP_KEYS = (
     "licence",
     "allow_gaps",
     "allow_swaps",
+    "motion",
     "select",
     "time",
     "channels",
@@ -166,6 +168,7 @@ class Sidecar:
     gravity: Gravity | None
     start: Start | None
     possible: dict[str, Any]
+    motion: str | None
 
     @classmethod
     def read(cls, path: Path) -> "Sidecar":
@@ -204,6 +207,7 @@ class Sidecar:
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
             possible=_possible_spec(path, top.table("possible")),
+            motion=top.choice("motion", dict.fromkeys(MOTIONS)) if "motion" in tree else None,
         )
 
     @property

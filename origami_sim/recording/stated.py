@@ -13,6 +13,7 @@ from origami_sim.recording.units import unit_factor
 
 POSES = ("hanging", "upside down", "lying")
 STATES = ("released", "equilibrium", "moving")
+MOTIONS = ("dynamic", "quasistatic")
 _GRAVITY_KEYS = ("pose", "down", "face", "size")
 _START_KEYS = ("state", "angles", "sd", "rate_sd")
 

@@ -84,6 +84,8 @@ class Batch:
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         self._pool: ThreadPoolExecutor | None = None
         self._total: wp.Launch | None = None
+        self._led: wp.Launch | None = None
+        self._views: dict[int, np.ndarray] = {}
         self.step = state.step
 
         def constant(a, dtype):
@@ -250,8 +252,16 @@ class Batch:
             out.assign(padded)
         return out
 
+    def _view(self, a: wp.array) -> np.ndarray:
+        """One of the batch's own arrays as numpy sees it; on the CPU it is the memory itself, and looked up once."""
+        if not self.device.is_cpu:
+            return a.numpy()
+        if id(a) not in self._views:
+            self._views[id(a)] = a.numpy()
+        return self._views[id(a)]
+
     def _download(self, a: wp.array, rows: int) -> np.ndarray:
-        return a.numpy()[:rows, : self.worlds].copy()
+        return self._view(a)[:rows, : self.worlds].copy()
 
     def _launch(self, kernel: wp.Kernel, outputs: list):
         """Runs a kernel over all worlds, split over threads on the CPU (a launch releases the interpreter lock)."""
@@ -274,6 +284,32 @@ class Batch:
     def advance(self, steps: int, dt: float, speed_limit: float):
         """Takes so many steps of dt [s]; a world faster than `speed_limit` [m/s] stops and keeps its status."""
         self._run(steps, dt, speed_limit, 0, self._nothing, self._no_angles, self._nothing)
+
+    def lead(self, x: np.ndarray, dt: float):
+        """Leads nodes that are held from where they are to positions [N, W, 3] within dt [s], where they then rest.
+
+        Memory advances. (For rigid panels, make a batch of which all nodes are held.)
+        """
+        assert not self.model.free.any()
+        self._overwrite(self._v, (x - self._download(self._x, len(x))) / dt)
+        self._overwrite(self._a, np.zeros_like(x))
+        self._overwrite(self._status, np.full((2, self.worlds), -1, np.int32))
+        if self.threads > 1 or self.device.is_cuda:
+            self.advance(1, dt, np.inf)
+        else:  # asked many times over, and a recorded launch costs a tenth
+            if self._led is None:
+                rest = [self._a, self._f, self._work, self._power, self._status, 0, 0, 1, wp.float64(dt)]
+                rest += [wp.float64(np.inf), 0, self._nothing, self._no_angles, self._nothing]
+                inputs = [*self._constants, self._x, self._v, self._angles, self._memory, *rest]
+                self._led = wp.launch(
+                    self.program.rollout, dim=self.worlds, inputs=inputs, device=self.device, record_cmd=True
+                )
+            assert self._led is not None
+            self._led.set_param_by_name("dt", wp.float64(dt))
+            self._led.launch()
+            self.step = max(self.step, 0) + 1
+        self._overwrite(self._x, x)  # without the rounding of the way there
+        self._overwrite(self._v, np.zeros_like(x))  # not what the step predicts for its end
 
     def film(self, frames: int, steps: int, dt: float, speed_limit: float) -> tuple[np.ndarray, np.ndarray]:
         """Takes `steps` steps for each frame, and keeps every frame.
@@ -380,13 +416,13 @@ class Batch:
         host = self._arranged(np.asarray(levels, float))
         assert len(host) == size
         if self.device.is_cpu:
-            self._buffer.numpy()[first : first + len(host)] = host
+            self._view(self._buffer)[first : first + len(host)] = host
         else:
             wp.copy(self._buffer, wp.array(host, dtype=wp.float64, device=self.device), first, 0, len(host))
 
     def _overwrite(self, target: wp.array, a: np.ndarray):
         if self.device.is_cpu:  # without an array in between
-            target.numpy()[: len(a), : self.worlds] = a
+            self._view(target)[: len(a), : self.worlds] = a
         else:
             target.assign(self._upload(a, target.dtype))
 

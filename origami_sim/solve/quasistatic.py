@@ -45,6 +45,9 @@ LARGE = 0.05
 SUDDEN = 0.9
 """Part of a large move that one half of a step may make; half is even, 3/4 a parabola from rest, 1 a jump."""
 
+FARTHEST = 4.0
+"""Length of a step over that of the one before, up to which it is looked ahead from there."""
+
 KNOT = 0.01
 """Part of a drive's range by which its samples between frames may depart from a straight line unseen."""
 
@@ -162,16 +165,22 @@ def quasistatic(
 class March:
     """Steps from instant to instant.
 
+    A step that ends nearly where the one before pointed to is as short as it has to be; any other is taken twice.
+
     Args:
         search: equilibria at the end of a step. drive: as it reaches the device.
         tolerance: of one step; None takes whole steps, unless something moves too far or is not found.
+        shortest: see `SHORTEST`.
 
     Attributes:
         state, time: where it is. alive: [W] worlds that still have equilibria. jumps, failures: what happened.
     """
 
-    def __init__(self, search: Settling, drive: Drive, tolerance: float | None):
-        self.search, self.drive, self.tolerance = search, drive, tolerance
+    def __init__(self, search: Settling, drive: Drive, tolerance: float | None, *, shortest: float = SHORTEST):
+        self.search, self.drive, self.tolerance, self.shortest = search, drive, tolerance, shortest
+        self._before: tuple[State, float] | None = None
+        self._constant = [s.constant for s in drive.signals.values()]
+        self._known: np.ndarray | None = None
         self.model = search.model
         self.size = float(np.ptp(self.model.position, axis=0).max()) or 1.0
         self.jumps: list[Jump] = []
@@ -195,23 +204,25 @@ class March:
     def _from_afar(self, level: np.ndarray, dt: float):
         """Equilibria that may be far away, reached within dt [s] at the present time."""
         start = self.state
-        new, found = self.search.settle(level, start, start.x, self.alive, dt=dt, time=self.time)
+        new, found = self.search.settle(level, start, start.x, self.alive, dt=dt, time=self.time, gradual=False)
         self._take(new, found, 0)
 
     def go(self, end: float, frame: int):
         """On to the equilibria at an instant, in as many steps as it takes."""
-        shortest, todo = SHORTEST * (end - self.time), [end]
+        shortest, todo = self.shortest * (end - self.time), [end]
         while todo and np.any(self.alive):
             to = todo[-1]
             dt = to - self.time
             last = 0.5 * dt < shortest
-            whole, found = self._settle(self.state, dt, to)
+            ahead = self._ahead(self._before, self.state, dt)
+            whole, found = self._settle(self.state, self._before, dt, to)
             move = self._apart(self.state, whole)
             good, sudden = np.all(found | ~self.alive), np.zeros(len(found), bool)
             far = move > LARGE * self.size
-            if good and (self.tolerance is not None or np.any(far & self.alive)):
-                half, first = self._settle(self.state, 0.5 * dt, to - 0.5 * dt)
-                whole_again, second = self._settle(half, 0.5 * dt, to)
+            asked = np.any(far & self.alive) or (self.tolerance is not None and not self._straight(ahead, whole, dt))
+            if good and asked:
+                half, first = self._settle(self.state, self._before, 0.5 * dt, to - 0.5 * dt)
+                whole_again, second = self._settle(half, (self.state, 0.5 * dt), 0.5 * dt, to)
                 good = np.all((first & second) | ~self.alive)
                 if good:
                     error = self._apart(whole, whole_again) / 3.0
@@ -232,13 +243,44 @@ class March:
                     sudden |= lost & found & (self._apart(self.state, whole) > LARGE * self.size)
                 self._say(sudden, whole, frame, to)
             self._take(whole, found, frame, to)
+            if np.any(sudden):  # nothing goes on as it went in a jump
+                self._before = None
             todo.pop()
         self.time = end
 
-    def _settle(self, state: State, dt: float, to: float) -> tuple[State, np.ndarray]:
+    def _ahead(self, before: tuple[State, float] | None, now: State, dt: float) -> np.ndarray | None:
+        """Positions [N, W, 3] after dt [s] if all goes on as it did in the step before; None: there was none."""
+        if before is None or dt > FARTHEST * before[1]:
+            return None
+        return self.search.ahead(before[0], now, dt / before[1])
+
+    def _straight(self, ahead: np.ndarray | None, new: State, dt: float) -> bool:
+        """Whether the way within a step departs from a straight one by less than the tolerance, in all worlds.
+
+        The second difference with the step before gives the curvature, and that how far the way sags.
+        """
+        if ahead is None or self._before is None or self.tolerance is None:
+            return False
+        part = 0.25 * dt / (dt + self._before[1])
+        off = part * np.linalg.norm(new.x - ahead, axis=-1).max(axis=0)
+        return not np.any(self.alive & (off > self.tolerance * self.size))
+
+    def _settle(self, state: State, past: tuple[State, float] | None, dt: float, to: float):
+        """The state after a step from another, and which worlds have one; `past` is where the step before began."""
         self.steps += 1
-        level = levels(self.drive, to, state.worlds)
-        return self.search.settle(level, state, state.x, self.alive, dt=dt, time=to, search=False)
+        ahead = self._ahead(past, state, dt)
+        level, guess = self._levels(to, state.worlds), state.x if ahead is None else ahead
+        past = None if ahead is None else past
+        return self.search.settle(level, state, guess, self.alive, dt=dt, time=to, search=False, past=past)
+
+    def _levels(self, time: float, worlds: int) -> np.ndarray:
+        """Levels of the drive at a time [channels, W]; only what varies is asked again."""
+        if self._known is None:
+            self._known = levels(self.drive, time, worlds)
+        for k, s in enumerate(self.drive.signals.values()):
+            if not self._constant[k]:
+                self._known[k] = np.squeeze(s(time))
+        return self._known.copy()
 
     def _apart(self, one: State, other: State) -> np.ndarray:
         """Largest distance of a node, or change of an angle times the size, between two states [W] [m]."""
@@ -264,6 +306,7 @@ class March:
         for name in ("x", "angles", "memory"):
             rest = ~self.alive
             getattr(out, name)[:, rest] = getattr(self.state, name)[:, rest]
+        self._before = None if time is None else (self.state, time - self.time)
         self.state = out
         self.time = self.time if time is None else time
 

@@ -257,6 +257,7 @@ class Topology:
         self._beyond = [np.array([b]) for b in range(len(panels))]
         for b in range(len(panels) - 1, 0, -1):
             self._beyond[self.parent[b]] = np.concatenate([self._beyond[self.parent[b]], self._beyond[b]])
+        self._carried_by = [np.isin(self.body_of, self._beyond[j + 1]) for j in range(len(self.joints))]
         self.root_nodes = np.flatnonzero(self.body_of == 0)
         self.turns, self.shifts, self.pivots, self.follows = self._root(model)
         self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body)
@@ -268,33 +269,19 @@ class Topology:
     def positions(self, start: np.ndarray, q: np.ndarray, points=None, bodies=None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
 
-        Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size) and turns of the root, then
-        changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that `bodies` [N] carry (-1: none).
+        Coordinates are zero at `start` [N, 3], or [N, W, 3] of each world: shifts (in units of the device's size) and
+        turns of the root, then changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that
+        `bodies` [N] carry (-1: none).
         """
-        points, bodies = (start, self.body_of) if points is None or bodies is None else (points, np.asarray(bodies))
-        w, roots, size = q.shape[1], len(self.turns), float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
-        centre = start[self.root_nodes].mean(axis=0)
-        pivots = np.tile(centre, (roots, 1)) if self.follows else self.pivots
-        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w, 1))
-        for n in range(w):
-            twist = np.zeros((4, 4))
-            for k in range(roots):
-                twist[:3, :3] += q[k, n] * np.cross(np.eye(3), self.turns[k])
-                twist[:3, 3] += q[k, n] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
-            moved = expm(twist)
-            turn[n], shift[n] = moved[:3, :3], centre + moved[:3, 3]
-        turns, places, axes, joints = [turn], [shift - turn @ centre], [], []
-        for j, (c, sign) in enumerate(self.joints):
-            first, last = start[self._creases[c, 1]], start[self._creases[c, 2]]
-            axis, p = sign * (last - first) / np.linalg.norm(last - first), self.parent[j + 1]
-            axes.append(turns[p] @ axis)
-            joints.append(turns[p] @ first + places[p])
-            angle, k = q[roots + j][:, None, None], np.cross(np.eye(3), axis)
-            turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
-            places.append(joints[-1] - turns[-1] @ first)
+        begin = start if start.ndim == 3 else start[:, None]
+        own = points is None or bodies is None
+        points, bodies = (begin, self.body_of) if own else (np.asarray(points)[:, None], np.asarray(bodies))
+        turns, places, axes, joints, shift, pivots = self._placed(begin, q)
+        w = q.shape[1]
         turns.append(np.tile(np.eye(3), (w, 1, 1)))  # of what no body carries
         places.append(np.zeros((w, 3)))
-        x = np.stack([turns[b] @ r + places[b] for b, r in zip(bodies, points, strict=True)])
+        x = _carried(points, bodies, turns, places)
+        size, roots = _size(begin), len(self.turns)
         by = np.zeros((roots + len(self.joints), *x.shape))
         for k in range(roots):
             by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
@@ -303,6 +290,55 @@ class Topology:
             mine = np.isin(bodies, self.beyond(j + 1))
             by[roots + j, mine] = np.cross(axes[j], x[mine] - joints[j])
         return x, by
+
+    def moved(self, start: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """The nodes of `positions` alone."""
+        begin = start if start.ndim == 3 else start[:, None]
+        turns, places, *_ = self._placed(begin, q)
+        return _carried(begin, self.body_of, turns, places)
+
+    def rates(self, x: np.ndarray) -> np.ndarray:
+        """Velocities of the nodes for unit rates of the coordinates [m, N, W, 3] at positions [N, W, 3]."""
+        roots = len(self.turns)
+        by = np.zeros((roots + len(self.joints), *x.shape))
+        if roots:
+            centre, size = x[self.root_nodes].mean(axis=0), _size(x)
+            for k in range(roots):
+                by[k] = self.shifts[k] * size + np.cross(
+                    self.turns[k], x - (centre if self.follows else self.pivots[k])
+                )
+        for j, (c, sign) in enumerate(self.joints):
+            first = x[self._creases[c, 1]]
+            along = x[self._creases[c, 2]] - first
+            axis = along * (sign / np.sqrt(np.einsum("wa,wa->w", along, along)))[:, None]
+            mine = self._carried_by[j]
+            by[roots + j, mine] = np.einsum("wab,nwb->nwa", _skew(axis), x[mine] - first)
+        return by
+
+    def _placed(self, begin: np.ndarray, q: np.ndarray):
+        """Turns [W, 3, 3] and places [W, 3] of the bodies, axes and places of the joints, and those of the root."""
+        w, roots, size = q.shape[1], len(self.turns), _size(begin)
+        centre = begin[self.root_nodes].mean(axis=0)
+        pivots = np.broadcast_to(centre if self.follows else self.pivots[:, None], (roots, len(centre), 3))
+        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w // len(centre), 1))
+        if roots:
+            twist = np.zeros((w, 4, 4))
+            for k in range(roots):
+                twist[:, :3, :3] += q[k][:, None, None] * np.cross(np.eye(3), self.turns[k])
+                twist[:, :3, 3] += q[k][:, None] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
+            moved = expm(twist)
+            turn, shift = moved[:, :3, :3], shift + moved[:, :3, 3]
+        turns, places, axes, joints = [turn], [shift - _turned(turn, centre)], [], []
+        for j, (c, sign) in enumerate(self.joints):
+            first, last = begin[self._creases[c, 1]], begin[self._creases[c, 2]]
+            along, p = sign * (last - first), self.parent[j + 1]
+            axis = along / np.sqrt(np.einsum("wa,wa->w", along, along))[:, None]
+            axes.append(_turned(turns[p], axis))
+            joints.append(_turned(turns[p], first) + places[p])
+            angle, k = q[roots + j][:, None, None], _skew(axis)
+            turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
+            places.append(joints[-1] - _turned(turns[-1], first))
+        return turns, places, axes, joints, shift, pivots
 
     def closures(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W]."""
@@ -398,6 +434,35 @@ class Topology:
             np.array(pairs, np.int32).reshape(-1, 2),
             np.array(axes, float).reshape(-1, 3),
         )
+
+
+def _size(x: np.ndarray) -> float:
+    """Size of a device at positions [N, W, 3], that of its first world [m]."""
+    return float(np.ptp(x[:, 0], axis=0).max(initial=0.0)) or 1.0
+
+
+def _skew(a: np.ndarray) -> np.ndarray:
+    """Matrices [W, 3, 3] that cross vectors a [W, 3] with what they are applied to."""
+    out = np.zeros((len(a), 3, 3))
+    out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = a[:, 0], a[:, 1], a[:, 2]
+    out[:, 1, 2], out[:, 2, 0], out[:, 0, 1] = -a[:, 0], -a[:, 1], -a[:, 2]
+    return out
+
+
+def _turned(turn: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Vectors a [1 or W, 3] turned by matrices [W, 3, 3]."""
+    return np.einsum("wab,wb->wa", turn, np.broadcast_to(a, (len(turn), 3)))
+
+
+def _carried(points: np.ndarray, bodies: np.ndarray, turns, places) -> np.ndarray:
+    """Where bodies [N] carry points [N, 1 or W, 3]: [N, W, 3]; the last of the turns is of what none carries."""
+    w = len(turns[0])
+    x = np.empty((len(points), w, 3))
+    for b in np.unique(bodies):
+        mine = bodies == b
+        own = np.broadcast_to(points[mine], (int(mine.sum()), w, 3))
+        x[mine] = np.einsum("wab,nwb->nwa", turns[b], own) + places[b]
+    return x
 
 
 def _within(basis: np.ndarray, points: np.ndarray, held: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from origami_sim.solve.statics import equilibrium
 from origami_sim.solve.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
 
 CLOSE = 1e-10
-"""A Newton step shorter than this part of the device ends the search for an equilibrium."""
+"""Error over the size of the device up to which a place is an equilibrium."""
 
 FAR = 0.1
 """Longest Newton step, as a part of the device, or of a radian times two."""
@@ -37,6 +37,10 @@ ITERATIONS = 12
 
 PATIENT = 60
 """Tangents of a world that has lost its equilibrium: so many cover the device from end to end several times."""
+
+FRESH, KEPT = 0.5, 0.1
+"""Part of the iteration before that each has to be at most, else a tangent is taken anew: one of this step, or of an
+earlier one. Where a tangent of an earlier step contracts tenfold, the present one is as stable as that was."""
 
 
 class Held:
@@ -60,25 +64,32 @@ class Held:
         self.batch = Batch(still, parameters, drive, state, among=among, threads=threads)
         self.remembers = any(get(e).memory for e in model.laws)
 
-    def force(self, start: State, x: np.ndarray, dt: float, time: float) -> np.ndarray:
-        """Forces [N, W, 3] at positions x [N, W, 3], reached from a state within dt [s], at a time [s]."""
+    def force(
+        self, start: State, x: np.ndarray, dt: float, time: float, velocity: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Forces [N, W, 3] at positions x [N, W, 3], reached from a state within dt [s], at a time [s].
+
+        They are those at rest, or at a velocity [N, W, 3].
+        """
         b = self.batch
         if self.remembers:
-            self.lead(start, x, dt)
-            b._overwrite(b._x, x)  # without the rounding of the way there
+            b.place(start.x, start.angles, start.memory)
+            b.lead(x, dt)
         else:
             b.place(x, start.angles)
+        b._overwrite(b._v, np.zeros_like(x) if velocity is None else velocity)
         return b.total_force(time)
 
-    def lead(self, start: State, x: np.ndarray, dt: float):
-        """Leads the nodes from a state to positions within dt [s]; memory advances, and they are then at rest."""
+    def after(self, start: State, x: np.ndarray, dt: float, time: float) -> State:
+        """The state at positions x [N, W, 3], reached from another within dt [s], at a time [s]."""
         b = self.batch
-        b.place(start.x, start.angles, start.memory)
-        b._overwrite(b._v, (x - start.x) / dt)
-        b._a.zero_()
-        b._status.fill_(-1)
-        b.advance(1, dt, np.inf)
-        b._v.zero_()
+        if self.remembers:
+            b.place(start.x, start.angles, start.memory)
+            b.lead(x, dt)
+        else:
+            b.place(x, start.angles)
+            b.total_force(time)  # which also goes on with the angles
+        return b.state()
 
     def at(self, state: State, time: float, velocity: np.ndarray | None = None) -> Evaluation:
         """Forces and energies by effect in a state, at rest or at a velocity [N, W, 3]."""
@@ -95,9 +106,11 @@ class Settling(ABC):
         model: for the couplings. worlds: model and parameters of each world, alike but for geometry and numbers.
         drive: one level of every channel for each world. state: one world each, for their number and memory.
         among: effects of the program, see `Batch`.
+        viscous: whether laws of the rate act, with the velocity at the end of a step.
+        keeping: whether a step begins with the tangents of the one before, which is many times faster.
     """
 
-    far, iterations = FAR, ITERATIONS
+    far, iterations, close = FAR, ITERATIONS, CLOSE
 
     def __init__(
         self,
@@ -107,8 +120,13 @@ class Settling(ABC):
         *,
         among: Sequence[str] = (),
         threads: int | None = None,
+        viscous: bool = False,
+        keeping: bool = False,
     ):
-        self.worlds, self.among, self.threads = worlds, among, threads
+        self.worlds, self.among, self.threads, self.viscous = worlds, among, threads, viscous
+        self.keeping, self._kept = keeping, [None] * len(worlds)
+        self.past: tuple[State, float] | None = None
+        self.moving = False
         self.model = worlds[0][0]
         self.drive, self.start, self.dt, self.time = drive, state, 1.0, 0.0
         self.levels = levels(drive, 0.0, state.worlds)
@@ -127,6 +145,8 @@ class Settling(ABC):
         dt: float,
         time: float,
         search: bool = True,
+        gradual: bool = True,
+        past: tuple[State, float] | None = None,
     ) -> tuple[State, np.ndarray]:
         """The state at the equilibria at the end of a step, and which of the worlds wanted have one [W].
 
@@ -134,8 +154,11 @@ class Settling(ABC):
             level: [channels, W] of the drive at the end. start: where the step begins. guess: [N, W, 3] positions.
             dt: length of the step [s]. time: its end [s].
             search: also look far away for worlds whose equilibrium ceased to exist.
+            gradual: whether the device moves for as long as the step lasts; else laws of the rate are silent.
+            past: where the step before this one began, and its length [s], if the motion goes on from there.
         """
         self.start, self.dt, self.time, self.levels = start, dt, time, level
+        self.moving, self.past = self.viscous and gradual, past
         self.held.batch.hold(level)
         x, done = self._newton(guess, wanted, ROUNDS)
         lost = wanted & ~done
@@ -149,8 +172,7 @@ class Settling(ABC):
                 x, found = self._newton(x, found, ROUNDS)
             done |= found
         done &= wanted
-        self.held.force(start, np.where(done[None, :, None], x, start.x), dt, time)
-        out = self.held.batch.state()
+        out = self.held.after(start, np.where(done[None, :, None], x, start.x), dt, time)
         out.v[:], out.a[:] = 0.0, 0.0
         out.step, out.status = -1, np.full_like(out.status, -1)
         return out, done
@@ -158,36 +180,56 @@ class Settling(ABC):
     def _newton(self, x: np.ndarray, wanted: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
         """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
         done = np.zeros(len(wanted), bool)
+        if any(f is not None for f in self._kept):
+            known = np.array([f is not None for f in self._kept])
+            x, done = self._with(self._kept, x, wanted & known, KEPT)
         for _ in range(rounds):
+            if not np.any(wanted & ~done):
+                break
             factors, stable = self._factors(x, wanted & ~done)
             going = np.array([f is not None for f in factors])
             if not np.any(going):
                 break
-            s = self._solved(factors, x, going)
-            past, before = [s], np.full(len(wanted), np.inf)
-            for _ in range(self.iterations):
-                large = np.abs(s).max(axis=0, initial=0.0)
-                going &= large < 0.5 * before  # else a new tangent serves better; false for nan
-                before = large
-                share = np.minimum(_over(np.full_like(large, self.far * self.size), large), 1.0)
-                share = self._clear(x, s * share, going) * np.where(large > 0, share, 1.0)
-                far = going & (share < 1.0)
-                if np.any(far):  # no further than this without a new tangent
-                    x = self._moved(x, np.where(far, s * share, 0.0))
-                    going &= ~far
-                x = self._moved(x, np.where(going, s, 0.0))
-                close = going & (large < CLOSE * self.size)
-                done |= close & stable
-                going &= ~close
-                if not np.any(going):
-                    break
-                z = self._solved(factors, x, going)
-                with np.errstate(all="ignore"):  # of worlds that go no further
-                    for a, b in pairwise(past):  # Broyden's first method (Kelley 1995, ch. 7)
-                        z = z + b * _over(np.sum(a * z, axis=0), np.sum(a * a, axis=0))
-                    last = past[-1]
-                    s = z / (1.0 - _over(np.sum(last * z, axis=0), np.sum(last * last, axis=0)))
-                past.append(s)
+            if self.keeping:
+                sound = going & stable
+                self._kept = [new if s else k for new, k, s in zip(factors, self._kept, sound, strict=True)]
+            x, close = self._with(factors, x, going, FRESH)
+            done |= close & stable
+        return x, done
+
+    def _with(self, factors, x: np.ndarray, going: np.ndarray, part: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions that tangents lead to as long as each iteration is that part of the one before; which are close."""
+        going, done = going.copy(), np.zeros(len(going), bool)
+        if not np.any(going):
+            return x, done
+        s = self._solved(factors, x, going)
+        past, before, worst = [s], np.full(len(going), np.inf), np.zeros(len(going))
+        for n in range(self.iterations):
+            large = np.abs(s).max(axis=0, initial=0.0)
+            going &= large < part * before  # else a new tangent serves better; false for nan
+            share = np.minimum(_over(np.full_like(large, self.far * self.size), large), 1.0)
+            share = self._clear(x, s * share, going) * np.where(large > 0, share, 1.0)
+            far = going & (share < 1.0)
+            if np.any(far):  # no further than this without a new tangent
+                x = self._moved(x, np.where(far, s * share, 0.0))
+                going &= ~far
+            x = self._moved(x, np.where(going, s, 0.0))
+            if n:
+                worst = np.maximum(worst, _over(large, before))
+            # the next iteration would be smaller again; not always by the same ratio, as bars relax what turns stretch
+            close = going & (large * np.sqrt(worst if n else 1.0) < self.close * self.size)
+            before = large
+            done |= close
+            going &= ~close
+            if not np.any(going):
+                break
+            z = self._solved(factors, x, going)
+            with np.errstate(all="ignore"):  # of worlds that go no further
+                for a, b in pairwise(past):  # Broyden's first method (Kelley 1995, ch. 7)
+                    z = z + b * _over(np.sum(a * z, axis=0), np.sum(a * a, axis=0))
+                last = past[-1]
+                s = z / (1.0 - _over(np.sum(last * z, axis=0), np.sum(last * last, axis=0)))
+            past.append(s)
         return x, done
 
     def _searched(self, x: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,6 +243,29 @@ class Settling(ABC):
             if one.converged:
                 x[:, w], found[w] = one.x, True
         return x, found
+
+    def _force(self, x: np.ndarray) -> np.ndarray:
+        """Forces [N, W, 3] at positions [N, W, 3] at the end of the step."""
+        return self.held.force(self.start, x, self.dt, self.time, self._velocity(x))
+
+    def _velocity(self, x: np.ndarray, of: np.ndarray | None = None) -> np.ndarray | None:
+        """Velocities at the end of the step at positions [N, K, 3] of worlds `of` (K,); None: at rest.
+
+        Backward differences of second order, where the step before is known (Curtiss & Hirschfelder 1952).
+        """
+        if not self.moving:
+            return None
+        worlds = slice(None) if of is None else of
+        begin = self.start.x[:, worlds]
+        rate = (x - begin) / self.dt
+        if self.past is None:
+            return rate
+        before, dt = self.past
+        return rate + (rate - (begin - before.x[:, worlds]) / dt) * (self.dt / (self.dt + dt))
+
+    def ahead(self, before: State, now: State, ratio: float) -> np.ndarray:
+        """Positions [N, W, 3] to which worlds go on as they went between two states, `ratio` times as far."""
+        return now.x + ratio * (now.x - before.x)
 
     def _solved(self, factors, x: np.ndarray, going: np.ndarray) -> np.ndarray:
         f = self._unbalanced(x)
@@ -258,8 +323,7 @@ class SettlingBars(Settling):
         return self.system.size
 
     def _unbalanced(self, x):
-        f = self.held.force(self.start, x, self.dt, self.time)
-        return np.moveaxis(f, 1, 2).reshape(-1, x.shape[1])[self.free]
+        return np.moveaxis(self._force(x), 1, 2).reshape(-1, x.shape[1])[self.free]
 
     def _moved(self, x, s):
         out = np.zeros((self.model.position.size, s.shape[1]))
@@ -274,7 +338,10 @@ class SettlingBars(Settling):
         stable = np.zeros(x.shape[1], bool)
         for w in np.flatnonzero(wanted):
             start = self.start.select(np.full(count, w))
-            k = y.assembled(self._copies(int(w), count).force(start, x[:, w, None] + y.moves, self.dt, self.time))
+            copies = self._copies(int(w), count)
+            moved = x[:, w, None] + y.moves
+            forces = copies.force(start, moved, self.dt, self.time, self._velocity(moved, np.full(count, w)))
+            k = y.assembled(forces)
             if not np.all(np.isfinite(k.data)):
                 continue
             largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
@@ -287,10 +354,12 @@ class _Small:
     """A dense tangent of any symmetry along some directions [m, d], shifted."""
 
     def __init__(self, k: np.ndarray, shift: float, along: np.ndarray):
-        self._k, self._along = k + shift * np.eye(len(k)), along
+        self._along = along
+        k = k + shift * np.eye(len(k))
+        self._inverse = np.linalg.pinv(k, rcond=1e-15)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        return self._along @ np.linalg.lstsq(self._k, self._along.T @ right, rcond=None)[0]
+        return self._along @ (self._inverse @ (self._along.T @ right))
 
 
 class SettlingPanels(Settling):
@@ -308,40 +377,54 @@ class SettlingPanels(Settling):
         self.count = len(t.turns) + len(t.joints)
         if not self.count:
             raise InputError("statics needs a panel that is free to move", field="free", value=0)
-        if len(t.row_node):  # the directions in which loops stay closed turn with every step
-            self.iterations = 1
+        self.loops = bool(len(t.row_node))
+        if self.loops:  # the directions in which loops stay closed turn with every step
+            self.iterations, self.keeping = 1, False
+        m = self.count
+        self._near = TURN * np.concatenate([np.zeros((m, 1)), np.eye(m), -np.eye(m)], axis=1)
+        self._every: Held | None = None
 
     @property
     def size(self) -> float:
         return 1.0
 
     def _unbalanced(self, x):
-        f = self.held.force(self.start, x, self.dt, self.time)
-        by = [self.tree.positions(x[:, w], np.zeros((self.count, 1)))[1][:, :, 0] for w in range(x.shape[1])]
-        return np.einsum("wmna,nwa->mw", np.stack(by), f)
+        return np.einsum("mnwa,nwa->mw", self.tree.rates(x), self._force(x))
 
     def _moved(self, x, s):
+        if not self.loops:
+            return self.tree.moved(x, s)
         out = x.copy()
         for w in np.flatnonzero(np.any(s != 0.0, axis=0)):
             q = closed(self.tree, x[:, w], s[:, w])
             if q is not None:
-                out[:, w] = self.tree.positions(x[:, w], q[:, None])[0][:, 0]
+                out[:, w] = self.tree.moved(x[:, w], q[:, None])[:, 0]
         return out
 
+    def ahead(self, before: State, now: State, ratio: float) -> np.ndarray:
+        if self.loops or len(self.tree.turns):
+            return now.x
+        turned = now.angles - before.angles
+        return self.tree.moved(now.x, ratio * np.stack([turned[c] for c, _ in self.tree.joints]))
+
     def _factors(self, x, wanted):
-        m = self.count
-        near = TURN * np.concatenate([np.zeros((m, 1)), np.eye(m), -np.eye(m)], axis=1)
-        out: list[_Small | None] = [None] * x.shape[1]
-        stable = np.zeros(x.shape[1], bool)
-        for w in np.flatnonzero(wanted):
-            moved, by = self.tree.positions(x[:, w], near)
-            start = self.start.select(np.full(2 * m + 1, w))
-            f = self._copies(int(w), 2 * m + 1).force(start, moved, self.dt, self.time)
-            moments = np.einsum("mnwa,nwa->mw", by, f)
-            if not np.all(np.isfinite(moments)):
-                continue
-            along, moments = loops_kept(self.tree, x[:, w], near, moments)
-            k = along.T @ ((moments[:, m + 1 :] - moments[:, 1 : m + 1]) / (2 * TURN)) @ along
+        m, worlds = self.count, x.shape[1]
+        copies = 2 * m + 1
+        each = np.repeat(np.arange(worlds), copies)
+        moved, by = self.tree.positions(x[:, each], np.tile(self._near, worlds))
+        if self._every is None:
+            parameters = Parameters.join([p for _, p in self.worlds], repeat=copies)
+            threads = 1 if len(each) * len(x) < THREADED else self.threads
+            drive, state = per_world(self.drive, self.levels[:, each]), self.start.select(each)
+            self._every = Held(self.model, parameters, drive, state, among=self.among, threads=threads)
+        self._every.batch.hold(self.levels[:, each])
+        f = self._every.force(self.start.select(each), moved, self.dt, self.time, self._velocity(moved, each))
+        moments = np.einsum("mnwa,nwa->mw", by, f).reshape(m, worlds, copies)
+        out: list[_Small | None] = [None] * worlds
+        stable = np.zeros(worlds, bool)
+        for w in np.flatnonzero(wanted & np.all(np.isfinite(moments), axis=(0, 2))):
+            along, own = loops_kept(self.tree, x[:, w], self._near, moments[:, w])
+            k = along.T @ ((own[:, m + 1 :] - own[:, 1 : m + 1]) / (2 * TURN)) @ along
             values = np.linalg.eigvalsh(0.5 * (k + k.T))
             largest = float(np.abs(values).max(initial=0.0)) or 1.0
             stable[w] = not len(values) or values[0] >= -NEUTRAL * largest
@@ -365,7 +448,7 @@ def coupled(model: Model, parameters: Parameters, drive: Drive) -> System:
 
 def levels(drive: Drive, time: float, worlds: int) -> np.ndarray:
     """What a drive gives at a time in each world [channels, W]; of the first world where fewer are asked for."""
-    values = [np.atleast_1d(np.squeeze(s(time))) for s in drive.signals.values()]
+    values = [np.atleast_1d(s.offset if s.constant else np.squeeze(s(time))) for s in drive.signals.values()]
     return np.stack([np.broadcast_to(v if len(v) in (1, worlds) else v[:worlds], (worlds,)) for v in values])
 
 

@@ -176,6 +176,18 @@ def test_chains_are_those_of_the_statics():
         assert np.abs(row - found).max() < 1e-8 * settings.length
 
 
+def test_rigid_panels_follow_load_steps():
+    """The flap of a rigid panel against its closed form, there and back."""
+    rigid = flap().with_rigid_panels()
+    forward = curves(rigid, [flap_curve()])
+    assert isinstance(forward, Static) and forward.model.panels == "rigid"
+    predicted = np.concatenate([v[0, :, 0] for v in forward.predict(Hypothesis(), [[f.start for f in rigid.nominals]])])
+    s = scene_settings(FLAP)
+    dipole = s.remanence * s.length * s.width * s.thickness / MU0
+    field = forward.recordings[0].drive["field"].values[:, 2]
+    assert np.abs(s.stiffness * predicted - dipole * field * np.cos(predicted)).max() < 1e-9 * s.stiffness
+
+
 def test_a_measurement_at_one_channel_acts_there_only():
     """Two sensors at one crease; the zero of the second is off. Exactly, and the other one is as it was."""
     one = flap_curve().channels["fold"]
