@@ -184,8 +184,8 @@ class Slow(Curves):
 
     # --- experiments
 
-    def menu(self) -> list[tuple[str, Curves]]:
-        out = super().menu()
+    def menu(self, levels: Sequence[float]) -> list[tuple[str, Curves]]:
+        out = super().menu(levels)
         for speed in (0.1, 10.0):
             other = self._other()
             other.recordings = [replace(r, times=r.times / speed) for r in self.recordings]
