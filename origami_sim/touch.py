@@ -22,8 +22,8 @@ LANDING = 0.1
 """Damping of panels that meet, as a ratio of critical of the mass of a corner.
 
 A corner alone rebounds with 0.7 of its speed, a panel that lands on several at once with less. The time step of bars
-becomes 0.3 times as long; 0.43 times with half of it and 0.17 times with double: stability is bounded for the most pairs
-that may touch at once.
+becomes 0.3 times as long; 0.43 times with half of it and 0.17 times with double, since stability is bounded for the
+most pairs that may touch at once.
 """
 
 

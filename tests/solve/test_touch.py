@@ -12,7 +12,6 @@ from origami_sim.errors import InputError
 from origami_sim.materials import G
 from origami_sim.model import State, node_mass
 from origami_sim.results import load_run, save_run
-from origami_sim.touch import LANDING
 
 MM = 1e-3
 SMALL = [(0, 0), (20, 0), (20, 16), (0, 16)]
@@ -23,10 +22,8 @@ def made(pattern, *, thickness=1 * MM, stiffness=2e-3, rest_angle=None, loss_tim
          touch=True, membrane_damping=0.02, **options):  # fmt: skip
     """A sheet with one set of effects, so that all tests share their kernels."""
     s = Sheet(pattern, thickness=thickness, triangulation="center", membrane_damping=membrane_damping)
-    s.on("bar_viscosity", "panel_bending", "crease", "crease_drive").gravity(gravity).touch(
-        **{"damping_ratio": 0.5, **options}
-    ).fix(panels=held)
-    s.crease(stiffness=stiffness, rest_angle=rest_angle, loss_time=loss_time)
+    s.on("bar_viscosity", "panel_bending", "crease", "crease_drive").gravity(gravity).touch(**options)
+    s.fix(panels=held).crease(stiffness=stiffness, rest_angle=rest_angle, loss_time=loss_time)
     model, parameters = s.build()
     if not touch:
         parameters.set("touch", "stiffness", 0.0)
@@ -61,7 +58,7 @@ def test_a_plate_that_falls_on_a_plate_sticks_below_the_friction_angle_and_slide
     mu = 0.5
     tilt = math.atan(ratio * mu)
     g = (G * math.sin(tilt), 0, -G * math.cos(tilt))
-    model, parameters = made(plates(0, 1.3), gravity=g, held=[0], friction=mu)
+    model, parameters = made(plates(0, 1.3), gravity=g, held=[0], friction=mu, damping_ratio=0.5)
     run = simulate(model, parameters, duration=0.08, rate=200)
     assert not run.failures
     x = run.x[:, of_panel(model, 1), 0].mean(axis=1)
@@ -80,7 +77,7 @@ def test_a_stack_of_plates_comes_to_rest_on_each_other():
     """At the default damping, and with corners on corners, where most pairs push at once."""
     corners = [(x, y, 1.1 * p) for p in range(3) for x, y in SMALL]
     pattern = mesh(np.array(corners) * MM, [tuple(range(4 * p, 4 * p + 4)) for p in range(3)])
-    model, parameters = made(pattern, gravity=(0, 0, -G), held=[0], damping_ratio=LANDING)
+    model, parameters = made(pattern, gravity=(0, 0, -G), held=[0])
     run = simulate(model, parameters, duration=0.1, rate=100)
     assert not run.failures
     for p in range(3):
