@@ -8,6 +8,7 @@ from effects.kit import random_rotation
 
 from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
+from origami_sim.bodies import rigid
 from origami_sim.errors import InputError
 from origami_sim.materials import G
 from origami_sim.model import State, node_mass
@@ -245,6 +246,19 @@ def test_dynamics_statics_and_slow_motions_rest_on_the_same_contact():
     assert np.abs(found.x - end).max() < 1e-7
     run = simulate(model, parameters, Drive(load=1.0), duration=0.3, rate=10, state=slow.state)
     assert np.abs(run.x[-1, :, 0] - end).max() < 1e-6
+
+
+def test_rigid_panels_rest_on_the_same_contact():
+    """In equilibria and in slow motions, from the same law; panels of the elastic sheet bend a little."""
+    model, parameters = rigid(*letter())
+    slow = quasistatic(model, parameters, Drive(load=ramp(1.0, 1.0)), [0.0, 0.5, 1.0])
+    elastic = quasistatic(*letter(), Drive(load=ramp(1.0, 1.0)), [0.0, 0.5, 1.0])
+    assert not slow.failures
+    assert slow.crossings() == [0]
+    assert np.abs(slow.creases[-1] - elastic.creases[-1]).max() < 0.005
+    found = equilibrium(model, parameters, Drive(load=1.0), state=slow.state)
+    assert found.converged and found.stable
+    assert np.abs(found.angles - slow.angles[-1, :, 0]).max() < 1e-9
 
 
 @pytest.mark.slow
