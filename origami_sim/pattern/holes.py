@@ -1,6 +1,5 @@
 """Panels with holes: cut into facets, so that every face of a pattern is a simple polygon."""
 
-
 from .planar import closed_loops, inside_polygon, signed_area
 from .topology import edge_key, face_sides
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
-from scipy.linalg import expm
 
 from origami_sim.articulation import Articulation
 from origami_sim.drive import Drive
@@ -208,6 +207,7 @@ class Topology:
         parent: [B] body towards the root, bodies numbered outwards. body_of: [N]. joint_of: [C], -1 closes a loop.
         joints: (crease, sign of its angle) of each joint.
         turns, shifts, pivots: [d, 3] of the rates of the root. follows: whether it turns about its own centre.
+        floating: whether nothing holds it; shifts of what is held are in metres.
         root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `articulated.Tree`.
     """
 
@@ -235,6 +235,7 @@ class Topology:
         for b in range(len(panels) - 1, 0, -1):
             self._beyond[self.parent[b]] = np.concatenate([self._beyond[self.parent[b]], self._beyond[b]])
         self.root_nodes = np.flatnonzero(self.body_of == 0)
+        self.floating = not np.any(model.free[self.root_nodes] == 0.0)
         self.turns, self.shifts, self.pivots, self.follows = self._root(model)
         self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body)
 
@@ -245,21 +246,16 @@ class Topology:
     def positions(self, start: np.ndarray, q: np.ndarray, points=None, bodies=None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
 
-        Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size) and turns of the root, then
-        changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that `bodies` [N] carry (-1: none).
+        Coordinates are zero at `start` [N, 3]: shifts (in units of the device's size, if it floats) and turns of the
+        root, then changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that `bodies` [N] carry
+        (-1: none).
         """
         points, bodies = (start, self.body_of) if points is None or bodies is None else (points, np.asarray(bodies))
-        w, roots, size = q.shape[1], len(self.turns), float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
+        w, roots, twists = q.shape[1], len(self.turns), self.twists(start)
         centre = start[self.root_nodes].mean(axis=0)
-        pivots = np.tile(centre, (roots, 1)) if self.follows else self.pivots
-        turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w, 1))
-        for n in range(w):
-            twist = np.zeros((4, 4))
-            for k in range(roots):
-                twist[:3, :3] += q[k, n] * np.cross(np.eye(3), self.turns[k])
-                twist[:3, 3] += q[k, n] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
-            moved = expm(twist)
-            turn[n], shift[n] = moved[:3, :3], centre + moved[:3, 3]
+        of = q[:roots].T @ twists
+        turn, along = screw(of[:, :3])
+        shift = centre + np.einsum("wab,wb->wa", along, of[:, 3:])
         turns, places, axes, joints = [turn], [shift - turn @ centre], [], []
         for j, (c, sign) in enumerate(self.joints):
             first, last = start[self._creases[c, 1]], start[self._creases[c, 2]]
@@ -274,12 +270,20 @@ class Topology:
         x = np.stack([turns[b] @ r + places[b] for b, r in zip(bodies, points, strict=True)])
         by = np.zeros((roots + len(self.joints), *x.shape))
         for k in range(roots):
-            by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
+            by[k] = twists[k, 3:] + np.cross(self.turns[k], x - (shift if self.follows else centre))
             by[k, bodies < 0] = 0.0
         for j in range(len(self.joints)):
             mine = np.isin(bodies, self.beyond(j + 1))
             by[roots + j, mine] = np.cross(axes[j], x[mine] - joints[j])
         return x, by
+
+    def twists(self, start: np.ndarray) -> np.ndarray:
+        """[d, 6] turn, and velocity of the root's centre at `start` [N, 3] [m], for unit rates of the root."""
+        size = float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
+        moves = self.shifts * (size if self.floating else 1.0)
+        if not self.follows:
+            moves = moves + np.cross(self.turns, start[self.root_nodes].mean(axis=0) - self.pivots)
+        return np.concatenate([self.turns, moves], axis=1)
 
     def closures(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W]."""
@@ -306,10 +310,8 @@ class Topology:
             found = len(basis)
             # a flat sheet may begin a motion that it cannot go on with: ask again a little further along each
             for motion in basis:
-                twist = np.zeros((4, 4))
-                twist[:3, :3], twist[:3, 3] = np.cross(np.eye(3), motion[:3]), motion[3:]
-                moved = expm(FARTHER * twist)
-                basis = _within(basis, points @ moved[:3, :3].T + moved[:3, 3], held)
+                turn, along = screw(FARTHER * motion[None, :3])
+                basis = _within(basis, points @ turn[0].T + FARTHER * along[0] @ motion[3:], held)
         if not np.any(held):
             free = np.eye(6) if np.ptp(model.position, axis=0).max() > 0 else np.eye(6)[3:]  # a point does not turn
             return free[:, :3], free[:, 3:], np.tile(centre, (len(free), 1)), True
@@ -375,6 +377,20 @@ class Topology:
             np.array(pairs, np.int32).reshape(-1, 2),
             np.array(axes, float).reshape(-1, 3),
         )
+
+
+def screw(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations R [W, 3, 3] by rotation vectors [W, 3] [rad], and matrices V [W, 3, 3] that make screws of them.
+
+    A velocity v that turns along for a unit of time shifts by V v: the exponential of a rigid motion (Murray, Li and
+    Sastry 1994, A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
+    """
+    angle = np.linalg.norm(turn, axis=1)[:, None, None]
+    k = np.cross(np.eye(3), turn[:, None, :])
+    sine, lift = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    small = angle < 1e-2  # where the difference of angle and sine is rounding
+    rest = np.where(small, 1 / 6 - angle**2 / 120 + angle**4 / 5040, (1 - sine) / np.where(small, 1.0, angle) ** 2)
+    return np.eye(3) + sine * k + lift * (k @ k), np.eye(3) + lift * k + rest * (k @ k)
 
 
 def _within(basis: np.ndarray, points: np.ndarray, held: np.ndarray) -> np.ndarray:
