@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from origami_sim.errors import InputError
+
 
 @dataclass(frozen=True)
 class Options:
@@ -13,7 +15,11 @@ class Options:
         segment: length of a segment [s], each with a start of its own; None: what can be predicted.
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; what was recorded faster is averaged to it.
-        fits: sets of effects that are fitted at most. threads: see `Batch`.
+        fits: sets of effects that are fitted at most, half of them before the weights are settled.
+        threads: see `Batch`.
+
+    Raises:
+        InputError: a rate that is not positive, fewer than 4 fits.
     """
 
     panels: str = "auto"
@@ -22,6 +28,12 @@ class Options:
     rate: float = 200.0
     fits: int = 16
     threads: int | None = None
+
+    def __post_init__(self):
+        if not self.rate > 0:
+            raise InputError("frames are compared at a positive rate", field="rate", value=self.rate, allowed="> 0 Hz")
+        if self.fits < 4:
+            raise InputError("too few fits to find an effect", field="fits", value=self.fits, allowed="4 or more")
 
 
 Report = Callable[[str, float], None]

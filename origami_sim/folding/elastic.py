@@ -38,6 +38,12 @@ GAIN = 1e-4
 """Relative fall of the energy in one iteration below which it is done."""
 STIFFEST, LARGEST = 1e-9, 1e3
 """Range of the damping of iterations: below, rigid motions are no longer held; above, nothing moves any more."""
+FIRST = 1e-6
+"""Damping of the first iteration."""
+REFUSED, POOR, GOOD = 5.0, 3.0, 0.25
+"""Factors of the damping after a step that loses, one that gains less than `FORESEEN`, and one that gains more."""
+FORESEEN = (0.2, 0.7)
+"""Gains of a step, over what the linear residuals promise, that count as poor and as good."""
 
 
 @dataclass
@@ -147,7 +153,7 @@ class Elastic:
         values = np.concatenate([np.concatenate([-pull, pull], axis=1).ravel(), hinge.ravel(), stop.ravel()])
         return sp.csr_matrix((values, (self._rows, self._columns)), shape=self._shape)
 
-    def relax(self, shape: Shape, target, iterations: int, damping: float = 1e-6) -> Shape:
+    def relax(self, shape: Shape, target, iterations: int) -> Shape:
         """Return the state of least energy near `shape`, or where `iterations` have led.
 
         Args:
@@ -156,7 +162,7 @@ class Elastic:
         """
         x = shape.x
         r, angles = self.residuals(x, shape.angles, target)
-        energy = float(r @ r)
+        energy, damping = float(r @ r), FIRST  # damping is a stiffness that holds every node where it is
         for _ in range(iterations):
             if energy < ROUNDING:
                 break
@@ -169,15 +175,15 @@ class Elastic:
                 gained = energy - float(tried @ tried)
                 if gained > 0.0:
                     break
-                damping *= 5.0
+                damping *= REFUSED
             else:
                 break  # nothing goes down any more
             foreseen = energy - float(np.sum((r + jacobian @ step) ** 2))
             x, r, angles, energy = x + step.reshape(-1, 3), tried, turned, energy - gained
-            if gained > 0.7 * foreseen:
-                damping = max(0.25 * damping, STIFFEST)
-            elif gained < 0.2 * foreseen:
-                damping *= 3.0
+            if gained > FORESEEN[1] * foreseen:
+                damping = max(GOOD * damping, STIFFEST)
+            elif gained < FORESEEN[0] * foreseen:
+                damping *= POOR
             if gained < GAIN * energy:
                 break
         return Shape(x, angles, 0.5 * max(energy, 0.0))

@@ -9,6 +9,7 @@ them would strain the sheet, and go on when others have made way.
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from .consistency import Vertex, vertices
 from .elastic import Elastic, Shape
 from .intersections import crossing_pairs
 from .placement import Placement
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SOFTNESS = (1e-3, 1e-2, 1e-1)
 """Stiffnesses of creases over that of the sheet in its plane, tried in turn, from a sheet to a rubber skin that is
@@ -33,11 +37,13 @@ STRETCH = 0.05
 """Strain beyond which a sheet counts as torn, besides the drawing's inaccuracy: paper breaks at 2 to 5 per cent."""
 THICKNESS = 2e-4
 """Thickness of a sheet that states none [m]: heavy paper."""
+EXACT = 2e-5
+"""Distance of all angles from their targets [rad] below which no other shape is looked for."""
 TOLERANCE = np.radians(5.0)
 """Distance from its target within which a crease has arrived [rad]."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Folding:
     """How a pattern folded.
 
@@ -58,6 +64,22 @@ class Folding:
     softness: float
     tolerance: float
     wall: float = 0.0
+
+    def __repr__(self) -> str:
+        worst, snaps = np.degrees(self.errors.max(initial=0.0)), f", {len(self.snaps)} snaps" if self.snaps else ""
+        ends = f"folds to within {max(worst, 0.01):.2f} deg" if self.reached else f"misses by up to {worst:.1f} deg"
+        return f"<Folding: {len(self.errors)} creases, {ends}{snaps}>"
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import folding_html  # only who looks pays for it
+
+        return folding_html(self)
+
+    def plot(self) -> "Figure":
+        """The sheet on its way, mountains red and valleys blue."""
+        from .picture import figure_of
+
+        return figure_of(self)
 
     @property
     def errors(self) -> np.ndarray:
@@ -188,8 +210,8 @@ def _follow(sheet: Elastic, placement: Placement, steps: int, progress) -> _Path
 
 
 def _exact(sheet: Elastic, shape: Shape, target) -> bool:
-    """Tell whether a shape is as good as any: all angles within a thousandth of a degree of where they should be."""
-    return bool(np.abs(shape.angles - target)[sheet.driven].max() < 2e-5)
+    """Tell whether a shape is as good as any."""
+    return bool(np.abs(shape.angles - target)[sheet.driven].max() < EXACT)
 
 
 def _stiffen(sheet: Elastic, path: _Path, tolerance: float) -> float:

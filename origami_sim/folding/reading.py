@@ -25,6 +25,8 @@ CLOSE = 1e-2
 BETTER = 0.5
 """Share of the sum of all gaps below which another distance is taken: mending leaves a tenth to a half of them, while
 merging true detail of a curved pattern leaves nine tenths."""
+KEPT = 0.5
+"""Share of the panels that mending has to leave."""
 
 
 def read(path, *, size: float | None = None, scale: float | None = None, merge: float | None = None) -> Pattern:
@@ -59,7 +61,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
             gap, _ = _gaps(other)
         except InputError:  # points merged that should not be: no pattern any more
             continue
-        if gap < least and len(other.faces) > 0.5 * len(pattern.faces):
+        if gap < least and len(other.faces) > KEPT * len(pattern.faces):
             best, least, chosen = other, gap, distance
     if chosen is not None:
         across = chosen * float(np.linalg.norm(np.ptp(best.vertices, axis=0)))
