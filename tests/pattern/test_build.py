@@ -109,7 +109,7 @@ def test_kresling_matches_the_published_layout():
         (lambda: strip([1, 1], 1, fold_angles=[4.0]), "out of range.*fold_angles"),
         (lambda: strip([1, 1], 1, fold_angles=[1.0, 1.0]), "wrong number"),
         (lambda: cross(math.nan, 1), "finite.*base"),
-        (lambda: cross(1, "2"), "finite.*flap_length"),
+        (lambda: cross(1, None), "finite.*flap_length"),
         (lambda: grid(0, 1, 1, 1), "bad count.*nx"),
         (lambda: grid(1, 1.5, 1, 1), "bad count.*ny"),
         (lambda: miura(1, 1, 1, 1, 1.6), "gamma"),
