@@ -164,7 +164,10 @@ def fold(
     began = clock.perf_counter()
     sheet = Elastic(pattern)
     if not len(sheet.mesh.creases):
-        raise InputError("the pattern has no crease to fold", field="edges_assignment", allowed="M and V edges")
+        unread = "".join(f"; {n.rstrip('.')}" for n in pattern.notes if "unknown colour" in n)
+        raise InputError(
+            f"the pattern has no crease to fold{unread}", field="edges_assignment", allowed="M and V edges"
+        )
     if not np.any(sheet.target):
         raise InputError(
             "the pattern gives no target angle", field="edges_foldAngle", allowed="M and V edges, or degrees"
