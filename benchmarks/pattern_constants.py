@@ -95,11 +95,12 @@ def main():
             if args.only and name not in args.only:
                 continue
             value = getattr(home, name)
-            for factor in (0.5, 2.0):
-                setattr(home, name, scaled(value, factor))
-                print(
-                    f"{module}.{name} x {factor:g}: {told(known(f'{module}.{name} {factor}', quick), was)}", flush=True
-                )
+            others = {f"x {factor:g}": scaled(value, factor) for factor in (0.5, 2.0)}
+            if name in WITHOUT:
+                others["without"] = WITHOUT[name]
+            for word, other in others.items():
+                setattr(home, name, other)
+                print(f"{module}.{name} {word}: {told(known(f'{module}.{name} {word}', quick), was)}", flush=True)
             setattr(home, name, value)
 
 

@@ -96,10 +96,9 @@ def bridge_stiffness(
     bends too; c = 0.66 for patches of 0.78 MPa, 0.40 for rigid ones (plane finite elements). Arguments may be
     quantities, "1.5 MPa".
     """
-    modulus = converted(modulus, "Pa", "modulus")
-    width, thickness, gap = (
-        converted(v, "m", n) for n, v in (("width", width), ("thickness", thickness), ("gap", gap))
-    )
+    modulus = float(converted(modulus, "Pa", "modulus"))
+    width, thickness = float(converted(width, "m", "width")), float(converted(thickness, "m", "thickness"))
+    gap = float(converted(gap, "m", "gap"))
     for name, value in (("modulus", modulus), ("width", width), ("thickness", thickness), ("gap", gap)):
         if not value > 0:
             raise InputError("a bridge needs positive dimensions", field=name, value=value, allowed="> 0")
