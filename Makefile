@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all bench prove docs lint setup clean
+.PHONY: demo test test-all bench prove docs lint wheel setup clean
 
 setup: .venv/ready
 
@@ -36,7 +36,11 @@ docs: setup
 
 lint: setup
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet origami_sim scenes studies examples tests benchmarks docs/*.py .ci
 	$(BIN)/pyright
+
+wheel: setup
+	$(BIN)/python .ci/wheel.py
 
 clean:
 	rm -rf .venv runs build *.egg-info

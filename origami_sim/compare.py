@@ -6,12 +6,16 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import Channel, Recording
 from origami_sim.recording.units import quantity, with_prefix
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PARTING_WINDOW = 5
 """Consecutive values of which the median residual must exceed the threshold."""
@@ -59,7 +63,7 @@ class ChannelComparison:
         return 100.0 * (1.0 - self.nrmse)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Recording against simulation, channel by channel.
 
@@ -84,6 +88,18 @@ class Comparison:
     def instant(self, time: float) -> str:
         """A time in words: 't = 0.412 s', or 'step 12' for load steps."""
         return f"step {time:.0f}" if self.by_step else f"t = {time:.3f} s"
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self.sentence()}>"
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import comparison_html  # only who looks pays for it
+
+        return comparison_html(self)
+
+    def plot(self) -> "Figure":
+        """Recording and simulation above, their residual with the noise band below, one column per component."""
+        return _overlay(self)
 
     def sentence(self) -> str:
         """What was found, in one sentence."""
@@ -250,12 +266,23 @@ def plot_overlay(comparison: Comparison, path: str | Path) -> Path:
     Returns:
         The path written.
     """
-    from matplotlib.figure import Figure  # slow to import, only needed here
-
     target = Path(path)
     formats = (".png", ".svg", ".pdf")
     if target.suffix.lower() not in formats:
         raise InputError("unknown kind of picture", field="path", value=str(path), allowed=", ".join(formats))
+    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial{target.suffix}")
+    try:
+        comparison.plot().savefig(partial)
+        os.replace(partial, target)
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+def _overlay(comparison: Comparison) -> "Figure":
+    """The figure of `plot_overlay`."""
+    from matplotlib.figure import Figure  # slow to import, only needed here
+
     panels = [(c, k) for c in comparison.channels.values() for k in range(c.recorded.shape[1])]
     columns = min(len(panels), 3)
     blocks = -(-len(panels) // columns)
@@ -271,13 +298,7 @@ def plot_overlay(comparison: Comparison, path: str | Path) -> Path:
         block, column = divmod(index, columns)
         grid[2 * block, column].set_visible(False)
         grid[2 * block + 1, column].set_visible(False)
-    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial{target.suffix}")
-    try:
-        figure.savefig(partial)
-        os.replace(partial, target)
-    finally:
-        partial.unlink(missing_ok=True)
-    return target
+    return figure
 
 
 def _compare_channel(

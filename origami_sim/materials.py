@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from origami_sim.errors import InputError
+from origami_sim.quantities import converted
 
 MU0 = 1.25663706212e-6
 """Permeability of free space [T m/A]."""
@@ -91,13 +92,23 @@ def layered_rigidity(layers: Sequence[tuple[float, float]]) -> float:
 
 
 def bridge_stiffness(
-    modulus: float, width: float, thickness: float, gap: float, *, poisson: float = 0.49, end_correction: float = 0.66
+    modulus: float | str,
+    width: float | str,
+    thickness: float | str,
+    gap: float | str,
+    *,
+    poisson: float = 0.49,
+    end_correction: float = 0.66,
 ) -> float:
     """Rotational stiffness of an elastomer bridge between two one-sided patches [N m/rad].
 
     K = E' w h^3 / (12 L*), L* = g + 2 c h: the bridge is longer than the gap because the sheet under the patches
-    bends too; c = 0.66 for patches of 0.78 MPa, 0.40 for rigid ones (plane finite elements).
+    bends too; c = 0.66 for patches of 0.78 MPa, 0.40 for rigid ones (plane finite elements). Arguments may be
+    quantities, "1.5 MPa".
     """
+    modulus = float(converted(modulus, "Pa", "modulus"))
+    width, thickness = float(converted(width, "m", "width")), float(converted(thickness, "m", "thickness"))
+    gap = float(converted(gap, "m", "gap"))
     for name, value in (("modulus", modulus), ("width", width), ("thickness", thickness), ("gap", gap)):
         if not value > 0:
             raise InputError("a bridge needs positive dimensions", field=name, value=value, allowed="> 0")

@@ -17,6 +17,7 @@ from origami_sim.scene import Settings
 PAPER = 25.0
 """Stride that the seed paper reports for its crawler [mm per cycle]."""
 
+
 def settings_hash(settings: Settings) -> str:
     """Digest of all values of a calibration."""
     return hashlib.sha256(json.dumps(settings.as_dict(), sort_keys=True).encode()).hexdigest()[:16]

@@ -4,11 +4,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from origami_sim.diagnose.budget import Share
 from origami_sim.files import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VERDICTS = ("ADEQUATE", "PARAMETER", "MEASUREMENT", "MECHANISM", "TIE", "SEVERAL", "UNKNOWN", "UNTESTABLE")
 
@@ -214,7 +218,7 @@ class Baseline:
     note: str = ""
 
 
-@dataclass
+@dataclass(repr=False)
 class Diagnosis:
     """All that was found.
 
@@ -272,6 +276,22 @@ class Diagnosis:
     @property
     def exit_code(self) -> int:
         return EXIT[self.verdict]
+
+    def __repr__(self) -> str:
+        from origami_sim.view.findings import diagnosis_line  # only who looks pays for it
+
+        return diagnosis_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import diagnosis_html
+
+        return diagnosis_html(self)
+
+    def plot(self) -> "Figure":
+        """Where the mismatch goes, and the first recording beside the model as given and the best explanation."""
+        from origami_sim.view.findings import plot_diagnosis
+
+        return plot_diagnosis(self)
 
     def to_dict(self) -> dict:
         """Plain lists and numbers; what is not finite becomes None."""

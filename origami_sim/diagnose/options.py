@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from origami_sim.errors import InputError
 from origami_sim.possible import Possible
 
 
@@ -20,6 +21,9 @@ class Options:
         fits: sets of effects that are fitted at most. threads: see `Batch`.
         possible: what the set-up can do in a further recording; None: what the scene says, else the defaults. What a
             sidecar states goes before either.
+
+    Raises:
+        InputError: a rate that is not positive, fewer than 4 fits.
     """
 
     motion: str = "auto"
@@ -30,6 +34,12 @@ class Options:
     fits: int = 16
     threads: int | None = None
     possible: Possible | None = None
+
+    def __post_init__(self):
+        if not self.rate > 0:
+            raise InputError("frames are compared at a positive rate", field="rate", value=self.rate, allowed="> 0 Hz")
+        if self.fits < 4:
+            raise InputError("too few fits to find an effect", field="fits", value=self.fits, allowed="4 or more")
 
 
 Report = Callable[[str, float], None]

@@ -1,7 +1,8 @@
 """Gradients of what a device does by the numbers of its design.
 
 Equilibria by the implicit function theorem: with the tangent K of the statics, K dy/dp = dF/dp on the free axes; held
-nodes go where the design puts them. Motions by forward sensitivities: worlds at p + s h, s = 1, -1, 2, -2, of one batch
+nodes go where the design puts them. Of rigid panels y are fold angles and the pose of the root, and closed loops stay
+closed. Motions by forward sensitivities: worlds at p + s h, s = 1, -1, 2, -2, of one batch
 with one time step, so that what is differentiated is one discrete motion.
 """
 
@@ -18,6 +19,7 @@ from origami_sim.errors import InputError
 from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, found
 from origami_sim.model import State
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.rigid_sensitivity import followed
 from origami_sim.solve.statics import tangent
 from origami_sim.solve.system import NULL_SHIFT, STENCIL, WEIGHTS
 from origami_sim.solve.timestep import stable_step
@@ -69,8 +71,8 @@ def gradient(
         scales: sizes over which the numbers matter, such as the width of their bounds (default: their own size).
 
     Raises:
-        InputError: the device is not found there, a number that is zero and has no scale, gradients of equilibria of
-            rigid panels, or of devices whose topology changes.
+        InputError: the device is not found there, a number that is zero and has no scale, devices whose topology
+            changes, loops of rigid panels that open as the design changes.
     """
     how, every = way or Way(), [measures] if callable(measures) else list(measures)
     names = list(point)
@@ -81,7 +83,7 @@ def gradient(
     step = {n: STEP * size[n] for n in names}
     moved = [{**point, n: point[n] + s * step[n]} for n in names for s in STENCIL]
     devices = [at(build, {**(fixed or {}), **p}) for p in [point, *moved]]
-    if any(len(d.model.position) != len(devices[0].model.position) for d in devices):
+    if len({(len(d.model.position), d.model.creases.tobytes(), d.model.triangles.tobytes()) for d in devices}) > 1:
         raise InputError("the design's topology changes with a number", field=", ".join(names))
     near = _moving(devices, how) if how.duration is not None else _at_rest(devices, how, len(names), step)
     value = np.array([float(m(near[0])) for m in every])
@@ -107,15 +109,16 @@ def _moving(devices: list[Device], way: Way) -> list[Found]:
 def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, float]) -> list[Found]:
     """The equilibrium, and to first order where it goes as the design changes."""
     first = devices[0]
-    if first.model.panels == "rigid":
-        raise InputError(
-            "gradients of equilibria are taken with bars", field="panels", value="rigid", allowed="elastic; or a motion"
-        )
     rest = found([first], way)[0]
     if rest.failure or rest.equilibrium is None:
         raise InputError(f"there is no gradient without an equilibrium: {rest.failure}", field="point")
     state = rest.equilibrium.state
     time = lasting(first.drive) if way.time is None else way.time
+    if first.model.panels == "rigid":
+        designs = [(d.model, d.parameters, d.drive) for d in devices]
+        there = followed(designs, state, time, STENCIL, WEIGHTS)
+        moved = [Found(*d, x, angles, time=time) for d, (x, angles) in zip(designs[1:], there, strict=True)]
+        return [rest, *moved]
     free = np.flatnonzero(first.model.free.ravel())
     k = sp.csc_array(tangent(first.model, first.parameters, first.drive, time=time, state=state))[free][:, free]
     stiffest = float(np.abs(k.diagonal()).max())

@@ -102,13 +102,18 @@ def solve_for(
     return Solution(values, value, reached, message, last, tried)
 
 
+def _end(value: float | str | None, free: float) -> float:
+    """One end of what a measure may be [SI]; `free` where nothing is stated."""
+    return free if value is None else float(converted(value, ANY, "subject_to"))
+
+
 def optimise(
     build: Build,
     objective: Measure,
     bounds: Bounds,
     *,
     fixed: Mapping[str, Any] | None = None,
-    subject_to: Sequence[tuple[Measure, float | str, float | str]] = (),
+    subject_to: Sequence[tuple[Measure, float | str | None, float | str | None]] = (),
     way: Way | None = None,
     samples: int = SAMPLES,
     rounds: int = 40,
@@ -122,7 +127,7 @@ def optimise(
     Args:
         objective: to be made small; `lambda found: -found.moved("x")` makes the way long.
         bounds: least and largest value of each unknown argument of `build`. fixed: other arguments.
-        subject_to: measures with their least and largest value.
+        subject_to: measures with their least and largest value; None: any.
         samples: at the start. rounds: of the descent, 0 for none. seed: of the sample.
 
     Raises:
@@ -130,9 +135,7 @@ def optimise(
     """
     how, limits = way or Way(), _limits(bounds)
     low, width = _box(limits)
-    walls = [
-        (m, float(converted(a, ANY, "subject_to")), float(converted(b, ANY, "subject_to"))) for m, a, b in subject_to
-    ]
+    walls = [(m, _end(a, -np.inf), _end(b, np.inf)) for m, a, b in subject_to]
     measures = [objective, *(m for m, _, _ in walls)]
     tried: list[dict[str, float]] = []
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from origami_sim.errors import InputError
 from origami_sim.explore.found import TOGETHER, Build, Device, Measure, Way, at, found
 from origami_sim.quantities import ANY, converted
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 ROWS = "points.jsonl"
 
 
-@dataclass
+@dataclass(repr=False)
 class Sweep:
     """A table of points and what was measured there.
 
@@ -58,16 +61,30 @@ class Sweep:
         front = np.flatnonzero(~np.array(beaten))
         return front[np.argsort(values[front, 0], kind="stable")]
 
+    def __repr__(self) -> str:
+        from origami_sim.view.findings import sweep_line  # only who looks pays for it
+
+        return sweep_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import sweep_html
+
+        return sweep_html(self)
+
+    def plot(self) -> "Figure":
+        """Every measure over the first input, a line for each combination of the others."""
+        from origami_sim.view.findings import plot_sweep
+
+        return plot_sweep(self)
+
     def draw(self, path: str | Path, x: str, y: str) -> Path:
         """A picture of all points and of the Pareto front of two measures, as `pareto` takes them."""
-        import matplotlib
-
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
+        from matplotlib.figure import Figure
 
         front = self.pareto(x, y)
         a, b = (self.columns[n.lstrip("-")] for n in (x, y))
-        figure, ax = plt.subplots(figsize=(6.5, 4.5), layout="constrained")
+        figure = Figure(figsize=(6.5, 4.5), layout="constrained")
+        ax = figure.subplots()
         ax.plot(a, b, "o", color="#9aa7b5", ms=5, label=f"{len(self)} designs")
         ax.plot(a[front], b[front], "o-", color="#c8342b", ms=6, label=f"Pareto front, {len(front)} designs")
         better = [f"{n.lstrip('-')} ({'larger' if n[0] == '-' else 'smaller'} is better)" for n in (x, y)]
@@ -77,7 +94,6 @@ class Sweep:
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=140)
-        plt.close(figure)
         return path
 
     def _toward(self, measure: str) -> np.ndarray:

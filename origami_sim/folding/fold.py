@@ -9,6 +9,7 @@ them would strain the sheet, and go on when others have made way.
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,24 +21,35 @@ from .elastic import Elastic, Shape
 from .intersections import crossing_pairs
 from .placement import Placement
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SOFTNESS = (1e-3, 1e-2, 1e-1)
 """Stiffnesses of creases over that of the sheet in its plane, tried in turn, from a sheet to a rubber skin that is
-drawn to its targets whatever it takes. The stiffest that reaches them is chosen."""
+drawn to its targets whatever it takes. The stiffest that reaches them is chosen. With
+half and double of all the same of 20 fold, in 1.04 and 0.87 times the time; what cannot fold ends in a compromise that
+keeps closer to lengths, or to angles."""
 STEPS = 20
-"""Steps of the targets. Half of them fold the same 12 of 13 small public patterns in half the time."""
+"""Steps of the targets, and frames of the replay. Half and double of them fold the same of 20 public patterns."""
 ITERATIONS, LAST = 15, 60
-"""Iterations at most in a step, which only has to stay near the path, and at the full targets, where it has to get."""
+"""Iterations at most in a step, which only has to stay near the path, and at the full targets, where it has to get.
+Half of the first takes 0.8 times the time, double of the second 1.06 times; the same of 20 fold."""
 LOWER = 0.9
-"""Share of the energy below which another shape is taken as a snap rather than as the same minimum, less well found."""
+"""Share of the energy below which another shape is taken as a snap rather than as the same minimum, less well found.
+Half folds the same of 20; above 1, where states of more energy would be taken, two end otherwise."""
 STRETCH = 0.05
-"""Strain beyond which a sheet counts as torn, besides the drawing's inaccuracy: paper breaks at 2 to 5 per cent."""
+"""Strain beyond which a sheet counts as torn, besides the drawing's inaccuracy: paper breaks at 2 to 5 per cent.
+Half and double change no verdict of 20."""
 THICKNESS = 2e-4
 """Thickness of a sheet that states none [m]: heavy paper."""
+EXACT = 2e-5
+"""Distance of all angles from their targets [rad] below which no other shape is looked for: it saves time. Half
+and double change nothing."""
 TOLERANCE = np.radians(5.0)
 """Distance from its target within which a crease has arrived [rad]."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Folding:
     """How a pattern folded.
 
@@ -58,6 +70,22 @@ class Folding:
     softness: float
     tolerance: float
     wall: float = 0.0
+
+    def __repr__(self) -> str:
+        worst, snaps = np.degrees(self.errors.max(initial=0.0)), f", {len(self.snaps)} snaps" if self.snaps else ""
+        ends = f"folds to within {max(worst, 0.01):.2f} deg" if self.reached else f"misses by up to {worst:.1f} deg"
+        return f"<Folding: {len(self.errors)} creases, {ends}{snaps}>"
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import folding_html  # only who looks pays for it
+
+        return folding_html(self)
+
+    def plot(self) -> "Figure":
+        """The sheet on its way, mountains red and valleys blue."""
+        from .picture import figure_of
+
+        return figure_of(self)
 
     @property
     def errors(self) -> np.ndarray:
@@ -136,7 +164,10 @@ def fold(
     began = clock.perf_counter()
     sheet = Elastic(pattern)
     if not len(sheet.mesh.creases):
-        raise InputError("the pattern has no crease to fold", field="edges_assignment", allowed="M and V edges")
+        unread = "".join(f"; {n.rstrip('.')}" for n in pattern.notes if "unknown colour" in n)
+        raise InputError(
+            f"the pattern has no crease to fold{unread}", field="edges_assignment", allowed="M and V edges"
+        )
     if not np.any(sheet.target):
         raise InputError(
             "the pattern gives no target angle", field="edges_foldAngle", allowed="M and V edges, or degrees"
@@ -188,8 +219,8 @@ def _follow(sheet: Elastic, placement: Placement, steps: int, progress) -> _Path
 
 
 def _exact(sheet: Elastic, shape: Shape, target) -> bool:
-    """Tell whether a shape is as good as any: all angles within a thousandth of a degree of where they should be."""
-    return bool(np.abs(shape.angles - target)[sheet.driven].max() < 2e-5)
+    """Tell whether a shape is as good as any."""
+    return bool(np.abs(shape.angles - target)[sheet.driven].max() < EXACT)
 
 
 def _stiffen(sheet: Elastic, path: _Path, tolerance: float) -> float:

@@ -1,10 +1,14 @@
 """A picture of a folding: the pattern, the way and the end, drawn without a viewer."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .fold import Folding
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COLOURS = {"M": "#d62728", "V": "#1f77b4"}
 OTHER = "#888888"
@@ -27,6 +31,12 @@ def draw(folding: Folding, path: str | Path) -> Path:
     Returns:
         The path.
     """
+    figure_of(folding).savefig(path)
+    return Path(path)
+
+
+def figure_of(folding: Folding) -> "Figure":
+    """Return the sheet on its way as a figure; see `draw`."""
     from matplotlib.figure import Figure  # slow to import, only needed here
 
     figure = Figure(figsize=(3.6 * len(FRAMES), 3.8), dpi=110, layout="constrained")
@@ -34,8 +44,7 @@ def draw(folding: Folding, path: str | Path) -> Path:
         frame = int(np.argmin(np.abs(folding.shares - share)))
         _draw(axes, folding, folding.x[frame])
         axes.set_title(f"{folding.shares[frame]:.0%} of the angles", fontsize=10)
-    figure.savefig(path)
-    return Path(path)
+    return figure
 
 
 def _draw(axes, folding: Folding, x) -> None:

@@ -15,9 +15,11 @@ from scipy.sparse.csgraph import connected_components
 from .elastic import Elastic, Shape
 
 LOOSE = 0.1
-"""Weight of the lines inside panels, taken as flat, beside that of driven creases: panels may bend."""
+"""Weight of the lines inside panels, taken as flat, beside that of driven creases: panels may bend. Half and
+double fold the same of 20 public patterns; a start need not be exact."""
 TINY = 1e-10
-"""Added to the diagonals, which have a null space where parts of a sheet hang together by a vertex."""
+"""Added to the diagonals, which have a null space where parts of a sheet hang together by a vertex. Half
+and double change nothing: it is far below all else and far above rounding."""
 
 
 class Placement:

@@ -1,10 +1,14 @@
-"""Crease patterns built from a few lengths. All lengths in metres, all angles in radians, valley folds positive."""
+"""Crease patterns built from a few lengths. All lengths in metres, all angles in radians, valley folds positive.
+
+Lengths and angles may be quantities: "20 mm", "60 deg".
+"""
 
 import math
 
 import numpy as np
 
 from ..errors import InputError
+from ..quantities import converted
 from .assemble import assemble
 from .checks import check_count, check_number, check_positive
 from .crease_pattern import Pattern
@@ -30,11 +34,11 @@ def strip(lengths, width, *, fold_angles=None) -> Pattern:
     Raises:
         InputError: a length or width that is not positive, or a wrong number of them.
     """
-    panels = [check_positive(f"lengths[{n}]", value) for n, value in enumerate(_sequence("lengths", lengths))]
-    if np.ndim(width):
-        widths = [check_positive(f"width[{n}]", value) for n, value in enumerate(width)]
+    panels = [_size(f"lengths[{n}]", value) for n, value in enumerate(_sequence("lengths", lengths))]
+    if np.ndim(width) and not isinstance(width, str):
+        widths = [_size(f"width[{n}]", value) for n, value in enumerate(width)]
     else:
-        widths = [check_positive("width", width)] * (len(panels) + 1)
+        widths = [_size("width", width)] * (len(panels) + 1)
     _check_length("width", widths, len(panels) + 1)
     x = np.concatenate([[0.0], np.cumsum(panels)])
     vertices = [(x[s], side * 0.5 * w, 0.0) for s, w in enumerate(widths) for side in (-1, 1)]
@@ -58,7 +62,7 @@ def cross(base, flap_length, *, fold_angle=None) -> Pattern:
     Raises:
         InputError: a length that is not positive.
     """
-    half, reach = 0.5 * check_positive("base", base), check_positive("flap_length", flap_length)
+    half, reach = 0.5 * _size("base", base), _size("flap_length", flap_length)
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
     outward = [(0, -1), (1, 0), (0, 1), (-1, 0)]
     vertices, faces, creases = list(corners), [(0, 1, 2, 3)], []
@@ -81,7 +85,7 @@ def grid(nx, ny, dx, dy) -> Pattern:
         InputError: a count below 1 or a size that is not positive.
     """
     nx, ny = check_count("nx", nx, 1), check_count("ny", ny, 1)
-    dx, dy = check_positive("dx", dx), check_positive("dy", dy)
+    dx, dy = _size("dx", dx), _size("dy", dy)
     vertices = [(dx * column, dy * row, 0.0) for row in range(ny + 1) for column in range(nx + 1)]
     return _creased(vertices, _grid_faces(nx, ny), {})
 
@@ -111,14 +115,14 @@ def miura(nx, ny, a, b, gamma, *, fold_angle=0.0, target_angle=None) -> Pattern:
         InputError: a count below 1, a size that is not positive or an angle out of range.
     """
     nx, ny = check_count("nx", nx, 1), check_count("ny", ny, 1)
-    a, b = check_positive("a", a), check_positive("b", b)
-    gamma = check_number("gamma", gamma, low=1e-3, high=0.5 * math.pi - 1e-3, allowed="an angle in (0, pi/2) rad")
-    fold_angle = check_number("fold_angle", fold_angle, low=0.0, high=math.pi - 1e-6, allowed="[0, pi) rad")
+    a, b = _size("a", a), _size("b", b)
+    gamma = _turn("gamma", gamma, low=1e-3, high=0.5 * math.pi - 1e-3, allowed="an angle in (0, pi/2) rad")
+    fold_angle = _turn("fold_angle", fold_angle, low=0.0, high=math.pi - 1e-6, allowed="[0, pi) rad")
     if target_angle is None:
         target, has_target = fold_angle, fold_angle > 0.0
     else:
         target, has_target = (
-            check_number("target_angle", target_angle, low=0.0, high=math.pi, allowed="[0, pi] rad"),
+            _turn("target_angle", target_angle, low=0.0, high=math.pi, allowed="[0, pi] rad"),
             True,
         )
     vertices = _miura_vertices(nx, ny, a, b, gamma, 0.5 * fold_angle)
@@ -167,10 +171,10 @@ def waterbomb(side, *, fold_angle=0.0, target_angle=None) -> Pattern:
     Raises:
         InputError: a side that is not positive or an angle out of range.
     """
-    side = check_positive("side", side)
+    side = _size("side", side)
     limit = {"low": 0.0, "high": math.pi - 1e-6, "allowed": "[0, pi) rad"}
-    fold_angle = check_number("fold_angle", fold_angle, **limit)
-    target = fold_angle if target_angle is None else check_number("target_angle", target_angle, **limit)
+    fold_angle = _turn("fold_angle", fold_angle, **limit)
+    target = fold_angle if target_angle is None else _turn("target_angle", target_angle, **limit)
     faces = [(0, n, n % 6 + 1) for n in range(1, 7)]
     letters = {(0, n): "M" if n in (1, 4) else "V" for n in range(1, 7)}
     creases = {key: (letter, math.nan) for key, letter in letters.items()}
@@ -212,8 +216,8 @@ def kresling(n, *, radius, height, twist) -> Pattern:
         InputError: n below 3, a size that is not positive or a twist out of range.
     """
     n = check_count("n", n, 3)
-    radius, height = check_positive("radius", radius), check_positive("height", height)
-    twist = check_number("twist", twist, low=-math.pi, high=math.pi, allowed="[-pi, pi] rad")
+    radius, height = _size("radius", radius), _size("height", height)
+    twist = _turn("twist", twist, low=-math.pi, high=math.pi, allowed="[-pi, pi] rad")
     turns = 2.0 * math.pi * np.arange(n) / n
     rings = [
         np.column_stack([radius * np.cos(turns + turn), radius * np.sin(turns + turn), np.full(n, z)])
@@ -234,6 +238,16 @@ def _grid_faces(nx, ny) -> list[tuple[int, ...]]:
     return [tuple(row * (nx + 1) + column + c for c in corners) for row in range(ny) for column in range(nx)]
 
 
+def _size(name, value) -> float:
+    """Return a length above zero [m]; it may be a quantity, "20 mm"."""
+    return check_positive(name, converted(value, "m", name))
+
+
+def _turn(name, value, **limits) -> float:
+    """Return an angle [rad]; it may be a quantity, "60 deg"."""
+    return check_number(name, converted(value, "rad", name), **limits)
+
+
 def _sequence(name, values) -> list:
     if np.ndim(values) != 1 or len(values) == 0:
         raise InputError("not a list of numbers", field=name, value=values, allowed="one or more numbers")
@@ -250,7 +264,7 @@ def _angles(name, values, count) -> list[float]:
     if values is None:
         return [math.nan] * count
     _check_length(name, values, count)
-    return [check_number(name, v, low=-math.pi, high=math.pi, allowed="[-pi, pi] rad") for v in values]
+    return [_turn(name, v, low=-math.pi, high=math.pi, allowed="[-pi, pi] rad") for v in values]
 
 
 def _letter(angle) -> str:

@@ -69,8 +69,8 @@ def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -
         keys["frame_unit"] = "unit"
     stated = metres_per(keys["frame_unit"], file=file, field="frame_unit")
     vertices = data.coordinates()
-    check_vertices(vertices, file=file)
-    extent = float(np.ptp(vertices, axis=0).max()) or 1.0
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused below, once its unit is known
+        extent = float(np.ptp(vertices, axis=0).max()) or 1.0
     if keys["frame_unit"] == "unit":
         keys["frame_unit"] = "m"
         scale = metres_of(extent, size=size, scale=scale, notes=notes, file=file)
@@ -78,7 +78,8 @@ def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -
         scale = stated
     else:
         scale = metres_of(extent, size=size, scale=scale, notes=notes, file=file)
-    vertices = vertices * scale
+    with np.errstate(over="ignore", invalid="ignore"):
+        vertices = vertices * scale
     check_vertices(vertices, file=file)
     edges, faces = data.loops("edges_vertices", size=2), data.loops("faces_vertices")
     if not edges and not faces:

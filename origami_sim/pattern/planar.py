@@ -13,7 +13,8 @@ from .topology import edge_key, face_sides
 
 FINEST, COARSEST, APART = 1e-4, 2.5e-3, 1e-2
 """Shares of the diagonal: always merged, never merged beyond, and surely apart. Hand-drawn files miss by up to 2e-3;
-half of `COARSEST` leaves slivers in them, double swallows pleats."""
+half of `COARSEST` leaves slivers in them, double swallows pleats.
+Half and double of `FINEST` and of `APART` fold the same of 20 public patterns."""
 CHUNK = 256
 """Segments whose neighbours are looked up at a time, so that a page of scribble needs no more memory than a pattern."""
 MAX_CROSSINGS = 200_000

@@ -111,7 +111,7 @@ class DriveChannel:
         return out.reshape(len(times), *self.values.shape[1:])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Channels of one measurement, on one time base.
 
@@ -134,6 +134,11 @@ class Recording:
     gravity: "Gravity | None" = None
     start: "Start | None" = None
     motion: str | None = None
+
+    def __repr__(self) -> str:
+        driven = f"; driven by {', '.join(self.drive)}" if self.drive else ""
+        span = f"{self.times[0]:g} to {self.times[-1]:g}" if len(self.times) else "none"
+        return f"<Recording {self.name}: {len(self.times)} frames, {span}; {', '.join(self.channels)}{driven}>"
 
     def __post_init__(self) -> None:
         for what, text in (("name", self.name), *(("channels", name) for name in self.channels)):

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
-from scipy.linalg import expm
 
 from origami_sim.articulation import Articulation
 from origami_sim.drive import Drive
@@ -231,6 +230,7 @@ class Topology:
         parent: [B] body towards the root, bodies numbered outwards. body_of: [N]. joint_of: [C], -1 closes a loop.
         joints: (crease, sign of its angle) of each joint.
         turns, shifts, pivots: [d, 3] of the rates of the root. follows: whether it turns about its own centre.
+        floating: whether nothing holds it; shifts of what is held are in metres.
         root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `articulated.Tree`.
     """
 
@@ -259,6 +259,7 @@ class Topology:
             self._beyond[self.parent[b]] = np.concatenate([self._beyond[self.parent[b]], self._beyond[b]])
         self._carried_by = [np.isin(self.body_of, self._beyond[j + 1]) for j in range(len(self.joints))]
         self.root_nodes = np.flatnonzero(self.body_of == 0)
+        self.floating = not np.any(model.free[self.root_nodes] == 0.0)
         self.turns, self.shifts, self.pivots, self.follows = self._root(model)
         self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body)
 
@@ -269,22 +270,22 @@ class Topology:
     def positions(self, start: np.ndarray, q: np.ndarray, points=None, bodies=None) -> tuple[np.ndarray, np.ndarray]:
         """Nodes [N, W, 3] [m], and their velocities for unit rates [m, N, W, 3], of coordinates q [m, W].
 
-        Coordinates are zero at `start` [N, 3], or [N, W, 3] of each world: shifts (in units of the device's size) and
-        turns of the root, then changes of fold angles [rad]. In place of the nodes, other `points` [N, 3] that
-        `bodies` [N] carry (-1: none).
+        Coordinates are zero at `start` [N, 3], or [N, W, 3] of each world: shifts (in units of the device's size, if it
+        floats) and turns of the root, then changes of fold angles [rad]. In place of the nodes, other `points` [N, 3]
+        that `bodies` [N] carry (-1: none).
         """
         begin = start if start.ndim == 3 else start[:, None]
         own = points is None or bodies is None
         points, bodies = (begin, self.body_of) if own else (np.asarray(points)[:, None], np.asarray(bodies))
-        turns, places, axes, joints, shift, pivots = self._placed(begin, q)
+        turns, places, axes, joints, shift = self._placed(begin, q)
         w = q.shape[1]
         turns.append(np.tile(np.eye(3), (w, 1, 1)))  # of what no body carries
         places.append(np.zeros((w, 3)))
         x = _carried(points, bodies, turns, places)
-        size, roots = _size(begin), len(self.turns)
+        roots, centre, twists = len(self.turns), begin[self.root_nodes].mean(axis=0), self._twists(begin)
         by = np.zeros((roots + len(self.joints), *x.shape))
         for k in range(roots):
-            by[k] = self.shifts[k] * size + np.cross(self.turns[k], x - (shift if self.follows else pivots[k]))
+            by[k] = twists[:, k, 3:] + np.cross(self.turns[k], x - (shift if self.follows else centre))
             by[k, bodies < 0] = 0.0
         for j in range(len(self.joints)):
             mine = np.isin(bodies, self.beyond(j + 1))
@@ -302,11 +303,9 @@ class Topology:
         roots = len(self.turns)
         by = np.zeros((roots + len(self.joints), *x.shape))
         if roots:
-            centre, size = x[self.root_nodes].mean(axis=0), _size(x)
+            centre, twists = x[self.root_nodes].mean(axis=0), self._twists(x)
             for k in range(roots):
-                by[k] = self.shifts[k] * size + np.cross(
-                    self.turns[k], x - (centre if self.follows else self.pivots[k])
-                )
+                by[k] = twists[:, k, 3:] + np.cross(self.turns[k], x - centre)
         for j, (c, sign) in enumerate(self.joints):
             first = x[self._creases[c, 1]]
             along = x[self._creases[c, 2]] - first
@@ -316,18 +315,15 @@ class Topology:
         return by
 
     def _placed(self, begin: np.ndarray, q: np.ndarray):
-        """Turns [W, 3, 3] and places [W, 3] of the bodies, axes and places of the joints, and those of the root."""
-        w, roots, size = q.shape[1], len(self.turns), _size(begin)
+        """Turns [W, 3, 3] and places [W, 3] of the bodies, axes and places of the joints, and the root's centre."""
+        w, roots = q.shape[1], len(self.turns)
         centre = begin[self.root_nodes].mean(axis=0)
-        pivots = np.broadcast_to(centre if self.follows else self.pivots[:, None], (roots, len(centre), 3))
         turn, shift = np.tile(np.eye(3), (w, 1, 1)), np.tile(centre, (w // len(centre), 1))
         if roots:
-            twist = np.zeros((w, 4, 4))
-            for k in range(roots):
-                twist[:, :3, :3] += q[k][:, None, None] * np.cross(np.eye(3), self.turns[k])
-                twist[:, :3, 3] += q[k][:, None] * (self.shifts[k] * size + np.cross(self.turns[k], centre - pivots[k]))
-            moved = expm(twist)
-            turn, shift = moved[:, :3, :3], shift + moved[:, :3, 3]
+            twists = np.broadcast_to(self._twists(begin), (w, roots, 6))
+            of = np.einsum("kw,wka->wa", q[:roots], twists)
+            turn, along = screw(of[:, :3])
+            shift = shift + np.einsum("wab,wb->wa", along, of[:, 3:])
         turns, places, axes, joints = [turn], [shift - _turned(turn, centre)], [], []
         for j, (c, sign) in enumerate(self.joints):
             first, last = begin[self._creases[c, 1]], begin[self._creases[c, 2]]
@@ -338,7 +334,20 @@ class Topology:
             angle, k = q[roots + j][:, None, None], _skew(axis)
             turns.append(turns[p] @ (np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)))
             places.append(joints[-1] - _turned(turns[-1], first))
-        return turns, places, axes, joints, shift, pivots
+        return turns, places, axes, joints, shift
+
+    def twists(self, start: np.ndarray) -> np.ndarray:
+        """[d, 6] turn, and velocity of the root's centre at `start` [N, 3] [m], for unit rates of the root."""
+        return self._twists(start[:, None])[0]
+
+    def _twists(self, begin: np.ndarray) -> np.ndarray:
+        """The same of worlds that begin at [N, W, 3]: [W, d, 6]."""
+        count = begin.shape[1]
+        moves = np.tile(self.shifts * (_size(begin) if self.floating else 1.0), (count, 1, 1))
+        if not self.follows:
+            centre = begin[self.root_nodes].mean(axis=0)
+            moves = moves + np.cross(self.turns, centre[:, None] - self.pivots)
+        return np.concatenate([np.tile(self.turns, (count, 1, 1)), moves], axis=2)
 
     def closures(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W]."""
@@ -365,10 +374,8 @@ class Topology:
             found = len(basis)
             # a flat sheet may begin a motion that it cannot go on with: ask again a little further along each
             for motion in basis:
-                twist = np.zeros((4, 4))
-                twist[:3, :3], twist[:3, 3] = np.cross(np.eye(3), motion[:3]), motion[3:]
-                moved = expm(FARTHER * twist)
-                basis = _within(basis, points @ moved[:3, :3].T + moved[:3, 3], held)
+                turn, along = screw(FARTHER * motion[None, :3])
+                basis = _within(basis, points @ turn[0].T + FARTHER * along[0] @ motion[3:], held)
         if not np.any(held):
             free = np.eye(6) if np.ptp(model.position, axis=0).max() > 0 else np.eye(6)[3:]  # a point does not turn
             return free[:, :3], free[:, 3:], np.tile(centre, (len(free), 1)), True
@@ -463,6 +470,20 @@ def _carried(points: np.ndarray, bodies: np.ndarray, turns, places) -> np.ndarra
         own = np.broadcast_to(points[mine], (int(mine.sum()), w, 3))
         x[mine] = np.einsum("wab,nwb->nwa", turns[b], own) + places[b]
     return x
+
+
+def screw(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations R [W, 3, 3] by rotation vectors [W, 3] [rad], and matrices V [W, 3, 3] that make screws of them.
+
+    A velocity v that turns along for a unit of time shifts by V v: the exponential of a rigid motion (Murray, Li and
+    Sastry 1994, A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
+    """
+    angle = np.linalg.norm(turn, axis=1)[:, None, None]
+    k = np.cross(np.eye(3), turn[:, None, :])
+    sine, lift = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    small = angle < 1e-2  # where the difference of angle and sine is rounding
+    rest = np.where(small, 1 / 6 - angle**2 / 120 + angle**4 / 5040, (1 - sine) / np.where(small, 1.0, angle) ** 2)
+    return np.eye(3) + sine * k + lift * (k @ k), np.eye(3) + lift * k + rest * (k @ k)
 
 
 def _within(basis: np.ndarray, points: np.ndarray, held: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from origami_sim.model import Model
     from origami_sim.solve.dynamics import Trajectory
 
@@ -53,10 +55,8 @@ def model_html(model: "Model") -> str:
         "contacts": len(model.contacts),
         "effects": ", ".join(model.effects) or "none",
     }
-    picture = io.BytesIO()
-    if len(model.triangles):
-        plot_model(model).savefig(picture, format="png", dpi=80)
-    return _card("Model", rows, picture.getvalue(), "image/png")
+    picture = picture_of(plot_model(model)) if len(model.triangles) else b""
+    return card("Model", rows, picture, "image/png")
 
 
 def trajectory_html(t: "Trajectory") -> str:
@@ -75,10 +75,18 @@ def trajectory_html(t: "Trajectory") -> str:
     }
     moving = moving_picture(Film(t), ".webp", rate=12, seconds=min(4.0, max(1.0, float(t.times[-1] - t.times[0]))),
                             width=WIDTH, height=HEIGHT) if len(t.model.triangles) else b""  # fmt: skip
-    return _card(type(t).__name__, rows, moving, "image/webp")
+    return card(type(t).__name__, rows, moving, "image/webp")
 
 
-def _card(title: str, rows: dict, picture: bytes, kind: str) -> str:
+def picture_of(figure: "Figure") -> bytes:
+    """A figure as a PNG file."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=80)
+    return out.getvalue()
+
+
+def card(title: str, rows: dict, picture: bytes, kind: str) -> str:
+    """A table of texts with a picture in it, as HTML."""
     cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(str(v))}</td></tr>" for k, v in rows.items())
     image = f"<img alt='{html.escape(title)}' src='data:{kind};base64,{base64.b64encode(picture).decode()}'>"
     return f"<div><b>{html.escape(title)}</b><table>{cells}</table>{image if picture else ''}</div>"

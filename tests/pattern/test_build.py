@@ -109,7 +109,7 @@ def test_kresling_matches_the_published_layout():
         (lambda: strip([1, 1], 1, fold_angles=[4.0]), "out of range.*fold_angles"),
         (lambda: strip([1, 1], 1, fold_angles=[1.0, 1.0]), "wrong number"),
         (lambda: cross(math.nan, 1), "finite.*base"),
-        (lambda: cross(1, "2"), "finite.*flap_length"),
+        (lambda: cross(1, None), "finite.*flap_length"),
         (lambda: grid(0, 1, 1, 1), "bad count.*nx"),
         (lambda: grid(1, 1.5, 1, 1), "bad count.*ny"),
         (lambda: miura(1, 1, 1, 1, 1.6), "gamma"),
@@ -145,3 +145,22 @@ def test_scene_patterns(name, built):
     assert np.nanmax(np.abs(pattern.fold_angles)) == pytest.approx(math.radians(120), abs=0.3)
     assert not np.isnan(pattern.fold_angles[pattern.edges_assigned("MV")]).any()
     assert np.ptp(pattern.vertices[:, 0]) < 0.2
+
+
+def test_lengths_and_angles_may_be_quantities():
+    right, sixth = np.pi / 2, np.pi / 6
+    same = (
+        (strip(["10 mm", 0.02], "2 cm", fold_angles=["90 deg"]), strip([0.01, 0.02], 0.02, fold_angles=[right])),
+        (
+            miura(1, 1, "2 cm", 0.03, "60 deg", fold_angle="30 deg"),
+            miura(1, 1, 0.02, 0.03, 2 * sixth, fold_angle=sixth),
+        ),
+        (kresling(6, radius="1 cm", height=0.02, twist="30 deg"), kresling(6, radius=0.01, height=0.02, twist=sixth)),
+    )
+    for one, other in same:
+        assert one.vertices == pytest.approx(other.vertices)
+        assert one.fold_angles == pytest.approx(other.fold_angles, nan_ok=True)
+    with pytest.raises(InputError, match="wrong unit"):
+        strip([0.01], "2 mT")
+    with pytest.raises(InputError, match="must be positive"):
+        strip([0.01], "-2 mm")

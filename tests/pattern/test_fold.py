@@ -243,6 +243,20 @@ def test_built_pattern_is_written_in_metres(tmp_path):
     assert again.extra == {"frame_unit": "m"}
 
 
+@pytest.mark.parametrize("corner", [1e9, -1e200])
+def test_drawings_without_a_unit_may_have_any_coordinates(tmp_path, corner):
+    """They are 0.2 m long wherever they lie."""
+    near = square(frame_unit="unit")
+    far = square(
+        frame_unit="unit", vertices_coords=[[corner * x, corner * y] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    )
+    for name, document in (("near", near), ("far", far)):
+        (tmp_path / f"{name}.fold").write_text(json.dumps(document))
+    one, other = read_fold(tmp_path / "near.fold"), read_fold(tmp_path / "far.fold")
+    assert np.ptp(one.vertices, axis=0) == pytest.approx([0.2, 0.2, 0])
+    assert np.ptp(other.vertices, axis=0) == pytest.approx([0.2, 0.2, 0])
+
+
 def test_straight_angle_stays_in_range(tmp_path):
     pattern = fold_pattern(square(edges_foldAngle=[None] * 4 + [180]))
     pattern.fold_angles[4] = np.nextafter(math.pi, 4)
@@ -257,7 +271,7 @@ BAD = {
     "not a finite number .*'x'": square(vertices_coords=[[0, 0], ["x", 0], [1, 1], [0, 1]]),
     "not a finite number .*True": square(vertices_coords=[[0, 0], [True, 0], [1, 1], [0, 1]]),
     "not a finite number .*huge": square(vertices_coords=[[0, 0], [10**400, 0], [1, 1], [0, 1]]),
-    "coordinate out of range": square(vertices_coords=[[0, 0], [1e300, 0], [1, 1], [0, 1]]),
+    "coordinate out of range": square(frame_unit="m", vertices_coords=[[0, 0], [1e300, 0], [1, 1], [0, 1]]),
     r"index out of range .*faces_vertices\[1\].*0 to 3": square(faces_vertices=[[0, 1, 2], [0, 2, 7]]),
     "index out of range .*-1": square(faces_vertices=[[0, 1, 2], [0, 2, -1]]),
     r"not an index .*edges_vertices\[0\]": square(edges_vertices=[[0, 1.5], [1, 2], [2, 3], [3, 0], [0, 2]]),

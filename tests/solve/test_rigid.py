@@ -402,6 +402,16 @@ def test_a_miura_rests_where_its_energy_along_its_one_motion_is_least(cells):
     assert abs(least.x - 0.8) > 0.1
 
 
+def test_a_panel_that_turns_about_a_held_edge_hangs_from_it():
+    """A pendulum of two panels, pulled sideways: each link points along weight and pull, and the edge stays."""
+    sheet = Sheet(strip([0.03, 0.02], 0.02), thickness=1e-3, panels="rigid", triangulation="center")
+    model, parameters = sheet.crease(stiffness=0.0).gravity((3.0, 0, -4.0)).fix(nodes=[0, 1]).build()
+    found = equilibrium(model, parameters)
+    assert found.converged and found.stable, found.message
+    assert found.x[:2] == pytest.approx(model.position[:2], abs=1e-12)
+    assert found.x[4] - found.x[0] == pytest.approx(0.05 * np.array([0.6, 0.0, -0.8]), abs=1e-9)
+
+
 def test_an_arch_of_rigid_panels_held_at_both_ends_sags_to_rest():
     """A chain of equal links between two walls under its weight: the links' slopes go up in equal steps."""
     angles = np.array([0.9, 0.5, -0.5, -0.9])  # of the links
