@@ -14,11 +14,13 @@ import argparse
 import numpy as np
 
 from origami_sim.diagnose import Options, Subject
+from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.command import read_recordings
-from origami_sim.diagnose.forward import local_line
-from origami_sim.diagnose.prepare import arranged, nominal_fits, prepared
+from origami_sim.diagnose.nominal import nominal_fits
+from origami_sim.diagnose.prepare import prepared
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
+from origami_sim.fit.starts import local_line
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P
 from origami_sim.scene import read_calibration, scene_module
 
@@ -61,7 +63,7 @@ def doubled(file: str):
     """Forward model of the double chain, and how its segments are split into those fitted and those predicted."""
     recordings = prepared(list(read_recordings([file])), 200.0)
     subject = Subject.from_scene(scene_module("pendulum_chain"), read_calibration("pendulum_chain"), spreads=SPREADS)
-    forward = arranged(subject, recordings, Options(steps=300_000, segment=2.0))
+    forward, _ = arranged(subject, recordings, Options(segment=2.0))
     blocks = np.arange(len(forward.blocks))
     halves = [list(map(int, h)) for h in np.array_split(blocks, 2)]
     turns = [list(map(int, blocks[k::2])) for k in range(2)]
@@ -79,7 +81,7 @@ def single(files: list[str]):
     recordings = prepared(list(read_recordings(files)), 200.0)
     settings = read_calibration("pendulum_chain").replace(**SINGLE)
     subject = Subject.from_scene(scene_module("pendulum_chain"), settings, spreads=SINGLE_SPREADS)
-    forward = arranged(subject, recordings, Options())
+    forward, _ = arranged(subject, recordings, Options())
     one, other = ([n for n, b in enumerate(forward.blocks) if b.recording == r] for r in range(2))
     return forward, {recordings[1].name: (one, other), recordings[0].name: (other, one)}
 

@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose import Options, Subject, diagnose
-from origami_sim.diagnose.forward import Forward
+from origami_sim.diagnose.arrange import arranged
 from origami_sim.fit.hypothesis import Free, Hypothesis, suspects
-from origami_sim.fit.least_squares import Fit, Weights, fit
+from origami_sim.fit.least_squares import Fit, fit
+from origami_sim.fit.weights import Weights
 from origami_sim.recording import Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import cube_toss, falling_ball
@@ -49,7 +50,7 @@ def tested(
     subject: Subject, train: Sequence[Recording], test: Sequence[Recording], weights: Weights, effect: str = ""
 ) -> tuple[Fit, Fit]:
     """A fit to some recordings, and its numbers on others, of which only the starts are adapted."""
-    one, other = (Forward(subject, list(r), start="fit") for r in (train, test))
+    one, other = (arranged(subject, list(r), Options(start="fit"))[0] for r in (train, test))
     every = suspects(one.model, one.recordings, one.drive, one.parameters)
     added = tuple(s for s in every if s.effect == effect and not (s.kind == "measurement" and s.entities))
     fitted = fit(one, Hypothesis(added), weights, most=12)
@@ -63,9 +64,9 @@ def number(f: Fit, name: str) -> str:
 
 
 def balls(source: Path, folder: Path) -> None:
-    """Each drop fitted and the other predicted; 0.1 m of error, a quarter of the frames count."""
+    """Each drop fitted and the other predicted; 0.2 m of error."""
     falling_ball.convert(source, folder)
-    weights = Weights(np.array([0.1]), 0.25)
+    weights = Weights(np.array([0.2]))
     for name in falling_ball.BALLS:
         drops = [read_recording(folder / f"{name.lower().replace(' ', '_')}_{n}.csv") for n in (1, 2)]
         settings = falling_ball.of_ball(read_calibration("falling_ball"), name)
@@ -92,7 +93,7 @@ def flights(source: Path, folder: Path) -> None:
     train, test = ([read_recording(f) for f in files[n::10][:21]] for n in (0, 5))
     subject = Subject.from_scene(cube_toss, read_calibration("cube_toss").replace(board_height=-0.1))
     fixed = replace(subject, nominals=tuple(n for n in subject.nominals if n.name == "gravity"))
-    weights = Weights(np.full(3, 1e-4), 0.25)
+    weights = Weights(np.full(3, 2e-4))
     least = np.zeros(len(test))
     for title, s, effect, shown in (
         ("nominal", fixed, "", "gravity"),
@@ -116,7 +117,7 @@ def blows(source: Path, folder: Path) -> None:
     files = cube_toss.convert(source, folder, "impact", scale=SHORT)
     halves = [[read_recording(f) for f in files[n::6][:24]] for n in (0, 3)]
     subject = Subject.from_scene(cube_toss, read_calibration("cube_toss").replace(length_scale=SHORT))
-    weights = Weights(np.full(12, 1e-3), 0.2)
+    weights = Weights(np.full(12, 2e-3))
 
     def only(*names: str) -> tuple[Free, ...]:
         return tuple(replace(n, scale=10 * n.spread) for n in subject.nominals if n.name in names)
@@ -125,7 +126,7 @@ def blows(source: Path, folder: Path) -> None:
         some = replace(subject, nominals=only(*names))
         for train, test in (halves, halves[::-1]):
             fitted, other = tested(some, train, test, weights)
-            forward = Forward(some, test, start="fit")
+            forward, _ = arranged(some, test, Options(start="fit"))
             given = fit(forward, Hypothesis(), weights, fixed=True, most=12)
             pairs = zip(given.residuals, other.residuals, strict=True)
             better = sum(bool(np.nanmean(b**2) < np.nanmean(a**2)) for a, b in pairs)

@@ -19,7 +19,7 @@ from origami_sim.effects import get
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
-from origami_sim.fit.least_squares import Fit, carried_on, fit
+from origami_sim.fit.least_squares import Fit, carried_on, fit, promised
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, recast
@@ -40,8 +40,8 @@ FITS = 16
 SINGLES = 12
 """Leading single effects that are fitted where the best set is far off, whatever is expected of them."""
 
-KEPT, POLISHED = 4, 1e-3
-"""Leading fits that are fitted on by their own noise, and their posterior at least."""
+KEPT, POLISHED, OWED = 4, 1e-3, 1.0
+"""Leading fits that are fitted on by their own noise, if they are so probable, and if a step promises them so much."""
 
 PARTNERS = 12
 """Leading effects of which pairs are formed with all others."""
@@ -103,8 +103,7 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         ranked: single effects by what they promise the model without any.
-        tried: sets that were fitted. promise: log posterior that sets which were not may have. tight: sets that were
-            fitted by the noise that they or their neighbours imply.
+        tried: sets that were fitted. promise: log posterior that sets which were not may have.
         weights: of the signatures. store: whether nodes keep their problems, to be judged anew (`stored`).
     """
 
@@ -118,7 +117,6 @@ class Posterior:
     ranked: list[Key] = field(default_factory=list)
     tried: set[Key] = field(default_factory=set)
     promise: dict[Key, float] = field(default_factory=dict)
-    tight: set[Key] = field(default_factory=set)
     store: bool = False
 
     def probabilities(self) -> dict[Key, float]:
@@ -210,12 +208,12 @@ def polished(out: Posterior, forward: Predictor) -> None:
     """Fits the leaders on, by their own noise."""
     prior, chance = log_priors(out.signatures), out.probabilities()
     for key in sorted((k for k in out.nodes if chance[k] > POLISHED), key=lambda k: -chance[k])[:KEPT]:
-        if key in out.tight:
-            continue
         f = out.nodes[key].fit
-        f = carried_on(forward, f.reweighted(tight(f)))
+        f = f.reweighted(tight(f))
+        if f.cost - promised(forward, f) < OWED:
+            continue
+        f = carried_on(forward, f)
         if not f.failed:
-            out.tight.add(key)
             _add(out, forward, key, f, prior)
 
 
@@ -252,6 +250,8 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     """Enters a judged set, and all that add one or two effects to it, into a posterior."""
     hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
+    for k in [k for k, e in out.estimates.items() if e.parent == key]:  # by an earlier fit of the same set
+        del out.estimates[k], out.log[k], out.promise[k]
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
     out.estimates.pop(key, None)
@@ -445,11 +445,12 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     parent = node.fit
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
-    if missed(forward, parent) < FAR:
-        by = tight(parent)
-        out.tight.add(key)
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
-    return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
+    loose = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
+    if loose.failed or not any(t is not None for t in parent.linear.tie):
+        return loose
+    firm = carried_on(forward, loose.reweighted(replace(level(forward, loose), gap=TIGHT)), most=4)
+    return loose if firm.failed else firm
 
 
 def marginals(p: Posterior) -> dict[str, float]:

@@ -161,7 +161,8 @@ class Stored:
         chance = p.probabilities()
         classes = by_effects(p, chance)
         lead, beside = surely(classes)
-        best = best_of(p, chance, lead)
+        top = max(classes, key=lambda c: classes[c])
+        best = best_of(p, chance, lead or top)
         shares = self.shares[best]
         rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
         discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
@@ -171,7 +172,7 @@ class Stored:
 
         if all(status for *_, status in self.suspects):
             return said("UNTESTABLE", [], 1.0)
-        if not lead and max(classes, key=lambda c: classes[c]) == lead:
+        if not top:
             if self.quiet == "UNKNOWN" or (discrepancy > MOSTLY and rest > MOSTLY):
                 return said("UNKNOWN", [], None)
             return said("UNTESTABLE" if self.compared < COMPARED else self.quiet, [], classes[lead])

@@ -64,13 +64,16 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     chance = p.probabilities()
     classes = by_effects(p, chance)
     lead, beside = surely(classes)
-    best = best_of(p, chance, lead)
+    top = max(classes, key=lambda c: classes[c])
+    best = best_of(p, chance, lead or top)
     shown = widened(p, best)
     shares = budget(forward, given, base, p.nodes[best].fit)
     rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
     set_, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
     tied = [widened(p, k) for c in set_ if (k := best_of(p, chance, c)) in p.nodes]
-    others = [widened(p, k) for k in sorted(p.nodes, key=lambda k: -chance.get(k, 0.0)) if _class(p, k) != lead]
+    others = [
+        widened(p, k) for k in sorted(p.nodes, key=lambda k: -chance.get(k, 0.0)) if _class(p, k) != (lead or top)
+    ]
     common = {"best": shown, "tied": tied, "others": others, "budget": shares}
     tested = [s for s in p.signatures if not s.status]
     if not tested and not p.signatures:
@@ -79,7 +82,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = "None of the catalogue's suspects is excited by these recordings."
         return Judgement("UNTESTABLE", text, 1.0, [], **common)
     discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
-    if not lead and max(classes, key=lambda c: classes[c]) == lead:
+    if not top:
         found = _nothing_named(forward, given, base, p, shares, rest, discrepancy, classes[lead], compared)
         return replace(found, **{k: v for k, v in common.items() if k != "best"}, best=shown)
     named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
@@ -186,8 +189,10 @@ def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[f
 
 def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> Key:
     """The most probable fitted set of these effects; or else of these and others, or else of any."""
+    if not effects:
+        return frozenset()
     classes = {k: _class(p, k) for k in p.nodes}
-    mine = [k for k, c in classes.items() if c == effects] if effects else []
+    mine = [k for k, c in classes.items() if c == effects]
     mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
     return max(mine, key=lambda k: chance.get(k, 0.0))
 

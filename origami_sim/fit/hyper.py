@@ -25,7 +25,7 @@ class Hyper:
     slabs: tuple[float, ...] = (4.0, 12.0, 40.0, 120.0, 400.0, 1200.0)
     effects: float = 0.6
     most: int = 5
-    gaps: tuple[float, ...] = (1e-5, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+    gaps: tuple[float, ...] = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
     smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)
     flaws: tuple[float, ...] = (2.0, 8.0)
     fewer: float = 0.3
@@ -45,7 +45,7 @@ class Hyper:
     @cached_property
     def clean(self) -> np.ndarray:
         """Whether a cell has next to no discrepancy, of forces or of channels."""
-        return np.array([gap <= self.gaps[1] and smooth == 0.0 for gap, smooth, _ in self.cells])
+        return np.array([gap <= self.gaps[0] and smooth == 0.0 for gap, smooth, _ in self.cells])
 
 
 HYPER = Hyper()

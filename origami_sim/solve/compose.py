@@ -417,9 +417,9 @@ class _Composer(Sheets, Touching):
             t("field = uniform_field")
             return
         t(f"place = {place}")
-        t("near = fields.near(sources, place, w)")
-        t("field = uniform_field + uniform_gradient * place + near.field")
-        t("gradient = uniform_gradient + near.gradient")
+        t("placed = fields.near(sources, place, w)")
+        t("field = uniform_field + uniform_gradient * place + placed.field")
+        t("gradient = uniform_gradient + placed.gradient")
 
     def _fold(self, t: Text):
         """A hinge's angle, continued from its last one, and its gradients."""

@@ -118,5 +118,5 @@ def test_recordings_of_few_values_are_refused_and_slow_ones_noted():
         check_recording(lost, MODEL)
     slow = replace(SWING, times=1e3 * SWING.times)
     (note,) = check_recording(slow, MODEL, 5e-5)
-    assert "lasts 10 s, 2e+05 steps" in note and note.endswith("load steps.")
+    assert "lasts 10 s, 2e+05 steps" in note and note.endswith("motion = 'quasistatic' in the sidecar.")
     assert check_recording(SWING, MODEL, 5e-5) == []

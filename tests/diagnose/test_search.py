@@ -57,7 +57,7 @@ def test_the_effect_its_site_and_its_strength_are_found(found, rubbing):
     f = found.nodes[best].fit
     numbers = {n.label: t for n, t in zip(f.free, f.theta, strict=True)}
     assert numbers["crease_friction.friction_moment"] == pytest.approx(2e-5, rel=0.2)
-    assert f.cost < rubbing[2].cost - 50.0
+    assert missed(rubbing[0], f) < 1.1 and missed(rubbing[0], rubbing[2]) > 10.0
     assert marginals(found)["crease_friction at crease 1"] > 0.5 and next(iter(by_effect(found))) == "crease_friction"
 
 
@@ -125,21 +125,16 @@ def test_residuals_are_held_against_the_drive_that_varies(rubbing):
 
 
 def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
-    """A number's derivative is large in one fold only: there the held-out error is that without the fit."""
-    forward, _, base, _, _ = rubbing
-    plain = held_out(forward, base)
-    assert np.all(plain.rms > 0.9 * forward.blocks[0].noise) and len(plain.folds) == 5
-    line = base.linear
-    first = folds(forward, base.blocks)[0]
-    alone = [t * (1.0 if n in first else 1e-3) for n, t in enumerate(line.tangent)]
-    off = [
-        r + (1e3 * t[:, 0] if n in first else 0.0)
+    """One fold alone asks for another number: it is told that number by the others, which know nothing of it."""
+    forward, _, base, *_ = rubbing
+    line, first = base.linear, folds(forward, base.blocks)[0]
+    asks = [
+        3.0 * t[:, 0] if n in first else 0.0 * r
         for n, (r, t) in enumerate(zip(line.residual, line.tangent, strict=True))
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
-    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=off, tangent=alone)))
-    assert left.folds[0] > 1.5 * plain.folds[0]
-    assert left.folds[1:] == pytest.approx(plain.folds[1:], rel=0.2)
+    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=asks)))
+    assert len(left.folds) == 5 and left.folds[0] > 3.0 * max(left.folds[1:])
 
 
 LEVELS = [
@@ -181,7 +176,7 @@ def test_what_acts_at_a_crease_is_told_least_where_that_crease_is_clamped(rubbin
     best = replace(best, theta=np.concatenate([base.theta, best.theta[len(base.theta) :]]))
     menu = {e.what: e for e in propose(forward, [best, base], np.array([0.5, 0.5]), weights, most=99)}
     clamped = [menu[f"crease {c} clamped as it is in the reference state"].information for c in (0, 1)]
-    assert clamped[0] > 0.95 and clamped[1] < 0.05
+    assert clamped[0] > 0.95 and clamped[1] < 0.2
     for e in menu.values():
         assert e.entropy == 1.0 and 0.0 <= e.information <= 1.0
         assert e.separates == ["crease_friction at crease 1", "nominal"]
