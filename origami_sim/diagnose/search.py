@@ -37,6 +37,9 @@ So far from what was recorded linear estimates say little, and all is judged by 
 FITS = 16
 """Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
 
+RENEWED = 2.0
+"""Log evidence that a set gains, by a fit of a larger one, over its own fit, from which it is fitted again."""
+
 SINGLES = 12
 """Leading single effects that are fitted where the best set is far off, whatever is expected of them."""
 
@@ -105,6 +108,7 @@ class Posterior:
         ranked: single effects by what they promise the model without any.
         tried: sets that were fitted. promise: log posterior that sets which were not may have.
         weights: of the signatures. store: whether nodes keep their problems, to be judged anew (`stored`).
+        renewed: sets that were fitted again, from a fit of a larger one.
     """
 
     signatures: list[Signature]
@@ -118,6 +122,7 @@ class Posterior:
     tried: set[Key] = field(default_factory=set)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
+    renewed: set[Key] = field(default_factory=set)
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy."""
@@ -250,8 +255,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     """Enters a judged set, and all that add one or two effects to it, into a posterior."""
     hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
-    for k in [k for k, e in out.estimates.items() if e.parent == key]:  # by an earlier fit of the same set
-        del out.estimates[k], out.log[k], out.promise[k]
+    forget(out, key)
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
     out.estimates.pop(key, None)
@@ -279,6 +283,13 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
             break
         pairs += [(*own, one, n) for n in ranked[a + 1 :] if _compatible(out, first, node.others[n - len(own)])]
     _judge(out, node, pairs, prior, cells)
+
+
+def forget(out: Posterior, key: Key) -> None:
+    """Leaves out a fit of a set, and what was estimated by it."""
+    out.nodes.pop(key, None)
+    for k in [k for k, e in out.estimates.items() if e.parent == key]:
+        del out.estimates[k], out.log[k], out.promise[k]
 
 
 def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
@@ -321,6 +332,10 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
             promise[mine] = total + log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
     for n, key in enumerate(keys):
+        if key in out.nodes and key and key < node.key and key not in out.renewed:
+            if logsumexp(found[n]) > logsumexp(out.log[key]) + RENEWED:  # its own fit ended early: it goes on from here
+                out.renewed.add(key)
+                forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
             continue
         before = out.estimates.get(key)
@@ -447,9 +462,13 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
     loose = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
-    if loose.failed or not any(t is not None for t in parent.linear.tie):
+    tied = any(t is not None for t in parent.linear.tie)
+    if loose.failed or not tied or missed(forward, loose) > FAR:
         return loose
-    firm = carried_on(forward, loose.reweighted(replace(level(forward, loose), gap=TIGHT)), most=4)
+    firm = loose.reweighted(replace(level(forward, loose), gap=TIGHT))
+    if firm.cost - promised(forward, firm) < OWED:
+        return loose
+    firm = carried_on(forward, firm, most=4)
     return loose if firm.failed else firm
 
 

@@ -132,7 +132,7 @@ class Stored:
             for s, side, status in self.suspects
         ]
         out = Posterior(signatures, Weights(np.ones(1)), hyper)
-        out.failed = dict.fromkeys(self.failed, "")
+        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(self.nodes)
         prior = log_priors(signatures, hyper)
         for key, node in self.nodes.items():
             place(out, self._node(key, *node, signatures, hyper), prior)

@@ -65,7 +65,7 @@ def test_other_hyperparameters_give_what_the_fits_give_with_them(kept, changed):
     _, stored, forward, p = kept
     hyper = replace(HYPER, **changed)
     direct = Posterior(p.signatures, p.weights, hyper)
-    direct.failed = dict(p.failed)
+    direct.failed, direct.renewed = dict(p.failed), set(p.nodes)
     prior = log_priors(p.signatures, hyper)
     for key, node in p.nodes.items():
         _add(direct, forward, key, node.fit, prior)
