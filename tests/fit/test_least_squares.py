@@ -1,5 +1,6 @@
 """Fits: curved valleys, bounds, steps that cost too much, derivatives that are used again, other weights."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.weights import Weights
 from tests.diagnose.strips import hanging, record, subject
 
+FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
 STIFFENING = {"crease_stiffening": {"cubic_stiffness": (4e-4, [1])}}
 SMALL = {"duration": 3.0, "panels": 3, "rate": 100}
 
@@ -156,3 +158,17 @@ def test_what_cannot_be_simulated_is_said_and_no_crash():
             return Prediction([np.full((len(thetas), 2, 1), np.nan)], [None])
 
     assert "unstable" in fit(Lost(10.0), Hypothesis(), Weights(np.ones(1))).failed
+
+
+def test_the_scale_of_all_moments_is_known_no_better_than_before():
+    """Inertia, weight, stiffness, losses and friction times one number move alike: only priors tell that number."""
+    forward, _ = arranged(subject(3), prepared([record(FRICTION, **SMALL)], 200.0), Options())
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    one = next(s for s in every if s.effect == "crease_friction" and s.entities == (1,))
+    coarse = replace(one, free=(replace(one.free[0], scale=1e-4), *one.free[1:]))  # five times what it is
+    weights = Weights(forward.blocks[0].noise, gap=0.03)
+    f = fit(forward, Hypothesis((coarse,)), weights, theta=np.array([1.0, 1.0, 1.0, 1e-5, 0.01]), most=15)
+    known = 1.0 / np.sqrt(0.05**-2 + 0.3**-2 + 0.03**-2)
+    spread = f.deviations()[[0, 2]]
+    assert np.all(spread > 0.85 * known) and np.all(spread < 1.15 * known)
+    assert f.theta[3] / f.theta[2] == pytest.approx(2e-5, rel=0.02)

@@ -159,3 +159,21 @@ def test_bars_become_rigid_panels_as_they_stiffen():
         bars = BarRollouts(Subject.from_model(model, harder), [recording])
         apart.append(np.abs(bars.predict(Hypothesis(), [np.zeros(0)])[0][0] - seen).max())
     assert apart[1] < 0.2 * apart[0] and apart[0] < 3 * NOISE
+
+
+def test_laws_remember_the_simulated_motion_where_a_segment_starts():
+    """Dry friction: segments that are tied predict what the whole motion does, from starts and memory alike."""
+    model, parameters = hanging(3)
+    richer = model.with_effects("crease_friction")
+    rubbing = parameters.for_model(richer).set("crease_friction", "friction_moment", 2e-5)
+    forward = RigidRollouts(subject(3), [swung(richer, rubbing)], segment=0.3)
+    friction = next(
+        s
+        for s in suspects(forward.model, forward.recordings, forward.drive)
+        if s.effect == "crease_friction" and s.entities is None
+    )
+    weights = Weights(np.full(len(forward.components), NOISE), gap=1e-3)
+    begin = np.array([1.0, 1.0, 1.0, 2e-5, 0.01])
+    f = fit(forward, Hypothesis((friction,)), weights, theta=begin, fixed=True, most=20)
+    left = np.concatenate(f.residuals)
+    assert len(forward.blocks) == 5 and np.abs(left).max() < 0.15 * NOISE

@@ -459,3 +459,39 @@ def test_the_gpu_follows_the_cpu(cuda, case):
     assert np.abs(one.x - two.x).max() <= 1e-9 * np.ptp(one.x, axis=(0, 1, 2)).max()
     adaptive = [simulate(model, parameters, state=state, duration=0.2, rate=50.0, device=d) for d in ("cpu", cuda)]
     assert np.abs(adaptive[0].x - adaptive[1].x).max() <= 1e-7 * np.ptp(one.x, axis=(0, 1, 2)).max()
+
+
+def test_a_step_hides_no_reversal_from_a_law_with_memory():
+    """Swings with dry friction: what a hinge turns forth and back within a step is no turn to the bristle."""
+
+    def swing(tolerance: float) -> np.ndarray:
+        sheet = hanging((0.03, 0.03, 0.03)).crease(stiffness=2e-4)
+        sheet.set("crease_friction", friction_moment=2e-4, yield_angle=3e-3)
+        model, parameters = sheet.build()
+        batch = RigidBatch(model, parameters, Drive(), folded(model, [0.9, -0.7]), tolerance=tolerance)
+        return batch.film(100, 1, 0.02, np.inf)[1][:, :2, 0]
+
+    exact = swing(1e-13)
+    assert np.ptp(exact, axis=0).min() > 0.5
+    errors = [np.abs(swing(t) - exact).max() for t in (1e-8, 1e-10)]
+    assert errors[0] < 1e-4 and errors[1] < 1e-5
+
+
+def test_a_held_sheet_starts_anew_with_what_its_laws_remember():
+    """A swing that is put back where it just was goes on as if nothing had been done."""
+    sheet = hanging((0.03, 0.03, 0.03)).crease(stiffness=2e-4)
+    sheet.set("crease_friction", friction_moment=2e-4, yield_angle=3e-3)
+    model, parameters = sheet.build()
+    whole, cut = (RigidBatch(model, parameters, Drive(), folded(model, [0.9, -0.7])) for _ in range(2))
+    for batch in (whole, cut):
+        batch.film(20, 1, 0.01, np.inf)
+    arm, state = Articulation(model), cut.state()
+    pose = arm.poses_of(state.x, state.angles)
+    cut.restart(pose.angles, arm.rates_of(pose, state.x, state.v))
+    one, other = (batch.film(30, 1, 0.01, np.inf)[1] for batch in (whole, cut))
+    assert np.ptp(one, axis=0).max() > 0.5
+    assert np.abs(one - other).max() < 1e-6
+    floating = Sheet(strip([0.03, 0.03], 0.03), thickness=2e-3, panels="rigid").crease(stiffness=2e-3)
+    free = RigidBatch(*(made := floating.build()), Drive(), State.at_rest(made[0]))
+    with pytest.raises(InputError, match=r"only a sheet that is held.*restart"):
+        free.restart(np.zeros((1, 1)), np.zeros((1, 1)))
