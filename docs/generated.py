@@ -28,7 +28,7 @@ def on_files(files, config):
         "reference/python.md": python(),
         "reference/settings.md": settings(),
         "reference/sidecar.md": sidecar(),
-        "changes.md": (ROOT / "CHANGELOG.md").read_text(),
+        "changes.md": (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "]("),
         "benchmarks.md": (ROOT / "benchmarks" / "README.md").read_text().replace("](../docs/", "]("),
     }
     for name, text in made.items():
