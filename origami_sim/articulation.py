@@ -158,15 +158,6 @@ class Articulation:
             out[mine] = np.einsum("wab,nb->nwa", turns[panel], x[mine]) + shifts[panel]
         return out
 
-    def pose_of(self, x: np.ndarray, angles: np.ndarray) -> Pose:
-        """The pose of panels that lie nearest to positions x [N, 3] [m] with these fold angles of all creases (C,)."""
-        mine = self._nodes[self.root]
-        middle = x[mine].mean(axis=0)
-        turn = np.eye(3)
-        if self.floating:
-            turn = Rotation.align_vectors(x[mine] - middle, self.model.position[mine] - self._centre)[0].as_matrix()
-        return Pose(turn[None], middle[None], np.asarray(angles, float)[self.creases, None])
-
     def poses_of(self, x: np.ndarray, angles: np.ndarray) -> Pose:
         """The poses of panels at positions x [N, W, 3] [m] of rigid panels, with fold angles of all creases [C, W]."""
         mine = self._nodes[self.root]

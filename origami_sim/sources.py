@@ -11,7 +11,6 @@ import numpy as np
 from origami_sim.drive import Signal, Value, as_signal
 from origami_sim.errors import InputError
 from origami_sim.gridded import FieldTable
-from origami_sim.materials import MU0
 from origami_sim.quantities import converted
 
 KINDS = ("dipole", "coil", "magnet", "table")
@@ -187,8 +186,3 @@ def flattened(sources: Sequence[Any]) -> tuple[Source, ...]:
             allowed = "dipole(...), magnet(...), coil(...), coil_pair(...), field_table(...)"
             raise InputError("is no source of a field", field="sources", value=repr(s)[:60], allowed=allowed)
     return tuple(out)
-
-
-def far_moment(remanence: float, radius: float, length: float) -> float:
-    """Dipole moment of a cylinder [A m^2], for what is far from it."""
-    return remanence * math.pi * radius**2 * length / MU0

@@ -25,7 +25,7 @@ from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.screen import Signature, screen
 from origami_sim.diagnose.search import Posterior, marginals, search
 from origami_sim.diagnose.stored import Stored
-from origami_sim.diagnose.tables import correlations, patch, rms_of, suspected, table, traces
+from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
 from origami_sim.diagnose.verdict import judge
 from origami_sim.diagnose.where import located
 from origami_sim.effects import get
@@ -144,7 +144,7 @@ def diagnose(
         components=list(forward.components),
         units=units_of(recordings[0]),
         noise=noise.tolist(),
-        error_before=rms_of(given).tolist(),
+        error_before=given.rms().tolist(),
         error_refitted=errors[frozenset()].tolist(),
         error_after=after.tolist(),
         notes=noted,

@@ -22,8 +22,7 @@ from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.menu import Trial, menu
 from origami_sim.diagnose.search import Key, Posterior
 from origami_sim.diagnose.verdict import widened
-from origami_sim.fit.hypothesis import Free
-from origami_sim.fit.least_squares import Fit, changed, links, start_steps
+from origami_sim.fit.least_squares import Fit, changed, first_steps, links, start_steps
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -177,7 +176,7 @@ def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Pr
     for h, f in enumerate(leading):
         rows.append(len(each))
         moved = [k for k in range(len(f.free)) if k >= count or h == 0]
-        steps.append(np.array([_step(f.free[k], f.theta[k], forward.nudge) for k in moved]))
+        steps.append(first_steps(forward, f.free, f.theta)[moved])
         for k, step in zip([None, *moved], [0.0, *steps[-1]], strict=True):
             theta = f.theta.copy()
             if k is not None:
@@ -223,9 +222,3 @@ def _line(forward: Predictor, parts: list[np.ndarray], worlds: int, nudges: np.n
         slopes.append(slope)
     still, none = [np.zeros(c.shape[1]) for c in parts], [c[:0].T for c in parts]
     return Linearisation(rows, still, none, slopes, [None] * len(rows))
-
-
-def _step(f: Free, value: float, nudge: float) -> float:
-    """Step of a derivative, inwards at a bound."""
-    step = nudge * f.scale
-    return -step if value + step > f.upper else step

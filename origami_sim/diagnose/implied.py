@@ -63,7 +63,7 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     assert line is not None and f.weights is not None
     if not any(t is not None for t in line.tie):
         return f.weights.gap
-    own = own_columns(f)
+    own = OwnColumns(f)
     effects = [t[:, own.columns] for t in line.tangent]
     none = [np.zeros((r.count, 0)) for r in line.rows]
     laid = own.sets(len(own.columns))
@@ -75,7 +75,7 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     return hyper.gaps[int(np.argmax(log))]
 
 
-class own_columns:
+class OwnColumns:
     """Columns of a fit's tangent: nominal numbers, then its effects', strengths first.
 
     Attributes:

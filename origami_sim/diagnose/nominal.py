@@ -24,8 +24,7 @@ SAME = 0.1
 
 def level(forward: Predictor, f: Fit) -> Weights:
     """White weights as large as what a fit leaves, and no smaller than the noise: to fit numbers with."""
-    rms = np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
-    return Weights(np.maximum(np.nan_to_num(rms), forward.blocks[0].noise), gap=GAP)
+    return Weights(np.maximum(np.nan_to_num(f.rms()), forward.blocks[0].noise), gap=GAP)
 
 
 def nominal_fits(forward: Predictor) -> tuple[Fit, Fit, Weights]:

@@ -88,7 +88,7 @@ def _positions(forward: Predictor, fit: Fit, r: int, mine: list[int]) -> dict[in
     """Node positions [n, N, 3] of each block: what markers on all nodes would have read."""
     recording, count = forward.recordings[r], len(forward.model.position)
     if not forward.curve:
-        forward.path(r)  # type: ignore[attr-defined]  # the recorded motion, which the copy below could not tell any more
+        forward.recorded(r)  # type: ignore[attr-defined]  # the recorded motion, which the copy below could not tell any more
     nowhere = np.zeros((len(recording.times), 3))
     markers = {f"node {i}": Channel(f"node {i}", "marker", nowhere, "m", 1.0, {"node": i}) for i in range(count)}
     other = copy.copy(forward)

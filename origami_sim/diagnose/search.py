@@ -12,10 +12,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from origami_sim.diagnose.implied import own_columns, regapped, with_own_noise
+from origami_sim.diagnose.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.diagnose.nominal import level
 from origami_sim.diagnose.screen import Signature
-from origami_sim.effects import get
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
@@ -24,8 +23,8 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, recast
 
-UNFITTED = 0.1
-"""Posterior of a set that has not been fitted, below which the search ends."""
+UNFITTED = 0.05
+"""Posterior of a set up to which it is not worth a fit: what is sure and what is listed holds ten times as much."""
 
 FAR = 1.5
 """Root mean square over the noise that the best set leaves, above which further sets are fitted whatever is expected.
@@ -35,19 +34,16 @@ So far from what was recorded linear estimates say little, and all is judged by 
 """
 
 FITS = 16
-"""Sets that are fitted at most; twice as many find no more in the opened cases, half as many lose pairs."""
+"""Sets that are fitted at most, before leaders are polished and after."""
 
-RENEWED = 2.0
-"""Log evidence that a set gains, by a fit of a larger one, over its own fit, from which it is fitted again."""
+LEADING = 12
+"""Single effects, those that promise most, that are paired with all others, and fitted where the best set is far off.
 
-SINGLES = 12
-"""Leading single effects that are fitted where the best set is far off, whatever is expected of them."""
+It bounds the time of a search.
+"""
 
-KEPT, POLISHED, OWED = 4, 1e-3, 1.0
-"""Leading fits that are fitted on by their own noise, if they are so probable, and if a step promises them so much."""
-
-PARTNERS = 12
-"""Leading effects of which pairs are formed with all others."""
+OWED = 1.0
+"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
 CELLS = 8
 """Cells of the grid of discrepancies for which pairs are judged: those that hold nearly all of the posterior."""
@@ -59,10 +55,7 @@ SMOOTH = 40
 """Cosines of a channel's discrepancy in one recording, at most: slower than noise, faster than an offset."""
 
 TIGHT = 1e-3
-"""Gaps between segments, as a part of usual rates, that fits allow at least: no recorder tells less from none.
-
-With a third of it the steps of a fit of swings begin to be shortened; three times as much are told in ten seconds.
-"""
+"""Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
 
 Key = frozenset[int]
 
@@ -106,8 +99,8 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
         ranked: single effects by what they promise the model without any.
-        tried: sets that were fitted. promise: log posterior that sets which were not may have.
-        weights: of the signatures. store: whether nodes keep their problems, to be judged anew (`stored`).
+        promise: log posterior that sets which were not fitted may have. weights: of the signatures.
+        store: whether nodes keep their problems, to be judged anew (`stored`).
         renewed: sets that were fitted again, from a fit of a larger one.
     """
 
@@ -119,7 +112,6 @@ class Posterior:
     estimates: dict[Key, Estimate] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
     ranked: list[Key] = field(default_factory=list)
-    tried: set[Key] = field(default_factory=set)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
@@ -164,35 +156,19 @@ def search(
 def extended(
     out: Posterior, forward: Predictor, *, progress: Callable[[float], None] | None = None, most: int = FITS
 ) -> Posterior:
-    """Fits sets until those that have not been fitted hold little of the posterior."""
+    """Fits sets until none that has not been fitted holds much of the posterior."""
     prior = log_priors(out.signatures)
     for n in range(most):
         if progress:
             progress(n / most)
         p = out.probabilities()
         open_sets = [k for k in p if k not in out.nodes and k not in out.failed]
-        if not open_sets:
-            break
         best = max(p, key=lambda k: p[k])
-        far = best in out.nodes and missed(forward, out.nodes[best].fit) > FAR
-        if not far and sum(p[k] for k in open_sets) < UNFITTED:
-            break
-        key = max(open_sets, key=lambda k: p[k])
-        if far:  # judged by what is missing, not by the noise that hides it
-            stands = float(logsumexp(out.log[best]))
-            hopeful = [k for k in open_sets if out.promise[k] > stands]
-            # one effect may do what several were expected to: what is linear far from the data promises too little
-            known = {out.suspect(m).effect for m in best}
-            others = (k for k in out.ranked[:SINGLES] if k in open_sets and k not in out.tried)
-            single = next((k for k in others if not known & {out.suspect(m).effect for m in k}), None)
-            if single is not None and (n % 2 or not hopeful):
-                key = single
-            elif hopeful:
-                key = max(hopeful, key=lambda k: out.promise[k])
-            else:
-                break
-        out.tried.add(key)
-        if not far and p[key] < UNFITTED / 5 and best in out.nodes:
+        if best in out.nodes and missed(forward, out.nodes[best].fit) > FAR:
+            key = _hopeful(out, best, open_sets, alone=n % 2 == 1)
+        else:
+            key = max((k for k in open_sets if p[k] >= UNFITTED), key=lambda k: p[k], default=None)
+        if key is None:
             break
         fitted = _fitted(out, forward, key)
         if fitted.failed:
@@ -203,16 +179,31 @@ def extended(
     return out
 
 
+def _hopeful(out: Posterior, best: Key, open_sets: Sequence[Key], *, alone: bool) -> Key | None:
+    """The set to fit where the best one is far off: by what is missing there, not by the noise that would hide it.
+
+    Args:
+        alone: prefer a single effect. It may do what several were expected to: what is linear promises too little.
+    """
+    known = {out.suspect(n).effect for n in best}
+    singles = (k for k in out.ranked[:LEADING] if k in open_sets)
+    single = next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
+    stands = float(logsumexp(out.log[best]))
+    hopeful = [k for k in open_sets if out.promise[k] > stands]
+    if single is not None and (alone or not hopeful):
+        return single
+    return max(hopeful, key=lambda k: out.promise[k], default=None)
+
+
 def missed(forward: Predictor, f: Fit) -> float:
     """Root mean square of what a fit leaves, over the noise; of the channel of which it leaves most."""
-    left = np.concatenate([r / forward.blocks[b].noise for r, b in zip(f.residuals, f.blocks, strict=True)])
-    return float(np.sqrt(np.nanmax(np.nanmean(left**2, axis=0))))
+    return float(np.nanmax(f.rms() / forward.blocks[0].noise))
 
 
 def polished(out: Posterior, forward: Predictor) -> None:
     """Fits the leaders on, by their own noise."""
     prior, chance = log_priors(out.signatures), out.probabilities()
-    for key in sorted((k for k in out.nodes if chance[k] > POLISHED), key=lambda k: -chance[k])[:KEPT]:
+    for key in [k for k in out.nodes if chance[k] >= UNFITTED]:
         f = out.nodes[key].fit
         f = f.reweighted(tight(f))
         if f.cost - promised(forward, f) < OWED:
@@ -277,7 +268,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     if not key:
         out.ranked = [frozenset((node.others[n],)) for n in ranked]
     pairs = []
-    for a, one in enumerate(ranked[:PARTNERS]):
+    for a, one in enumerate(ranked[:LEADING]):
         first = frozenset((node.others[one - len(own)],))
         if len(own) + 2 > hyper.most:
             break
@@ -333,7 +324,7 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
             values.update(zip(mine, value, strict=True))
     for n, key in enumerate(keys):
         if key in out.nodes and key and key < node.key and key not in out.renewed:
-            if logsumexp(found[n]) > logsumexp(out.log[key]) + RENEWED:  # its own fit ended early: it goes on from here
+            if logsumexp(found[n]) > logsumexp(out.log[key]) + OWED:  # its own fit ended early: it goes on from here
                 out.renewed.add(key)
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
@@ -365,7 +356,7 @@ def _same_place(a: Suspect, b: Suspect) -> bool:
 
 def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
     hyper, f = out.hyper, with_own_noise(forward, f, out.hyper)
-    line, own = f.linear, own_columns(f)
+    line, own = f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
     # order: the fit's own columns by suspect, then one column for each other suspect
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
@@ -478,13 +469,4 @@ def marginals(p: Posterior) -> dict[str, float]:
     for key, value in p.probabilities().items():
         for label in {p.suspect(n).label for n in key}:
             out[label] = out.get(label, 0.0) + value
-    return dict(sorted(out.items(), key=lambda item: -item[1]))
-
-
-def by_effect(p: Posterior) -> dict[str, float]:
-    """Posterior of each effect at any site."""
-    out: dict[str, float] = {}
-    for key, value in p.probabilities().items():
-        for effect in {get(p.suspect(n).effect).name for n in key}:
-            out[effect] = out.get(effect, 0.0) + value
     return dict(sorted(out.items(), key=lambda item: -item[1]))

@@ -20,17 +20,7 @@ import numpy as np
 from origami_sim.diagnose.budget import Share, budget
 from origami_sim.diagnose.screen import Signature
 from origami_sim.diagnose.search import Key, Node, Posterior, log_priors, place
-from origami_sim.diagnose.verdict import (
-    COMPARED,
-    MOSTLY,
-    _class,
-    _nothing_named,
-    _of_recorder,
-    best_of,
-    by_effects,
-    credible,
-    surely,
-)
+from origami_sim.diagnose.verdict import COMPARED, best_of, decide, unnamed_verdict
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed
 from origami_sim.fit.hyper import HYPER, Hyper
@@ -106,7 +96,7 @@ class Stored:
         for key, node in p.nodes.items():
             members = [place_of[id(s)] for s in node.fit.hypothesis.suspects]
             nodes[key] = members, node.groups, node.others, {g: Reduced.of(q) for g, q in node.problems.items()}
-        quiet = _nothing_named(forward, given, base, p, [], 0.0, 0.0, 1.0, 1.0).verdict
+        quiet = unnamed_verdict(forward, given, base, 1.0)[0]
         return cls(
             [(s.suspect, s.side, s.status or ("" if s.parts else "none")) for s in p.signatures],
             p.hyper.gaps,
@@ -158,34 +148,20 @@ class Stored:
 
     def decided(self, p: Posterior) -> dict[str, Any]:
         """Verdict, labels that are chosen and probability, as `verdict.judge` has them before it writes sentences."""
-        chance = p.probabilities()
-        classes = by_effects(p, chance)
-        lead, beside = surely(classes)
-        top = max(classes, key=lambda c: classes[c])
-        best = best_of(p, chance, lead or top)
-        shares = self.shares[best]
-        rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
-        discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
-
-        def said(verdict: str, chosen: list[str], probability: float | None) -> dict[str, Any]:
-            return {"verdict": verdict, "chosen": chosen, "probability": probability}
-
-        if all(status for *_, status in self.suspects):
-            return said("UNTESTABLE", [], 1.0)
-        if not top:
-            if self.quiet == "UNKNOWN" or (discrepancy > MOSTLY and rest > MOSTLY):
-                return said("UNKNOWN", [], None)
-            return said("UNTESTABLE" if self.compared < COMPARED else self.quiet, [], classes[lead])
-        named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
-        if rest > MOSTLY and discrepancy > MOSTLY and rest > named:
-            return said("UNKNOWN", [p.label(best)], None)
-        set_, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
-        sure = sum(v for c, v in classes.items() if c >= lead)
-        if not lead or beside:
-            names = [p.label(best_of(p, chance, c)) for c in set_ if c] + (["nominal"] if frozenset() in set_ else [])
-            return said("MEASUREMENT" if all(map(_of_recorder, set_)) else "TIE", names, total)
-        word = "MEASUREMENT" if _of_recorder(_class(p, best)) else "SEVERAL" if len(best) > 1 else "MECHANISM"
-        return said(word, [p.suspect(n).label for n in best], sure)
+        d = decide(p, self.shares.__getitem__)
+        word, probability, chosen = d.word, None if np.isnan(d.probability) else d.probability, []
+        if not d.lead and word != "UNTESTABLE":
+            word = "UNKNOWN" if word == "UNKNOWN" or self.quiet == "UNKNOWN" else self.quiet
+            word = "UNTESTABLE" if word != "UNKNOWN" and self.compared < COMPARED else word
+            probability = None if word == "UNKNOWN" else probability
+        elif word == "UNKNOWN":
+            chosen = [p.label(d.best)]
+        elif d.tie:
+            chance = p.probabilities()
+            chosen = [p.label(best_of(p, chance, c)) if c else "nominal" for c in d.credible]
+        elif word != "UNTESTABLE":
+            chosen = [p.suspect(n).label for n in d.best]
+        return {"verdict": word, "chosen": chosen, "probability": probability}
 
     def save(self, path: str | Path) -> Path:
         """Writes a compressed file of arrays; nothing in it is pickled."""

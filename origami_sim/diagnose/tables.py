@@ -99,11 +99,7 @@ def fit_percent(forward: Predictor, f: Fit) -> np.ndarray:
     """(D,) 100 (1 - NRMSE) [%] over all fitted blocks."""
     values = np.concatenate([forward.blocks[b].values for b in f.blocks])
     spread = np.nanstd(values, axis=0)
-    return 100.0 * (1.0 - rms_of(f) / np.where(spread > 0, spread, np.nan))
-
-
-def rms_of(f: Fit) -> np.ndarray:
-    return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
+    return 100.0 * (1.0 - f.rms() / np.where(spread > 0, spread, np.nan))
 
 
 def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, noise: np.ndarray) -> list[Trace]:

@@ -1,14 +1,15 @@
 """The verdict: sums over the posterior, put into words."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from origami_sim.diagnose.budget import Share, budget
+from origami_sim.diagnose.implied import OwnColumns
 from origami_sim.diagnose.search import Key, Node, Posterior
-from origami_sim.diagnose.words import distinct, joined, kind, pooled, said, say, title
+from origami_sim.diagnose.words import distinct, joined, pooled, said, say, title
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -55,89 +56,136 @@ class Judgement:
     notes: list[str] = field(default_factory=list)
 
 
-def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
+@dataclass(frozen=True)
+class Decision:
+    """What a posterior says, before it is put into words.
+
+    Attributes:
+        word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
+        credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
+            named, or of them.
+    """
+
+    word: str
+    best: Key
+    lead: frozenset[str]
+    credible: list[frozenset[str]]
+    tie: bool
+    probability: float
+
+
+def decide(p: Posterior, shares: Callable[[Key], Sequence[Share]]) -> Decision:
     """The verdict on a posterior over sets of effects.
 
     Args:
-        given, base: the model as given, and refitted. compared: share of the frames that were compared.
+        shares: the budget of a fitted set.
     """
     chance = p.probabilities()
     classes = by_effects(p, chance)
     lead, beside = surely(classes)
     top = max(classes, key=lambda c: classes[c])
     best = best_of(p, chance, lead or top)
-    shown = widened(p, best)
-    shares = budget(forward, given, base, p.nodes[best].fit)
-    rest = next((s.share for s in shares if s.kind == "rest"), 0.0)
-    set_, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
-    tied = [widened(p, k) for c in set_ if (k := best_of(p, chance, c)) in p.nodes]
-    others = [
-        widened(p, k) for k in sorted(p.nodes, key=lambda k: -chance.get(k, 0.0)) if _class(p, k) != (lead or top)
-    ]
-    common = {"best": shown, "tied": tied, "others": others, "budget": shares}
-    tested = [s for s in p.signatures if not s.status]
-    if not tested and not p.signatures:
-        return Judgement("UNTESTABLE", "There is no suspect that could act here.", 1.0, [], **common)
-    if not tested:
-        text = "None of the catalogue's suspects is excited by these recordings."
-        return Judgement("UNTESTABLE", text, 1.0, [], **common)
-    discrepancy = float(np.sum(p.cells(best)[~p.hyper.clean]))
+    may_be, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
+
+    def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
+        return Decision(word, best, lead or top, may_be, tie, probability)
+
+    if all(s.status for s in p.signatures):
+        return as_("UNTESTABLE", 1.0)
+    budgeted = shares(best)
+    rest = sum(s.share for s in budgeted if s.kind == "rest")
+    named = sum(s.share for s in budgeted if s.kind in ("effect", "measurement"))
+    if rest > MOSTLY and rest > named and np.sum(p.cells(best)[~p.hyper.clean]) > MOSTLY:
+        return as_("UNKNOWN", np.nan)
     if not top:
-        found = _nothing_named(forward, given, base, p, shares, rest, discrepancy, classes[lead], compared)
-        return replace(found, **{k: v for k, v in common.items() if k != "best"}, best=shown)
-    named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
-    explained = _explained(shares)
-    if rest > MOSTLY and discrepancy > MOSTLY and rest > named:
-        text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
-        return Judgement("UNKNOWN", text, np.nan, [shown.hypothesis.label], **common)
-    sure = sum(v for c, v in classes.items() if c >= lead)
+        return as_("", classes[top])
     if not lead or beside:
-        names = distinct([f for f in tied if f.hypothesis.suspects]) + (["nothing"] if frozenset() in set_ else [])
-        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in set_[:4]]
-        more = f" and {len(set_) - 4} more" if len(set_) > 4 else ""
-        text = (
-            f"These recordings do not decide between {joined(each)}{more}. The best is {say(shown)}, which {explained}."
-        )
-        word = "MEASUREMENT" if all(map(_of_recorder, set_)) else "TIE"
-        return Judgement(word, text, total, names, **common)
+        return as_("MEASUREMENT" if all(map(_of_recorder, may_be)) else "TIE", total, tie=True)
+    word = "MEASUREMENT" if _of_recorder(class_of(p, best)) else "SEVERAL" if len(best) > 1 else "MECHANISM"
+    return as_(word, sum(v for c, v in classes.items() if c >= lead))
+
+
+def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
+    """The verdict in words.
+
+    Args:
+        given, base: the model as given, and refitted. compared: share of the frames that were compared.
+    """
+    shares: dict[Key, list[Share]] = {}
+
+    def budgeted(key: Key) -> list[Share]:
+        return shares.setdefault(key, budget(forward, given, base, p.nodes[key].fit))
+
+    d = decide(p, budgeted)
+    chance = p.probabilities()
+    classes = by_effects(p, chance)
+    shown, explained = widened(p, d.best), _explained(budgeted(d.best))
+    tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
+    ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
+    others = [widened(p, k) for k in ranked if class_of(p, k) != d.lead]
+    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best)}
     suspects = shown.hypothesis.suspects
-    where = _elsewhere(p, chance, lead, best)
     chosen = [s.label for s in suspects]
-    if kind(shown) == "measurement":
-        text = f"The measurement, not the device, explains the mismatch: {say(shown)}, p = {sure:.2f}; it {explained}."
-        return Judgement("MEASUREMENT", text, sure, chosen, **common)
-    verb = "they" if len(suspects) > 1 else "it"
+    if d.word == "UNTESTABLE":
+        text = "None of the catalogue's suspects is excited by these recordings."
+        text = text if p.signatures else "There is no suspect that could act here."
+        return Judgement(d.word, text, d.probability, [], **common)
+    if not d.lead:
+        word, text, chosen = unnamed_verdict(forward, given, base, compared, unknown=d.word == "UNKNOWN")
+        return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
+    if d.word == "UNKNOWN":
+        text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
+        return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
+    if d.tie:
+        names = distinct([f for f in tied if f.hypothesis.suspects]) + (
+            ["nothing"] if frozenset() in d.credible else []
+        )
+        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4]]
+        more = f" and {len(d.credible) - 4} more" if len(d.credible) > 4 else ""
+        text = f"These recordings do not decide between {joined(each)}{more}. "
+        return Judgement(d.word, f"{text}The best is {say(shown)}, which {explained}.", d.probability, names, **common)
     explained = explained if len(suspects) < 2 else explained.replace("explains", "explain", 1)
-    text = f"Found: {say(shown)}{where}, p = {sure:.2f}; {verb} {explained}."
-    more = 1.0 - classes.get(lead, 0.0) / sure
+    verb = "they" if len(suspects) > 1 else "it"
+    if d.word == "MEASUREMENT":
+        text = f"The measurement, not the device, explains the mismatch: {say(shown)}"
+    else:
+        text = f"Found: {say(shown)}{_elsewhere(p, chance, d.lead, d.best)}"
+    text += f", p = {d.probability:.2f}; {verb} {explained}."
+    more = 1.0 - classes.get(d.lead, 0.0) / d.probability
     if more > ALONE:
         text += f" Something small acts besides (p = {more:.2f}); these recordings do not tell what it is."
-    return Judgement("SEVERAL" if len(suspects) > 1 else "MECHANISM", text, sure, chosen, **common)
+    return Judgement(d.word, text, d.probability, chosen, **common)
 
 
-def _nothing_named(forward, given, base, p, shares, rest, discrepancy, chance, compared) -> Judgement:
-    """Where no effect is more probable than none: adequate, a number, or real and not in the catalogue."""
-    over = pooled(_rms(base) / forward.blocks[0].noise)
-    if over > FAR or (discrepancy > MOSTLY and rest > MOSTLY):
+def unnamed_verdict(
+    forward: Predictor, given: Fit, base: Fit, compared: float, *, unknown: bool = False
+) -> tuple[str, str, list[str]]:
+    """Word, sentence and numbers where no effect is more probable than none: adequate, a number, or real and not named.
+
+    Args:
+        unknown: whether a discrepancy is real that the refitted model leaves.
+    """
+    over = pooled(base.rms() / forward.blocks[0].noise)
+    if over > FAR or unknown:
         text = f"The refitted model misses the recordings by {over:.2f} times the noise, and nothing in the catalogue "
-        return Judgement("UNKNOWN", f"{text}explains it.", np.nan, [], base)
+        return "UNKNOWN", f"{text}explains it.", []
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
-        return Judgement("UNTESTABLE", text, chance, [], base)
+        return "UNTESTABLE", text, []
     off = [m for m, v in zip(base.free, base.theta, strict=True) if abs(v - m.start) > m.spread]
     if odds_of_numbers(given, base) <= 0.0 or not off:
         text = f"The model is adequate: within what is known of its numbers, its error is {over:.2f} times the noise."
-        return Judgement("ADEQUATE", text, chance, [], base)
+        return "ADEQUATE", text, []
     far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
     f, t = far[0]
     beyond = [m for m, v in far if abs(v - m.start) > m.spread]
-    aligned = all(m.aligned for m in [f, *beyond])
-    recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in [f, *beyond])
+    aligned = all(m.aligned for m in beyond)
+    recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in beyond)
     strain = abs(t - f.start) / f.spread
     text = "Aligning the recording" if aligned else "Refitting the numbers of the model"
     text += f" is enough: {f.label} goes from {said(f.start, f.unit)} to {said(t, f.unit)}, {strain:.1f} standard "
     text += f"deviations of what was known; the error is then {over:.2f} times the noise."
-    return Judgement("MEASUREMENT" if recorder else "PARAMETER", text, chance, [m.label for m in beyond], base)
+    return "MEASUREMENT" if recorder else "PARAMETER", text, [m.label for m in beyond]
 
 
 def odds_of_numbers(given: Fit, base: Fit) -> float:
@@ -156,12 +204,12 @@ def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], f
     """Posterior of each set of effects, wherever they act."""
     out: dict[frozenset[str], float] = {}
     for key, value in chance.items():
-        c = _class(p, key)
+        c = class_of(p, key)
         out[c] = out.get(c, 0.0) + value
     return out
 
 
-def _class(p: Posterior, key: Key) -> frozenset[str]:
+def class_of(p: Posterior, key: Key) -> frozenset[str]:
     return frozenset(p.suspect(n).effect for n in key)
 
 
@@ -191,7 +239,7 @@ def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> 
     """The most probable fitted set of these effects; or else of these and others, or else of any."""
     if not effects:
         return frozenset()
-    classes = {k: _class(p, k) for k in p.nodes}
+    classes = {k: class_of(p, k) for k in p.nodes}
     mine = [k for k, c in classes.items() if c == effects]
     mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
     return max(mine, key=lambda k: chance.get(k, 0.0))
@@ -225,28 +273,18 @@ def widened(p: Posterior, key: Key) -> Fit:
 
 def deviations(node: Node, p: Posterior) -> np.ndarray:
     """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI]."""
-    f = node.fit
     cell = node.grid[int(np.argmax(node.evidence + p.hyper.log_cells))]
     assert cell is not None
-    gram = cell.gram
-    mine = node.groups[: len(f.hypothesis.suspects)]
-    columns = [c for g in mine for c in g.columns]
-    spread = np.concatenate([g.spread for g in mine])
-    strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in mine])
-    a = gram[np.ix_(columns, columns)]
-    tight = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread)
-    cover = np.linalg.pinv(a + np.diag(tight**2), rcond=1e-14)
-    sd = np.sqrt(np.maximum(np.diag(cover), 0.0))
-    out, place, column = [], 0, 0
-    for s, g in zip(f.hypothesis.suspects, mine, strict=True):
-        inner = list(s.free)
-        strong = [k for k, n in enumerate(inner) if n in s.strengths]
-        order = [*strong, *(k for k in range(len(inner)) if k not in strong)]
-        own = np.zeros(len(inner))
-        own[order] = sd[column : column + len(inner)] * np.array([inner[k].scale for k in order])
-        out.append(own)
-        place, column = place + len(inner), column + len(g.columns)
-    return np.concatenate(out)
+    own = OwnColumns(node.fit)
+    count, first = len(own.columns), len(own.nominal)
+    spread = np.concatenate([g.spread for g in own.groups])
+    strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in own.groups])
+    known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread)
+    cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known**2), rcond=1e-14)
+    out = np.zeros(count)
+    scale = np.array([node.fit.free[c].scale for c in own.columns])
+    out[np.array(own.columns) - first] = scale * np.sqrt(np.maximum(np.diag(cover), 0.0))
+    return out
 
 
 def _explained(shares: Sequence[Share]) -> str:
@@ -264,10 +302,10 @@ def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], bes
     labels = {p.suspect(n).label for n in best}
     others: dict[str, float] = {}
     for key, value in chance.items():
-        if _class(p, key) == lead and {p.suspect(n).label for n in key} != labels:
+        if class_of(p, key) == lead and {p.suspect(n).label for n in key} != labels:
             name = p.label(key)
             others[name] = others.get(name, 0.0) + value
-    total = sum(v for k, v in chance.items() if _class(p, k) == lead)
+    total = sum(v for k, v in chance.items() if class_of(p, k) == lead)
     likely = [n for n, v in others.items() if v > (1.0 - CREDIBLE) * total]
     return f" (or {joined(sorted(likely)[:3])})" if likely else ""
 
@@ -278,10 +316,6 @@ def _name(effects: frozenset[str]) -> str:
 
 def _of_recorder(effects: frozenset[str]) -> bool:
     return bool(effects) and all(get(e).family == "measurement" for e in effects)
-
-
-def _rms(f: Fit) -> np.ndarray:
-    return np.sqrt(np.nanmean(np.concatenate(f.residuals) ** 2, axis=0))
 
 
 def log_odds(p: Posterior, key: Key) -> float:

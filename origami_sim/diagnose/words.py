@@ -25,14 +25,6 @@ def pooled(errors: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(np.square(errors))))
 
 
-def effects_of(f: Fit) -> tuple[str, ...]:
-    return tuple(sorted(s.effect for s in f.hypothesis.suspects))
-
-
-def labels_of(f: Fit) -> set[str]:
-    return {s.label for s in f.hypothesis.suspects}
-
-
 def distinct(fits: Sequence[Fit]) -> list[str]:
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 

@@ -80,7 +80,8 @@ def digest(forward: Worlds, each: Sequence[Hypothesis], theta, local, wanted: Se
     h.update(model.hash.encode() + parameters.hash.encode())
     for values in theta:
         h.update(np.asarray(values, float).tobytes() + b"|")
-    h.update(b"-" if local is None else np.ascontiguousarray(np.asarray(local)[:, wanted]).tobytes())
+    if local is not None:  # what is remembered at a start depends on the first world's starts before it
+        h.update(np.ascontiguousarray(np.asarray(local)[:, wanted]).tobytes() + np.asarray(local)[0].tobytes())
     for b in wanted:
         block = forward.blocks[b]
         h.update(repr((block.recording, block.first, block.lasting)).encode())

@@ -60,7 +60,6 @@ class Fit:
         at_bound: (P,) whether a number lies on a bound.
         failed: why the fit could not be made, or "".
         wider: (P,) by how much effects that are too small to be told widen what is known of theta; None: not asked.
-        promise: of a rough fit that did not settle, the cost that a further step promised; else infinite.
         exact: whether all derivatives are those of the place where the fit ended.
         weights: what residuals were measured by.
     """
@@ -78,7 +77,6 @@ class Fit:
     failed: str = ""
     linear: "Linearisation | None" = None
     wider: np.ndarray | None = None
-    promise: float = np.inf
     exact: bool = False
     weights: "Weights | None" = None
 
@@ -86,10 +84,9 @@ class Fit:
     def cost(self) -> float:
         return self.misfit + self.penalty
 
-    @property
-    def reach(self) -> float:
-        """The cost that it has, or that a further step promises."""
-        return min(self.cost, self.promise)
+    def rms(self) -> np.ndarray:
+        """(D,) root mean square of the residuals [SI]; nan where nothing was seen."""
+        return np.sqrt(np.nanmean(np.concatenate(self.residuals) ** 2, axis=0))
 
     def deviations(self) -> np.ndarray:
         """(P,) standard deviations of theta."""
@@ -125,7 +122,7 @@ def linearise(
     known: Linearisation | None = None,
     kept: int = 0,
     residual: list[np.ndarray] | None = None,
-    near: Linearisation | None = None,
+    steps: np.ndarray | None = None,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
@@ -133,13 +130,13 @@ def linearise(
         fixed: leave theta out (only the starts are to be fitted).
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
         residual: whitened residuals at this point, if they are known.
-        near: a linearisation at a near point, for the steps that were small enough there.
+        steps: (k,) those of the first numbers that were small enough at a near point [SI].
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
     size = 0 if known is not None else forward.local
     fresh = count - kept
-    steps = first_steps(forward, free, theta, near if near is not None else known)[:count]
+    steps = first_steps(forward, free, theta, steps)[:count]
     nudges = start_steps(forward)
     if residual is None:
         residual = residuals(forward, hypothesis, theta, local, blocks, weights)
@@ -245,12 +242,13 @@ def start_steps(forward: Predictor) -> np.ndarray:
     return np.concatenate([np.full(m, shift), np.full(m, rate)]) if forward.local else np.zeros(0)
 
 
-def first_steps(forward: Predictor, free: Sequence[Free], theta: np.ndarray, near: Linearisation | None) -> np.ndarray:
-    """(P,) steps of derivatives: what is noticeable, or as small as they had to be nearby; inwards at a bound."""
+def first_steps(
+    forward: Predictor, free: Sequence[Free], theta: np.ndarray, near: np.ndarray | None = None
+) -> np.ndarray:
+    """(P,) steps of derivatives: what is noticeable, or for the first numbers those `near`; inwards at a bound."""
     steps = np.array([forward.nudge * f.scale for f in free])
-    if near is not None and near.steps is not None:
-        known = min(len(near.steps), len(steps))
-        steps[:known] = np.abs(near.steps[:known])
+    if near is not None:
+        steps[: len(near)] = np.abs(near)
     upper = np.array([f.upper for f in free])
     return np.where(theta + steps > upper, -steps, steps)
 
@@ -270,7 +268,6 @@ def fit(
     kept: int = 0,
     begin: Linearisation | None = None,
     exact: bool = False,
-    rough: bool = False,
 ) -> Fit:
     """Fits nominals, the hypothesis' numbers and the starts of the blocks.
 
@@ -283,7 +280,6 @@ def fit(
         blocks: fit these only. fixed: keep theta and fit the starts only.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
         begin: residuals and all derivatives of the point where the fit begins; `exact` if none is of a point before.
-        rough: keep the derivatives that are known; only those by the hypothesis' own numbers are renewed.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
     free = (*forward.subject.nominals, *hypothesis.free)
@@ -292,10 +288,11 @@ def fit(
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = 0 if fixed else len(free)
 
-    line = begin
+    line: Linearisation | None = begin
 
     def derived(theta, local, near: Linearisation | None, residual) -> Linearisation:
-        also = {"known": near, "kept": kept if near else 0, "residual": residual, "near": line or known}
+        steps = line.steps if line else known.steps[:kept] if known and known.steps is not None else None
+        also = {"known": near, "kept": kept if near else 0, "residual": residual, "steps": steps}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
     def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
@@ -307,7 +304,7 @@ def fit(
     def too_slow(theta, least: float) -> bool:
         return bool(width) and forward.step(hypothesis, theta) < least
 
-    line = begin or derived(theta, local, known, residuals(forward, hypothesis, theta, local, blocks, weights))
+    line = line or derived(theta, local, known, None)
     own = 0 < kept < width
     level = (ALL if exact else STALE) if begin else ALL if known is None else OWN if own else STALE
     best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
@@ -317,7 +314,6 @@ def fit(
     slowest = min(step, forward.step(Hypothesis(), theta[: len(forward.subject.nominals)]) / UTMOST)
     slow = max(step / SLOWEST, slowest)
     floor = sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
-    finest, hoped, settled = (OWN if rough else ALL), np.inf, False
     for n in range(most):
         assert theta is not None and local is not None
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
@@ -326,7 +322,6 @@ def fit(
         enough = max(LITTLE, done * (best - floor))
         whole, gain, found = best - hoped, 0.0, None
         if whole < enough and (level > STALE or not width):
-            settled = level == ALL or doubts <= 1  # then these derivatives are as good as new
             break
         trying = STEPS if level == ALL or not n else CHORD
         straight = 0.0
@@ -353,7 +348,7 @@ def fit(
             if best - there[0] > owed:
                 break
         faithful, stuck = straight > FAITHFUL * whole, gain < enough
-        if stuck and level == finest:
+        if stuck and level == ALL:
             break
         if found is not None:
             best, gaps, theta, local = found
@@ -361,21 +356,21 @@ def fit(
         level = STALE
         if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
-            level = OWN if own and doubts == 1 else finest
+            level = OWN if own and doubts == 1 else ALL
             line = derived(theta, local, line if level == OWN else None, line.residual)
     if width and level == STALE:  # the intervals are those of the place where the fit ended
         line = derived(theta, local, line, line.residual)
     if not all(np.all(np.isfinite(t)) for t in line.tangent):
         return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite where the fit ends")
     out = _finished(forward, hypothesis, free, theta, local, blocks, weights, line)
-    return replace(out, exact=level == ALL, promise=np.inf if settled or not rough else hoped)
+    return replace(out, exact=level == ALL)
 
 
-def carried_on(forward, f: Fit, *, fixed: bool = False, most: int = 8) -> Fit:
+def carried_on(forward, f: Fit, *, most: int = 8) -> Fit:
     """A fit carried on from where it ended, with the derivatives and weights that it has."""
     assert f.weights is not None
     given = {"theta": f.theta, "local": f.local, "blocks": f.blocks, "begin": f.linear, "exact": f.exact}
-    return fit(forward, f.hypothesis, f.weights, **given, fixed=fixed, most=most)
+    return fit(forward, f.hypothesis, f.weights, **given, most=most)
 
 
 def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:

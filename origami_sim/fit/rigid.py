@@ -10,7 +10,7 @@ from origami_sim.articulation import Pose
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
-from origami_sim.fit.rollouts import Path, Rollouts, Shots, film, joined_poses
+from origami_sim.fit.rollouts import Motion, Rollouts, Shots, film, joined_poses
 from origami_sim.fit.worlds import World
 from origami_sim.model import Parameters, State
 from origami_sim.recording import Recording
@@ -104,27 +104,28 @@ class RigidRollouts(Rollouts):
             ends[:, lost] = np.nan
         return out, ends
 
-    def _moved(self, r: int, world: World, local: np.ndarray | None) -> Path | None:
-        """See `Rollouts._moved`: of tied segments the motion of the world itself, one segment after the other."""
+    def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
+        """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other."""
         numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
         blocks = [self.blocks[n] for n in numbers]
         if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
-            return super()._moved(r, world, local)
-        model, parameters = world
-        recording, count = self.recordings[r], len(blocks)
-        step = float(np.median(np.diff(recording.times)))
-        starts = np.zeros((1, count, self.local)) if local is None else local[None, numbers]
-        shots = Shots(r, blocks, [world], np.zeros((1, count)), starts, None, step, len(recording.times), 0)
-        state = self._state(shots)
-        every = self._driven(replace(shots, blocks=blocks[:1]), model, parameters)
-        first = State.at_rest(model, position=state.x[:, 0])
-        batch = self._batch(model, parameters, every, first, tolerance=TOLERANCE)
+            return super()._motion(r, world, local)
+        (model, parameters), m = world, self.articulation.size
+        step = float(np.median(np.diff(self.recordings[r].times)))
+        shifts = np.zeros((len(blocks), 2 * m)) if local is None else local[numbers]
+        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)], axis=1)
+        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)], axis=1)
+        x = np.moveaxis(self._placed(angles[:, :1]), 0, 1)
+        begin = State.at_rest(model, position=x)
+        begin.memory[:] = self._rested(r, [world], 0, x).remembered()
+        shots = Shots(r, blocks[:1], [world], np.zeros((1, 1)), None, None, step, len(self.recordings[r].times), 0)
+        drive = self._driven(shots, model, parameters)
+        batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        angles = np.stack([b.pose.angles[:, 0] for b in blocks], axis=1) + starts[0, :, : self.local // 2].T
-        rates = np.stack([b.rates for b in blocks], axis=1) + starts[0, :, self.local // 2 :].T
-        films = [angles[:, :1]]
+        films, memory = [angles[:, :1]], {}
         for n, block in enumerate(blocks):
+            memory[block.first] = batch.remembered()[:, 0]
             batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
             after = block.lasting if block.reach is not None else block.times[-1]
             frames = round(after / step)
@@ -132,7 +133,9 @@ class RigidRollouts(Rollouts):
                 filmed = batch.film(frames, 1, after / frames, np.inf)[1]
                 films.append(filmed[:, self.articulation.creases, 0].T)
         q = np.concatenate(films, axis=1)
-        return self._placed(recording, q) if np.all(np.isfinite(q)) else super()._moved(r, world, local)
+        if not np.all(np.isfinite(q)):  # a world that goes unstable
+            return super()._motion(r, world, local)
+        return Motion(self._placed(q), memory)
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""

@@ -2,10 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from origami_sim.articulation import Articulation, Pose
@@ -35,10 +34,6 @@ from origami_sim.solve.rigid import batch_of
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
-
-TURN, PARTS = 1e-4, 8
-"""How far a way of straight steps may cut a turning point [rad], a hundredth of the angle in which friction yields; and
-steps between two frames at most. Without steps between frames of 10 ms, that angle came out a tenth too small."""
 
 FASTEST = 3.0
 """Frames below which a time constant is not told from none."""
@@ -76,15 +71,15 @@ class Shots:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
-    """A way that nodes take: positions [(F - 1) count + 1, N, 3] [m], `count` steps between two of F frames."""
+class Motion:
+    """What laws remember where segments start.
+
+    Attributes:
+        positions: [F, N, 3] of all frames [m]. memory: (M,) of the world that moved so, by first frame, where known.
+    """
 
     positions: np.ndarray
-    count: int
-
-    def between(self, first: int, last: int) -> np.ndarray:
-        """Positions [n, N, 1, 3] from one frame to another."""
-        return self.positions[first * self.count : last * self.count + 1, :, None]
+    memory: dict[int, np.ndarray] = field(default_factory=dict)
 
 
 class Rollouts(Worlds, ABC):
@@ -104,7 +99,7 @@ class Rollouts(Worlds, ABC):
         super().__init__(subject, recordings, threads)
         self.start = start
         self.drives = [drive_of(r, self.drive) for r in self.recordings]
-        self._paths: dict[int, Path | None] = {}
+        self._recorded: dict[int, Motion | None] = {}
         self._usual: dict[int, np.ndarray] = {}
         self.local = 2 * self.articulation.size if start == "fit" else 0
 
@@ -293,76 +288,74 @@ class Rollouts(Worlds, ABC):
     ) -> dict[int, np.ndarray] | None:
         """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
 
-        It is that of the first world's motion up to there (`_moved`), of which starts are shifted by local [B, L]. All
-        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest.
+        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
+        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
+        carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
         """
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
         every = np.union1d(every, [b.first for b in wanted])
         if not len(State.at_rest(model).memory) or not np.any(every):
             return None
-        path = self._moved(r, worlds[0], local)
-        if path is None:
+        motion = self._motion(r, worlds[0], local)
+        if motion is None:
             return None
         some, of = distinct_memories(worlds)
-        worlds = [worlds[k] for k in some]
-        parameters = Parameters.join([p for _, p in worlds])
-        times = self.recordings[r].times - self.recordings[r].times[0]
-        step = float(np.median(np.diff(times)))
-        held = replace(model, free=np.zeros_like(model.free))
-
-        def rested(frame: int) -> Batch:
-            """The worlds held as they were at a frame, where they have rested, driven as from there on."""
-            span = float(times[-1] - times[frame]) + step
-            drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
-            x = path.between(frame, frame)
-            state = State.at_rest(held, len(worlds), position=np.repeat(x[0], len(worlds), axis=1))
-            batch = self._batch(held, parameters, drive.held(0.0), state)
-            batch.carry(x[[0, 0]], LEAD * step)
-            return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()))
-
+        worlds, path = [worlds[k] for k in some], motion.positions[:, :, None]
+        step = float(np.median(np.diff(self.recordings[r].times)))
         out: dict[int, np.ndarray] = {}
         last, batch = -LEAD - 1, None
         for first in map(int, every[every <= max(b.first for b in wanted)]):
             if batch is None or first - last > LEAD:
                 last = max(first - LEAD, 0)
-                batch = rested(last)
+                batch = self._rested(r, worlds, last, path[last])
             if first > last:
-                batch.carry(path.between(last, first), step / path.count)
-            last, out[first] = first, batch.remembered()[:, of]
+                batch.carry(path[last : first + 1], step)
+            carried = batch.remembered()
+            if first in motion.memory:
+                carried = carried + (motion.memory[first][:, None] - carried[:, :1])
+            last, out[first] = first, carried[:, of]
         return out
+
+    def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:
+        """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on."""
+        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
+        times = self.recordings[r].times - self.recordings[r].times[0]
+        step = float(np.median(np.diff(times)))
+        span = float(times[-1] - times[frame]) + step
+        drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
+        held = replace(model, free=np.zeros_like(model.free))
+        state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
+        batch = self._batch(held, parameters, drive.held(0.0), state)
+        batch.carry(np.stack([x, x]), LEAD * step)
+        return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()))
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)
 
-    def _placed(self, recording: Recording, q: np.ndarray) -> Path:
-        """The way that nodes take with coordinates [m, F]."""
-        arm, times = self.articulation, recording.times
-        curve = CubicSpline(times, q, axis=1)
-        bend = float(np.abs(np.diff(q, 2, axis=1)).max(initial=0.0)) / 8.0
-        count = int(np.clip(np.ceil(np.sqrt(bend / TURN)), 1, PARTS))
-        between = np.interp(np.arange((len(times) - 1) * count + 1) / count, np.arange(len(times)), times)
-        fine = curve(between)
-        pose = arm.moved(arm.reference(len(between)), fine - arm.reference().angles)
-        return Path(np.moveaxis(arm.positions(pose), 1, 0), count)
-
-    def path(self, r: int) -> Path | None:
-        """The recorded motion, smoothed; None if the channels do not tell it."""
-        if r not in self._paths:
-            found = coordinates(self, r)
-            self._paths[r] = None
-            if found is not None:
-                q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
-                self._paths[r] = self._placed(self.recordings[r], q)
-        return self._paths[r]
-
-    def _moved(self, r: int, world: World, local: np.ndarray | None) -> Path | None:
-        """The motion of a recording that laws remember where its segments start: here the recorded one.
+    def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
+        """The motion of a recording that laws remember: here the recorded one.
 
         Args:
             world: of whose motion. local: [B, L] shifts of all segments' starts.
         """
-        return self.path(r)
+        return self.recorded(r)
+
+    def recorded(self, r: int) -> Motion | None:
+        """The recorded motion, smoothed; None if the channels do not tell it."""
+        if r not in self._recorded:
+            found = coordinates(self, r)
+            self._recorded[r] = None
+            if found is not None:
+                q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
+                self._recorded[r] = Motion(self._placed(q))
+        return self._recorded[r]
+
+    def _placed(self, q: np.ndarray) -> np.ndarray:
+        """Positions [F, N, 3] of coordinates [m, F] of a device that is held."""
+        arm = self.articulation
+        pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
+        return np.moveaxis(arm.positions(pose), 1, 0)
 
 
 def remembering(state: State, shots: Shots) -> State:

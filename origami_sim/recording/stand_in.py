@@ -1,12 +1,13 @@
 """A stand-in for the measured double pendulum, for tests and demonstrations where the recording is not at hand."""
 
-import os
+import io
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import write_text
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE, simulate_double_pendulum
 
 ENCODER_STEP = 1.57e-4
@@ -40,21 +41,10 @@ def stand_in_double_pendulum(
     zeros = np.random.default_rng([seed, 1]).uniform(0.0, ENCODER_STEP, size=2)
     angles = np.round((states[:, :2] - zeros) / ENCODER_STEP) * ENCODER_STEP + zeros
 
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with partial.open("w", encoding="ascii", newline="\n") as file:
-            np.savetxt(
-                file,
-                np.column_stack([times, angles]),
-                fmt=["%.6f", "%.8f", "%.8f"],
-                delimiter=",",
-                header="time_s,theta1_rad,theta2_rad",
-                comments="",
-            )
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-    return path
+    table, header = io.StringIO(), "time_s,theta1_rad,theta2_rad"
+    rows = np.column_stack([times, angles])
+    np.savetxt(table, rows, fmt=["%.6f", "%.8f", "%.8f"], delimiter=",", header=header, comments="")
+    return write_text(path, table.getvalue())
 
 
 def stand_in_start(seed: int) -> np.ndarray:
@@ -64,14 +54,7 @@ def stand_in_start(seed: int) -> np.ndarray:
 
 def write_stand_in_sidecar(path_csv: str | Path) -> Path:
     """Writes the sidecar of a stand-in beside it, with what an experimenter would know; returns its path."""
-    path = Path(path_csv).with_suffix(".toml")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_text(_SIDECAR, encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-    return path
+    return write_text(Path(path_csv).with_suffix(".toml"), _SIDECAR)
 
 
 _SIDECAR = """\
