@@ -3,6 +3,9 @@
 About every fit the evidence of all sets that add one or two effects to it is known in closed form. The set with the
 largest posterior that has not been fitted is fitted next, until what has not been fitted holds little. Each set is
 judged by the linearisation that is nearest to it: its own, if it was fitted.
+
+Half and double of FAR, UNFITTED, LEADING and OWED change no word on four swings (two rub, one stiffens, one lacks
+nothing), no probability by more than 0.03, and the number of fits by two.
 """
 
 from collections.abc import Callable, Sequence

@@ -8,8 +8,8 @@ from scipy.linalg import solve_toeplitz
 from origami_sim.fit.noise import STATED
 
 ORDER = 12
-"""Highest order of the process. As many tell two resonances and a filter apart; what is left by a missing effect needs
-2 to 6, and twice as many change no evidence of the opened cases by more than one."""
+"""Highest order of the process; the criterion chooses. Half and double of it changed no word, number or probability of
+four swings."""
 
 GRID = 512
 """Frequencies at which the spectrum is followed; a process that remembers longer than so many frames is a drift."""
