@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
+from origami_sim.diagnose.foresight import Foresight
 from origami_sim.diagnose.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.diagnose.nominal import level
 from origami_sim.diagnose.screen import Signature
@@ -45,6 +46,12 @@ LEADING = 12
 It bounds the time of a search.
 """
 
+DOUBT = 2.0
+"""Times as much as a linear estimate promises that a single effect may explain, in log evidence, before any was fitted.
+
+Fits of single effects then tell how far these recordings mislead such estimates.
+"""
+
 OWED = 1.0
 """Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
@@ -70,9 +77,8 @@ class Node:
     Attributes:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell. white: of a fit that leaves coloured noise, the problem in which it is white,
-            and the log evidence of the fit's own set in it: what is missing explains some of the colour.
-            problems: by size of the gaps, if they are to be stored.
+        grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
+            problems: by size of the gaps, if they are to be stored. judged: log posterior of sets that were not fitted.
     """
 
     key: Key
@@ -81,17 +87,22 @@ class Node:
     groups: list[Group]
     others: list[int]
     grid: list[Summed | None]
-    white: tuple[Summed, float] | None = None
+    foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
+    judged: dict[Key, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns."""
+    """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
+
+    `near`: how many effects that one has more or less, and its evidence, the better the smaller.
+    """
 
     parent: Key
     groups: tuple[int, ...]
     values: np.ndarray
+    near: tuple[int, float]
 
 
 @dataclass(eq=False)
@@ -118,13 +129,24 @@ class Posterior:
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
+    _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
-        """Of each set, over all sizes of discrepancy."""
-        cells = np.array([v.ravel() for v in self.log.values()])
-        peak = cells.max()
-        total = np.exp(cells - peak).sum(axis=1)
-        return dict(zip(self.log, (total / total.sum()).tolist(), strict=True))
+        """Of each set, over all sizes of discrepancy; of those that differ in where their shapes begin, the best."""
+        cells = np.array(list(self.log.values()))
+        log = dict(zip(self.log, logsumexp(cells, axis=1).tolist(), strict=True))
+        best: dict[tuple[str, ...], Key] = {}
+        for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
+            best[self.labels(key)] = key
+        p = np.array([log[k] for k in best.values()])
+        total = logsumexp(p)
+        return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Effects of a set and their sites."""
+        if key not in self._labels:
+            self._labels[key] = tuple(sorted(self.suspect(n).label for n in key))
+        return self._labels[key]
 
     def cells(self, key: Key | None = None) -> np.ndarray:
         """(cells,) posterior of sizes of discrepancy and flaws, given a set or over all."""
@@ -135,7 +157,7 @@ class Posterior:
         return self.signatures[n].suspect
 
     def label(self, key: Key) -> str:
-        return " + ".join(sorted(self.suspect(n).label for n in key)) or "nominal"
+        return " + ".join(self.labels(key)) or "nominal"
 
 
 def search(
@@ -164,13 +186,10 @@ def extended(
     for n in range(most):
         if progress:
             progress(n / most)
-        p = out.probabilities()
-        open_sets = [k for k in p if k not in out.nodes and k not in out.failed]
-        best = max(p, key=lambda k: p[k])
-        if best in out.nodes and missed(forward, out.nodes[best].fit) > FAR:
-            key = _hopeful(out, best, open_sets, alone=n % 2 == 1)
-        else:
-            key = max((k for k in open_sets if p[k] >= UNFITTED), key=lambda k: p[k], default=None)
+        best = max(out.log, key=lambda k: logsumexp(out.log[k]))
+        key = _likely(out)
+        if best in out.nodes and (n % 2 or key is None) and missed(forward, out.nodes[best].fit) > FAR:
+            key = _alone(out, best) or key
         if key is None:
             break
         fitted = _fitted(out, forward, key)
@@ -182,20 +201,47 @@ def extended(
     return out
 
 
-def _hopeful(out: Posterior, best: Key, open_sets: Sequence[Key], *, alone: bool) -> Key | None:
-    """The set to fit where the best one is far off: by what is missing there, not by the noise that would hide it.
+def _likely(out: Posterior) -> Key | None:
+    """The set to fit next: that which promises most, if it may hold much of the posterior."""
+    stands = [_worth(out, k) for k in out.nodes]
+    least = max(stands) + np.log(UNFITTED)
+    leader = list(out.nodes.values())[int(np.argmax(stands))]
+    unfitted = {k: w for k in out.log if k not in out.nodes and (w := _worth(out, k, leader)) >= least}
+    # another start of the shape of a set that was fitted has to be better than that
+    fitted = dict(
+        sorted(((out.labels(k), w) for k, w in zip(out.nodes, stands, strict=True)), key=lambda item: item[1])
+    )
+    better = [k for k, w in unfitted.items() if w > fitted.get(out.labels(k), -np.inf) + OWED]
+    return max(better, key=lambda k: unfitted[k], default=None)
 
-    Args:
-        alone: prefer a single effect. It may do what several were expected to: what is linear promises too little.
-    """
+
+def _worth(out: Posterior, key: Key, leader: Node | None = None) -> float:
+    """Log posterior of a set, or what it promises if it was not fitted, by the nearest fit or by `leader`."""
+    log = float(logsumexp(out.log[key]))
+    if key in out.nodes:
+        return log
+    return max(log, out.promise.get(key, -np.inf), leader.judged.get(key, -np.inf) if leader else -np.inf)
+
+
+def _alone(out: Posterior, best: Key) -> Key | None:
+    """A single effect to fit where the best set is far off: it may do what several were expected to."""
     known = {out.suspect(n).effect for n in best}
-    singles = (k for k in out.ranked[:LEADING] if k in open_sets)
+    singles = (k for k in out.ranked[:LEADING] if k in out.estimates)
     single = next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
-    stands = float(logsumexp(out.log[best]))
-    hopeful = [k for k in open_sets if out.promise[k] > stands]
-    if single is not None and (alone or not hopeful):
-        return single
-    return max(hopeful, key=lambda k: out.promise[k], default=None)
+    if single is None:
+        return None
+    none: Key = frozenset()
+    nothing, base = _worth(out, none), out.nodes[none].fit
+    fitted = [k for k in out.nodes if len(k) == 1 and out.promise.get(k, -np.inf) > nothing]
+    misled = [explained(base, out.nodes[k].fit) / (out.promise[k] - nothing) for k in fitted]
+    hoped = DOUBT * max([1.0, *misled]) * max(_worth(out, single) - nothing, 0.0)
+    return single if hoped >= explained(base, out.nodes[best].fit) else None
+
+
+def explained(base: Fit, f: Fit) -> float:
+    """Log evidence that a fit gains over another one by what it leaves, in white noise of the size of that."""
+    seen = np.sum([r.shape[0] - np.sum(np.isnan(r), axis=0) for r in base.residuals], axis=0)
+    return float(np.sum(seen * np.log(base.rms() / f.rms())))
 
 
 def missed(forward: Predictor, f: Fit) -> float:
@@ -207,6 +253,8 @@ def polished(out: Posterior, forward: Predictor) -> None:
     """Fits the leaders on, by their own noise."""
     prior, chance = log_priors(out.signatures), out.probabilities()
     for key in [k for k in out.nodes if chance[k] >= UNFITTED]:
+        if key not in out.nodes:  # a larger set that went on fits it better
+            continue
         f = out.nodes[key].fit
         f = f.reweighted(tight(f))
         if f.cost - promised(forward, f) < OWED:
@@ -229,8 +277,9 @@ def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndar
         kinds.setdefault(s.suspect.effect, []).append(n)
     out = np.zeros(len(signatures))
     for mine in kinds.values():  # a recorder as a whole is as likely to be wrong as all of its channels alone
-        share = np.array([1.0 / signatures[n].suspect.sites for n in mine])
-        out[mine] = np.log(share / share.sum()) - np.log(len(kinds))
+        share = {signatures[n].suspect.label: 1.0 / signatures[n].suspect.sites for n in mine}
+        for n in mine:
+            out[n] = np.log(share[signatures[n].suspect.label] / sum(share.values())) - np.log(len(kinds))
     return out + np.log(hyper.effects)
 
 
@@ -266,7 +315,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     for s in fewer:
         _judge(out, node, joined(s), prior, cells)
     more = joined(own)
-    singles = _judge(out, node, more, prior, cells)
+    singles = _judge(out, node, more, prior, cells, foresee=True)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
     if not key:
         out.ranked = [frozenset((node.others[n],)) for n in ranked]
@@ -276,7 +325,8 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
         if len(own) + 2 > hyper.most:
             break
         pairs += [(*own, one, n) for n in ranked[a + 1 :] if _compatible(out, first, node.others[n - len(own)])]
-    _judge(out, node, pairs, prior, cells)
+    _judge(out, node, pairs, prior, cells, foresee=True)
+    node.foresight = None  # it is large
 
 
 def forget(out: Posterior, key: Key) -> None:
@@ -292,8 +342,16 @@ def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
     return [place[id(s)] for s in hypothesis.suspects]  # the same objects also after weights have changed
 
 
-def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """What sets of groups promise (n,), by a node; their posteriors are taken over where it is nearer than others."""
+def _judge(
+    out: Posterior,
+    node: Node,
+    sets: list[tuple[int, ...]],
+    prior: np.ndarray,
+    cells: np.ndarray,
+    *,
+    foresee: bool = False,
+) -> np.ndarray:
+    """Judges sets of groups by a node, and keeps that where no other node is nearer; how they rank (n,)."""
     if not sets:
         return np.zeros(0)
     members = _members(node.fit.hypothesis, out)
@@ -317,14 +375,18 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
             found[mine, c] = log + cells[c] + log_prior[mine]
             for n in np.flatnonzero(found[mine, c] > peak[mine]):
                 peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
-    promise = logsumexp(found, axis=1)
-    if node.white is not None:
-        problem_, own_ = node.white
-        total = float(logsumexp(node.evidence + cells)) - own_
+    rank = promise = logsumexp(found, axis=1)
+    if foresee and node.foresight is not None:
+        # what is missing explains some of the colour, and all that flaws and discrepancy would
+        bare = np.array([smooth == 0.0 and flaws == out.hyper.flaws[0] for _, smooth, flaws in out.hyper.cells])
+        total, rank, promise = float(logsumexp((node.evidence + cells)[bare])), rank.copy(), promise.copy()
         for mine, rows in laid:
-            log, value = problem_.of(rows, out.hyper)
-            promise[mine] = total + log + log_prior[mine]
+            log, value = node.foresight.white.of(rows, out.hyper)
+            rank[mine] = log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
+        for n in np.argsort(-rank)[:LEADING]:
+            columns = [c for g in sets[n] for c in node.groups[g].columns]
+            promise[n] = total + log_prior[n] + node.foresight.gain(columns, out.hyper)
     for n, key in enumerate(keys):
         if key in out.nodes and key and key < node.key and key not in out.renewed:
             if logsumexp(found[n]) > logsumexp(out.log[key]) + OWED:  # its own fit ended early: it goes on from here
@@ -332,16 +394,12 @@ def _judge(out: Posterior, node: Node, sets: list[tuple[int, ...]], prior: np.nd
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
             continue
-        before = out.estimates.get(key)
-        away = len(key ^ node.key)
-        if before is None or (away, -_best(node)) < (len(key ^ before.parent), -_best(out.nodes[before.parent])):
-            out.log[key], out.estimates[key] = found[n], Estimate(node.key, sets[n], values[n])
-            out.promise[key] = float(promise[n])
-    return promise
-
-
-def _best(node: Node) -> float:
-    return float(np.max(node.evidence))
+        node.judged[key] = float(logsumexp(found[n]))
+        before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
+        if before is None or near <= before.near:
+            out.log[key], out.promise[key] = found[n], float(promise[n])
+            out.estimates[key] = Estimate(node.key, sets[n], values[n], near)
+    return rank
 
 
 def _compatible(out: Posterior, key: Key, n: int) -> bool:
@@ -389,15 +447,8 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         cell = summed(problems[gap], size, flaws)
         grid.append(cell)
         evidence[c] = cell.of(laid, hyper)[0][0]
-    white = None
-    if f.weights.colour:
-        plain = Weights(f.weights.deviation, gap=f.weights.gap)
-        now = line.reweighted(f.weights, plain)
-        theirs = [recast(e, r, f.weights, plain) for e, r in zip(effects, line.rows, strict=True)]
-        none = [np.zeros((r.count, 0)) for r in line.rows]
-        whole = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, hyper.flaws[0])
-        white = whole, float(whole.of(laid, hyper)[0][0])
-    return Node(key, f, evidence, groups, others, grid, white, problems if out.store else {})
+    foresight = Foresight.of(forward, f, own, effects, hyper) if f.weights.colour else None
+    return Node(key, f, evidence, groups, others, grid, foresight, problems if out.store else {})
 
 
 def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:

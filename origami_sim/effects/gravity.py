@@ -22,10 +22,10 @@ EFFECT = Effect(
     energy=energy,
     conservative=True,
     parameters=(
-        Parameter("gravity_x", "gx", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along x", typical=0.0),
-        Parameter("gravity_y", "gy", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along y", typical=0.0),
+        Parameter("gravity_x", "gx", "m/s^2", 0.0, (-10.0, 10.0), "acceleration of gravity along x", typical=0.0),
+        Parameter("gravity_y", "gy", "m/s^2", 0.0, (-10.0, 10.0), "acceleration of gravity along y", typical=0.0),
         Parameter(
-            "gravity_z", "gz", "m/s^2", -9.80665, (-100.0, 100.0), "acceleration of gravity along z", typical=-9.80665
+            "gravity_z", "gz", "m/s^2", -9.80665, (-10.0, 10.0), "acceleration of gravity along z", typical=-9.80665
         ),
     ),
     fitted=("gravity_z",),

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import cholesky_banded, lapack
+from scipy.sparse import dia_array
 
 from origami_sim.errors import InputError
 
@@ -17,6 +18,7 @@ def factor(correlation: np.ndarray, frames: np.ndarray) -> np.ndarray:
     Raises:
         InputError: no process has this correlation.
     """
+    correlation = correlation[: frames[-1] - frames[0] + 1]
     made = _factor(np.asarray(correlation, float).tobytes(), np.asarray(frames, np.int64).tobytes())
     return np.frombuffer(made).reshape(len(correlation), len(frames))
 
@@ -45,7 +47,5 @@ def divided(bands: np.ndarray, columns: np.ndarray) -> np.ndarray:
 
 def multiplied(bands: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Columns [m, k] of independent numbers as correlated ones: multiplied by their factor."""
-    out = np.zeros(columns.shape)
-    for d, below in enumerate(bands[: len(columns)]):
-        out[d:] += below[: len(columns) - d, None] * columns[: len(columns) - d]
-    return out
+    size = bands.shape[1]
+    return dia_array((bands, -np.arange(len(bands))), shape=(size, size)) @ columns

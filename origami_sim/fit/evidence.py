@@ -175,7 +175,7 @@ class Summed:
         sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
         left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
         out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
-        slab = _log_slab(value * norm, hyper) + np.log(norm)
+        slab = log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
         out += np.sum(np.where(sets.strength, slab, shape), axis=1)
         out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
@@ -198,20 +198,20 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
 
 
-def _log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+def log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
     """Log densities [..., s] of a strength at detectability d' under each of the normals, equally likely."""
     widths = np.array(hyper.slabs)
     log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
     return log - np.log(len(widths))
 
 
-def _log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
+def log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
     """Log density of a strength at detectability d': a mixture of normals."""
-    return logsumexp(_log_slabs(d, hyper), axis=-1)
+    return logsumexp(log_slabs(d, hyper), axis=-1)
 
 
 def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:
     """One over the root mean square width of the normals, each as probable as it is at detectability d'."""
-    log = _log_slabs(d, hyper)
+    log = log_slabs(d, hyper)
     share = np.exp(log - logsumexp(log, axis=-1, keepdims=True))
     return np.sqrt(share @ (1.0 / np.square(hyper.slabs)))

@@ -47,7 +47,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     if not len(found):
         return level, np.ones(1), log_prior
     response = np.fft.rfft(np.concatenate([[1.0], -found]), 2 * GRID)
-    covariance = np.fft.irfft(1.0 / np.abs(response) ** 2)[: min(GRID, longest)]
+    covariance = np.fft.irfft(1.0 / np.abs(response) ** 2)[:GRID]
     colour = covariance / covariance[0]
     last = int(np.flatnonzero(np.abs(colour) > NEGLIGIBLE)[-1])
     return level, np.ascontiguousarray(colour[: last + 1]), log_prior - 0.5 * len(found) * float(np.log(count))

@@ -32,7 +32,7 @@ class Track:
 
     def at(self, times: np.ndarray, q: np.ndarray) -> Pose:
         """Poses at times (k,) whose coordinates [m, k] are near those of the nearest frames."""
-        near = np.abs(times[:, None] - self.times).argmin(axis=1)
+        near = np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
         pose = self.pose.select(near)
         if len(q) == len(pose.angles):  # something holds it
             return Pose(pose.rotation, pose.centre, q)
