@@ -16,6 +16,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import plates, skin, sources
 from origami_sim.solve.compose import BITS, compose
+from origami_sim.solve.compose_sheets import asks_change
 
 APART = 128
 """Bytes between the worlds' stretches of memory on the CPU: two cache lines, because processors fetch them in pairs.
@@ -152,8 +153,9 @@ class Batch:
             numbers = self._room(max(len(sources.NUMBERS) * len(drive.placed), 1), dtype=wp.float64)
             self._constants.append(sources.upload(drive, numbers, self.device))
         if self.program.shells:
-            moments = self._room(max(len(hinges), 1), dtype=wp.float64)
-            self._constants.append(plates.upload(model, moments, self.device))
+            rows = 2 if any(map(asks_change, self.program.effects)) else 1
+            room = [self._room(max(len(hinges), 1), dtype=wp.float64) for _ in range(rows)]
+            self._constants.append(plates.upload(model, self.device, *room))
         if self.program.touches:
             self._constants.append(skin.upload(model, self._room, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
