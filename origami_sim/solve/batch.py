@@ -58,6 +58,7 @@ class Batch:
         threads: on the CPU, how many threads share the worlds (default: all cores). Results do not depend on it.
         among: effects that the program has anyway, so that models with few of them share it; those that the model
             lacks do nothing.
+        supports: the model with the supports that bend its sheets, where all nodes are held only to be led.
 
     Raises:
         InputError: parameters or drive for another number of worlds, too few electrode groups, no such device.
@@ -73,6 +74,7 @@ class Batch:
         device: str = "cpu",
         threads: int | None = None,
         among: Sequence[str] = (),
+        supports: Model | None = None,
     ):
         try:
             self.device = wp.get_device(device)
@@ -155,7 +157,7 @@ class Batch:
         if self.program.shells:
             rows = 2 if any(map(asks_change, self.program.effects)) else 1
             room = [self._room(max(len(hinges), 1), dtype=wp.float64) for _ in range(rows)]
-            self._constants.append(plates.upload(model, self.device, *room))
+            self._constants.append(plates.upload(supports or model, self.device, *room))
         if self.program.touches:
             self._constants.append(skin.upload(model, self._room, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
