@@ -35,6 +35,7 @@ class Text:
 class Sheets:
     """Strains and curvatures of triangles, for the laws of membranes and plates; a part of the composer."""
 
+    effects: Any
     family: Any
     number: Any
     acting: Any
