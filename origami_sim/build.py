@@ -204,6 +204,7 @@ class Sheet(Grounds, Electrodes, Touches):
         membrane: ArrayLike | None = None,
         bending: ArrayLike | None = None,
         axis: Sequence[float] = (1.0, 0.0, 0.0),
+        relaxation: Sequence[tuple[float, float]] = (),
     ) -> "Sheet":
         """Makes the panels thin shells, which converge to plates and membranes of the material on any mesh.
 
@@ -215,15 +216,18 @@ class Sheet(Grounds, Electrodes, Touches):
             elasticity: [3, 3] plane-stress stiffness [Pa], such as `orthotropic(...)`, for strains 11, 22 and twice 12.
             membrane, bending: [3, 3] stiffness of the whole thickness [N/m], [N m] instead of what follows from it.
             axis: the material's first axis in the reference state.
+            relaxation: up to three Maxwell branches beside the elasticity, (stiffness over the elastic one, time [s]).
 
         Raises:
-            InputError: rigid panels, a matrix that is not symmetric and positive, an axis without direction.
+            InputError: rigid panels, a matrix that is not symmetric and positive, an axis without direction, a branch
+                without stiffness or time.
         """
         if self.panels == "rigid":
             raise InputError("rigid panels neither bend nor stretch", field="panels", value="rigid", allowed="elastic")
-        self._shell = stated(elasticity, membrane, bending, poisson, axis)
+        self._shell = stated(elasticity, membrane, bending, poisson, axis, relaxation)
         self._effects = [e for e in self._effects if e != "bars"]
-        return self.on("shell_membrane", "shell_bending")
+        losses = ("shell_membrane_relaxation", "shell_bending_relaxation") if relaxation else ()
+        return self.on("shell_membrane", "shell_bending", *losses)
 
     @statement(rigidity="N m")
     def panel(self, panels, *, rigidity: float) -> "Sheet":

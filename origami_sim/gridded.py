@@ -166,7 +166,11 @@ class FieldTable:
 
     @property
     def divergence(self) -> float:
-        """Divergence over one step of the grid, relative to the field, both as root mean squares; 0 in free space."""
+        """Divergence at the places over one step of the grid, relative to the field, both as root mean squares.
+
+        A field of free space has none, so it is the error of the gradient: between the places it is some 0.4 times as
+        large, and three times the error of a component of the gradient.
+        """
         whole = np.sqrt(np.mean(self.values**2))
         return float(np.sqrt(np.mean(self._at_places[1] ** 2)) * self.steps.max() / whole) if whole else 0.0
 

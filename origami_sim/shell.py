@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim import curvature
-from origami_sim.effects._plate import COMPONENTS
+from origami_sim.effects._plate import BRANCHES, COMPONENTS
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 
@@ -27,6 +27,7 @@ class Shell:
         elasticity: [3, 3] plane-stress stiffness [Pa] in the material's axes; None: isotropic, each panel's own.
         membrane: [3, 3] membrane stiffness [N/m], bending: [3, 3] bending stiffness [N m]; None: from the elasticity.
         poisson: Poisson's ratio instead of the material's. axis: the material's first axis in the reference state.
+        relaxation: stiffness over the elastic one, and time [s], of each Maxwell branch; the same in every direction.
     """
 
     elasticity: np.ndarray | None = None
@@ -34,6 +35,7 @@ class Shell:
     bending: np.ndarray | None = None
     poisson: float | None = None
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    relaxation: tuple[tuple[float, float], ...] = ()
 
 
 def isotropic(modulus: float, poisson: float) -> np.ndarray:
@@ -79,8 +81,9 @@ def stated(
     bending: ArrayLike | None,
     poisson: float | None,
     axis: Sequence[float],
+    relaxation: Sequence[tuple[float, float]] = (),
 ) -> Shell:
-    """A checked statement. Raises InputError for matrices that are not positive and an axis without direction."""
+    """A checked statement. Raises InputError for a matrix that is not positive, an axis without direction, a branch."""
     given = {"elasticity": elasticity, "membrane": membrane, "bending": bending}
     matrices = {n: None if m is None else _positive(n, m) for n, m in given.items()}
     if poisson is not None:
@@ -91,7 +94,20 @@ def stated(
     if direction.shape != (3,) or not np.all(np.isfinite(direction)) or not np.linalg.norm(direction) > 0:
         raise InputError("a material needs a direction", field="axis", value=direction.tolist(), allowed="x, y, z")
     x, y, z = direction.tolist()
-    return Shell(**matrices, poisson=poisson, axis=(x, y, z))
+    return Shell(**matrices, poisson=poisson, axis=(x, y, z), relaxation=_branches(relaxation))
+
+
+def _branches(given: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    try:
+        pairs = np.asarray(given, float).reshape(-1, 2)
+        good = np.shape(given) in ((len(pairs), 2), (0,)) and len(pairs) <= len(BRANCHES)
+        good &= bool(np.all(np.isfinite(pairs)) and np.all(pairs > 0))
+    except (TypeError, ValueError):
+        good, pairs = False, np.zeros((0, 2))
+    if not good:
+        allowed = f"at most {len(BRANCHES)} pairs of a stiffness over the elastic one and a time [s], both positive"
+        raise InputError("no sheet relaxes like this", field="relaxation", value=str(given), allowed=allowed)
+    return tuple((share, time) for share, time in pairs.tolist())
 
 
 def _positive(name: str, given: ArrayLike) -> np.ndarray:
@@ -129,7 +145,11 @@ def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -
             by = _turned(turn[t])
             a, d = by.T @ a @ by, by.T @ d @ by
         membrane[t], bending[t] = a, curvature.relaxed(d, found.normal[t][found.loose[t]])
-    for effect, matrices in (("shell_membrane", membrane), ("shell_bending", bending)):
+    laws = [(n, membrane) for n in ("shell_membrane", "shell_membrane_relaxation")]
+    laws += [(n, bending) for n in ("shell_bending", "shell_bending_relaxation")]
+    for effect, matrices in laws:
+        if effect not in model.effects:
+            continue
         # what is left of a relaxed direction by rounding must not be negative
         scale = np.abs(matrices).max(axis=(1, 2), initial=1e-300)
         for c in COMPONENTS:
@@ -137,6 +157,9 @@ def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -
             values = matrices[:, row, column]
             values = np.where(np.abs(values) < 1e-12 * scale, 0.0, values)
             parameters.set(effect, f"stiffness_{c}", values[:, None])
+        if effect.endswith("relaxation"):
+            for i, (share, time) in enumerate(shell.relaxation, 1):
+                parameters.set(effect, f"share_{i}", share).set(effect, f"time_{i}", time)
 
 
 def _of_panel(sheet: "Sheet", shell: Shell, panel: int) -> tuple[np.ndarray, np.ndarray]:

@@ -147,6 +147,27 @@ def test_a_table_has_no_curl_and_errors_of_fourth_order():
     assert off[-1] < 1e-4 and largest[-1] < 2e-3 and table(25).divergence < 1e-3
 
 
+def test_the_divergence_of_a_table_of_a_dipole_is_the_error_of_its_gradient():
+    """No curl at all between the places; a divergence that is stated from above, falls, and measures the gradient."""
+    source = Drive(sources=[dipole(0.3, position=(0.003, 0.002, -0.05), axis=(0.3, -0.2, 1))])
+    points = np.random.default_rng(0).uniform(-0.02, 0.02, (2000, 3))
+    exact = field_at(source, points)[1]
+    steps, left = [], []
+    for n in (9, 13, 17, 25):
+        a = np.linspace(-0.02, 0.02, n)
+        t = FieldTable.sampled(lambda p: field_at(source, p)[0], a, a, a)
+        slope = t.at(points)[1]
+        assert np.array_equal(slope, np.swapaxes(slope, 1, 2))
+        divergence = np.sqrt(np.mean(np.trace(slope, axis1=1, axis2=2) ** 2))
+        over_a_step = divergence * t.steps.max() / np.sqrt(np.mean(t.values**2))
+        assert over_a_step < t.divergence < 4 * over_a_step
+        # of independent errors of nine components of alike size the trace has the root of three; these lie in the trace
+        assert np.sqrt(np.mean((slope - exact) ** 2)) == pytest.approx(divergence / 3, rel=0.1)
+        steps.append(t.steps[0])
+        left.append(divergence)
+    assert np.polyfit(np.log(steps), np.log(left), 1)[0] > 3.0
+
+
 def test_noise_and_a_probe_that_is_turned_are_seen_in_the_misfit():
     noise = np.random.default_rng(2)
     rms = np.sqrt(np.mean(table(9).values ** 2))

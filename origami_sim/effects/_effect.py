@@ -29,9 +29,10 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "triangle": ("x1", "x2", "x3", "v1", "v2", "v3", "stray", "stray_gradient", "dt"),
     # resultants [N/m] from Green's strain (11, 22 and twice 12), and moments per width [N] from the curvature [1/m]
     # that comes on top of the reference state's, in the triangle's axes; both positive where they grow with it
-    # whole: 1 for a triangle's curvature, 0 for the difference to a neighbour's
-    "membrane": ("strain", "dt"),
-    "plate": ("curvature", "whole", "dt"),
+    # change: of the strain or curvature in this step; whole: 1 for a triangle's curvature, 0 for the difference to a
+    # neighbour's, which shares the triangle's memory and has to leave it as it is
+    "membrane": ("strain", "change", "dt"),
+    "plate": ("curvature", "change", "whole", "dt"),
     # force on the node
     "node": ("x", "v", "mass", "dt"),
     # normal: force along the ground's normal, repulsion positive
@@ -95,11 +96,13 @@ class Memory:
 
     Args:
         base: so many numbers more in each world, of a law whose pairs share the room.
+        own: whether a vector's components are in the entity's own axes, so that they stay when the device turns.
     """
 
     name: str
     size: int = 1
     base: int = 0
+    own: bool = False
 
 
 @dataclass(frozen=True)
@@ -183,8 +186,8 @@ class Effect:
                     )
             object.__setattr__(self, attribute, names)
         local = {"field", "gradient", "voltage"} & set(self.drives)
-        if self.family in SHELLS and (local or self.memory):
-            raise ValueError(f"effect '{self.name}': the family '{self.family}' offers no memory, field or voltage")
+        if self.family in SHELLS and local:
+            raise ValueError(f"effect '{self.name}': the family '{self.family}' offers no field or voltage")
         if self.inertia is not None and self.family != "node":
             raise ValueError(f"effect '{self.name}': only nodes have a mass to add to, not the family '{self.family}'")
         if self.interacts and (self.magnet is None or not self.fitted):

@@ -1,4 +1,4 @@
-"""Stiffness matrices of sheets: six numbers that weigh strains or curvatures 11, 22 and twice 12."""
+"""Stiffness of sheets, a matrix of six numbers for strains or curvatures 11, 22 and twice 12, and its relaxation."""
 
 import math
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import warp as wp
 
-from origami_sim.effects._effect import Parameter, scalar
+from origami_sim.effects._effect import Memory, Parameter, scalar
 
 COMPONENTS = ("11", "22", "12", "66", "16", "26")
 """Entries of the matrix that are parameters; 6 stands for the shear (Jones 1999, Mechanics of Composite Materials)."""
@@ -40,3 +40,70 @@ def largest(parameters: Mapping[str, np.ndarray]) -> np.ndarray:
     """Largest stiffness of any strain of unit norm (11^2 + 22^2 + 2 12^2): an eigenvalue in Mandel's notation."""
     scale = np.sqrt([1.0, 1.0, 2.0])
     return np.abs(np.linalg.eigvalsh(matrix(parameters) * scale[:, None] * scale)).max(axis=-1)
+
+
+# relaxation -----------------------------------------------------------------------------------------------------------
+
+BRANCHES = (1, 2, 3)
+
+
+@wp.func
+def relaxed(q: wp.vec3d, change: wp.vec3d, dt: scalar, share: scalar, time: scalar):
+    """A Maxwell branch's stress over the stiffness after a step; exact for a strain that changes evenly within it."""
+    r = dt / time
+    grow = scalar(1.0) - scalar(0.5) * r
+    if r > scalar(1.0e-6):
+        grow = (scalar(1.0) - wp.exp(-r)) / r
+    return wp.exp(-r) * q + (share * grow) * change
+
+
+@wp.func
+def maxwell(
+    change: wp.vec3d,
+    dt: scalar,
+    q1: wp.vec3d,
+    q2: wp.vec3d,
+    q3: wp.vec3d,
+    s11: scalar,
+    s22: scalar,
+    s12: scalar,
+    s66: scalar,
+    s16: scalar,
+    s26: scalar,
+    share_1: scalar,
+    time_1: scalar,
+    share_2: scalar,
+    time_2: scalar,
+    share_3: scalar,
+    time_3: scalar,
+):
+    """What three branches resist a change with, and their memory after it."""
+    p1 = relaxed(q1, change, dt, share_1, time_1)
+    p2 = relaxed(q2, change, dt, share_2, time_2)
+    p3 = relaxed(q3, change, dt, share_3, time_3)
+    return weighed(p1 + p2 + p3, s11, s22, s12, s66, s16, s26), p1, p2, p3
+
+
+def branches() -> tuple[Parameter, ...]:
+    """Share of the stiffness and relaxation time of the branches, silent at first."""
+    return tuple(
+        p
+        for i in BRANCHES
+        for p in (
+            Parameter(
+                f"share_{i}", f"g{i}", "-", 0.0, (0.0, math.inf), f"stiffness of branch {i} over the elastic one",
+                typical=0.1 if i == 1 else 0.0,
+            ),
+            Parameter(f"time_{i}", f"tau{i}", "s", 1.0, (1e-6, math.inf), f"relaxation time {i}", typical=0.01),
+        )
+    )  # fmt: skip
+
+
+def memories() -> tuple[Memory, ...]:
+    """Stress of each branch over the stiffness: a strain or a curvature, in the triangle's axes."""
+    return tuple(Memory(f"q{i}", 3, own=True) for i in BRANCHES)
+
+
+def instantaneous(parameters: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Largest stiffness of the branches for a strain of unit norm that comes at once."""
+    return largest(parameters) * sum(np.asarray(parameters[f"share_{i}"]) for i in BRANCHES)

@@ -44,6 +44,21 @@ def stored(polarisation: scalar, susceptibility: scalar, saturation: scalar):
 
 
 @wp.func
+def axes(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, poling_1: scalar, poling_2: scalar):
+    """The patch's axes as rows: its first one, across it in the panel, and the panel's normal."""
+    u = wp.normalize(poling_1 * (x2 - x1) + poling_2 * (x3 - x1))
+    normal = wp.normalize(wp.cross(x2 - x1, x3 - x1))
+    return wp.matrix_from_rows(u, wp.cross(normal, u), normal)
+
+
+@wp.func
+def factors(demagnetising_1: scalar, demagnetising_2: scalar):
+    """Demagnetising factors along the axes, of which the sum is one."""
+    rest = scalar(1.0) - demagnetising_1 - demagnetising_2
+    return wp.vec3d(demagnetising_1, demagnetising_2, wp.max(rest, scalar(0.0)))
+
+
+@wp.func
 def force(
     x1: wp.vec3d,
     x2: wp.vec3d,
@@ -58,20 +73,18 @@ def force(
     demagnetising_1: scalar,
     demagnetising_2: scalar,
 ):
-    u = wp.normalize(poling_1 * (x2 - x1) + poling_2 * (x3 - x1))
-    normal = wp.normalize(wp.cross(x2 - x1, x3 - x1))
-    across = wp.cross(normal, u)
-    rest = wp.max(scalar(1.0) - demagnetising_1 - demagnetising_2, scalar(0.0))
     out = corner_rows(wp.vec3d(), wp.vec3d(), wp.vec3d())
     if susceptibility > scalar(0.0):
-        b = wp.vec3d(wp.dot(field, u), wp.dot(field, across), wp.dot(field, normal))
-        j = polarised(b, susceptibility, wp.vec3d(demagnetising_1, demagnetising_2, rest), saturation)
+        a = axes(x1, x2, x3, poling_1, poling_2)
+        j = polarised(a * field, susceptibility, factors(demagnetising_1, demagnetising_2), saturation)
+        u = wp.vec3d(a[0, 0], a[0, 1], a[0, 2])
+        normal = wp.vec3d(a[2, 0], a[2, 1], a[2, 2])
         # the polarisation is where the energy is least, so its changes cost nothing: the force is that of a magnet
         turned = j[0] * field + j[1] * wp.cross(field, normal)
         tilted = j[2] * field + j[1] * wp.cross(u, field)
         out = nominal.force(x1, x2, x3, turned, scalar(1.0), volume, poling_1, poling_2, scalar(0.0))
         out = out + nominal.force(x1, x2, x3, tilted, scalar(1.0), volume, poling_1, poling_2, scalar(1.0))
-        pull = wp.transpose(gradient) * (j[0] * u + j[1] * across + j[2] * normal)
+        pull = wp.transpose(gradient) * (wp.transpose(a) * j)
         third = (volume / (scalar(3.0) * scalar(MU0))) * pull
         out = out + corner_rows(third, third, third)
     return out
@@ -91,12 +104,10 @@ def energy(
     demagnetising_1: scalar,
     demagnetising_2: scalar,
 ):
-    u = wp.normalize(poling_1 * (x2 - x1) + poling_2 * (x3 - x1))
-    normal = wp.normalize(wp.cross(x2 - x1, x3 - x1))
-    n = wp.vec3d(demagnetising_1, demagnetising_2, wp.max(scalar(1.0) - demagnetising_1 - demagnetising_2, scalar(0.0)))
     out = scalar(0.0)
     if susceptibility > scalar(0.0):
-        b = wp.vec3d(wp.dot(field, u), wp.dot(field, wp.cross(normal, u)), wp.dot(field, normal))
+        b = axes(x1, x2, x3, poling_1, poling_2) * field
+        n = factors(demagnetising_1, demagnetising_2)
         j = polarised(b, susceptibility, n, saturation)
         poles = scalar(0.5) * wp.dot(j, wp.cw_mul(n, j))
         out = volume / scalar(MU0) * (stored(wp.length(j), susceptibility, saturation) + poles - wp.dot(j, b))

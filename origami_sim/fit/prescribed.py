@@ -84,7 +84,7 @@ class Prescribed(Curves):
         still = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(model, count, position=x[:, 0])
         every = per_world(drive, levels(drive, 0.0, count))
-        batch = Batch(still, parameters, every, state, threads=self.threads, among=self.shared)
+        batch = Batch(still, parameters, every, state, threads=self.threads, among=self.shared, supports=model)
         moments = np.empty((len(q), frames, count))
         for k in range(frames):
             batch.hold(levels(drive, float(times[k]), count))

@@ -326,9 +326,9 @@ class Rollouts(Worlds, ABC):
         drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
         held = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
-        batch = self._batch(held, parameters, drive.held(0.0), state)
+        batch = self._batch(held, parameters, drive.held(0.0), state, supports=model)
         batch.carry(np.stack([x, x]), LEAD * step)
-        return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()))
+        return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()), supports=model)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)

@@ -46,12 +46,14 @@ class _Averager(compose._Composer):
         # the mean of the gradient along the path: times the change of the span it is the change of the length
         t("along = (before + after) * (scalar(1.0) / (wp.length(before) + wp.length(after)))")
 
-    def _strain(self, t: compose.Text):
+    def _strain(self, t: compose.Text, moving: bool):
         ends = [f"X0[n{i}]" for i in (1, 2, 3)], [f"X1[n{i}, w]" for i in (1, 2, 3)]
         for i, (a, b) in enumerate(zip(*ends, strict=True), 1):
             t(f"y{i} = scalar(0.5) * ({a} + {b})")
         t(f"before_strain = shells.strain({', '.join(ends[0])}, shape)")
         t(f"strain = before_strain + fraction * (shells.strain({', '.join(ends[1])}, shape) - before_strain)")
+        if moving:
+            t("earlier = before_strain")
 
     def _fold(self, t: compose.Text):
         t("g = kinematics.dihedral(X[i, w], X[j, w], X[k, w], X[l, w])")

@@ -16,6 +16,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import plates, skin, sources
 from origami_sim.solve.compose import BITS, compose
+from origami_sim.solve.compose_sheets import asks_change
 
 APART = 128
 """Bytes between the worlds' stretches of memory on the CPU: two cache lines, because processors fetch them in pairs.
@@ -57,6 +58,7 @@ class Batch:
         threads: on the CPU, how many threads share the worlds (default: all cores). Results do not depend on it.
         among: effects that the program has anyway, so that models with few of them share it; those that the model
             lacks do nothing.
+        supports: the model with the supports that bend its sheets, where all nodes are held only to be led.
 
     Raises:
         InputError: parameters or drive for another number of worlds, too few electrode groups, no such device.
@@ -72,6 +74,7 @@ class Batch:
         device: str = "cpu",
         threads: int | None = None,
         among: Sequence[str] = (),
+        supports: Model | None = None,
     ):
         try:
             self.device = wp.get_device(device)
@@ -152,8 +155,9 @@ class Batch:
             numbers = self._room(max(len(sources.NUMBERS) * len(drive.placed), 1), dtype=wp.float64)
             self._constants.append(sources.upload(drive, numbers, self.device))
         if self.program.shells:
-            moments = self._room(max(len(hinges), 1), dtype=wp.float64)
-            self._constants.append(plates.upload(model, moments, self.device))
+            rows = 2 if any(map(asks_change, self.program.effects)) else 1
+            room = [self._room(max(len(hinges), 1), dtype=wp.float64) for _ in range(rows)]
+            self._constants.append(plates.upload(supports or model, self.device, *room))
         if self.program.touches:
             self._constants.append(skin.upload(model, self._room, self.device))
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))

@@ -376,6 +376,8 @@ class _Composer(Sheets, Touching):
             self._fold(t)
         if any("turn" in e.arguments for e in effects):
             t("turn = angle - angles[r, w]" if mode in MOVING else "turn = scalar(0.0)")
+        if family == "bend" and mode == "rollout":
+            self._note_turn(t)
         if mode == "rigid":
             with t.block("if last:"):
                 t("angles[r, w] = angle")

