@@ -111,7 +111,8 @@ class Posterior:
 
     Attributes:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
-            posterior, not normalised. estimates: of sets that were not fitted. failed: why a fit was not possible.
+            posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
+            was not possible.
         ranked: single effects by what they promise the model without any.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
@@ -123,6 +124,7 @@ class Posterior:
     hyper: Hyper = HYPER
     nodes: dict[Key, Node] = field(default_factory=dict)
     log: dict[Key, np.ndarray] = field(default_factory=dict)
+    total: dict[Key, float] = field(default_factory=dict)
     estimates: dict[Key, Estimate] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
     ranked: list[Key] = field(default_factory=list)
@@ -133,8 +135,7 @@ class Posterior:
 
     def probabilities(self) -> dict[Key, float]:
         """Of each set, over all sizes of discrepancy; of those that differ in where their shapes begin, the best."""
-        cells = np.array(list(self.log.values()))
-        log = dict(zip(self.log, logsumexp(cells, axis=1).tolist(), strict=True))
+        log = self.total
         best: dict[tuple[str, ...], Key] = {}
         for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
             best[self.labels(key)] = key
@@ -186,7 +187,7 @@ def extended(
     for n in range(most):
         if progress:
             progress(n / most)
-        best = max(out.log, key=lambda k: logsumexp(out.log[k]))
+        best = max(out.total, key=lambda k: out.total[k])
         key = _likely(out)
         if best in out.nodes and (n % 2 or key is None) and missed(forward, out.nodes[best].fit) > FAR:
             key = _alone(out, best) or key
@@ -195,7 +196,7 @@ def extended(
         fitted = _fitted(out, forward, key)
         if fitted.failed:
             out.failed[key] = fitted.failed
-            del out.log[key]
+            del out.log[key], out.total[key]
             continue
         _add(out, forward, key, fitted, prior)
     return out
@@ -216,11 +217,15 @@ def _likely(out: Posterior) -> Key | None:
 
 
 def _worth(out: Posterior, key: Key, leader: Node | None = None) -> float:
-    """Log posterior of a set, or what it promises if it was not fitted, by the nearest fit or by `leader`."""
-    log = float(logsumexp(out.log[key]))
+    """Log posterior of a set, or what it promises if it was not fitted.
+
+    The nearest fit tells that; if it leaves coloured noise, also `leader`, which leaves less.
+    """
     if key in out.nodes:
-        return log
-    return max(log, out.promise.get(key, -np.inf), leader.judged.get(key, -np.inf) if leader else -np.inf)
+        return out.total[key]
+    worth = max(out.total[key], out.promise[key])
+    weights = out.nodes[out.estimates[key].parent].fit.weights
+    return max(worth, leader.judged.get(key, -np.inf)) if leader and weights and weights.colour else worth
 
 
 def _alone(out: Posterior, best: Key) -> Key | None:
@@ -301,6 +306,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     forget(out, key)
     out.nodes[key] = node
     out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
+    out.total[key] = float(logsumexp(out.log[key]))
     out.estimates.pop(key, None)
     members = _members(f.hypothesis, out)
     own = tuple(range(len(members)))
@@ -333,7 +339,7 @@ def forget(out: Posterior, key: Key) -> None:
     """Leaves out a fit of a set, and what was estimated by it."""
     out.nodes.pop(key, None)
     for k in [k for k, e in out.estimates.items() if e.parent == key]:
-        del out.estimates[k], out.log[k], out.promise[k]
+        del out.estimates[k], out.log[k], out.total[k], out.promise[k]
 
 
 def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
@@ -376,6 +382,7 @@ def _judge(
             for n in np.flatnonzero(found[mine, c] > peak[mine]):
                 peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
     rank = promise = logsumexp(found, axis=1)
+    totals: list[float] = rank.tolist()
     if foresee and node.foresight is not None:
         # what is missing explains some of the colour, and all that flaws and discrepancy would
         bare = np.array([smooth == 0.0 and flaws == out.hyper.flaws[0] for _, smooth, flaws in out.hyper.cells])
@@ -389,15 +396,15 @@ def _judge(
             promise[n] = total + log_prior[n] + node.foresight.gain(columns, out.hyper)
     for n, key in enumerate(keys):
         if key in out.nodes and key and key < node.key and key not in out.renewed:
-            if logsumexp(found[n]) > logsumexp(out.log[key]) + OWED:  # its own fit ended early: it goes on from here
+            if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
                 out.renewed.add(key)
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
             continue
-        node.judged[key] = float(logsumexp(found[n]))
+        node.judged[key] = totals[n]
         before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
         if before is None or near <= before.near:
-            out.log[key], out.promise[key] = found[n], float(promise[n])
+            out.log[key], out.total[key], out.promise[key] = found[n], totals[n], float(promise[n])
             out.estimates[key] = Estimate(node.key, sets[n], values[n], near)
     return rank
 
