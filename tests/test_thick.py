@@ -131,6 +131,12 @@ def test_panels_on_a_hinge_beyond_a_face_fold_flat_with_twice_that_gap(at, gap):
     np.testing.assert_allclose(apart - 2 * MM, gap, atol=1e-9)
 
 
+def test_panels_about_a_face_touch_each_other():
+    """Thicker by 0.4 mm for touch than for the hinge: they stop where their diagonals cross, 20 mm from the axis."""
+    _, angles, _ = folded(pair().hinge(at="top").touch(thickness=2.4 * MM))
+    assert np.pi - angles[0] == pytest.approx(0.4 / 20, rel=0.1)
+
+
 def test_a_swing_about_a_face_is_that_of_a_plate_about_that_axis():
     t, length, density = 6 * MM, 0.04, 2700.0
     s = Sheet(strip([0.04, length], 0.03), thickness=t, material="aluminium", density=density, panels="rigid")
