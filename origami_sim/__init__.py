@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from origami_sim.pattern import (
         Pattern,
         cross,
+        cut,
         grid,
         kresling,
         miura,
@@ -67,7 +68,7 @@ _HOMES = {
     "errors": "InputError",
     "materials": "MATERIALS bridge_stiffness layered_rigidity material",
     "model": "Model Parameters State",
-    "pattern": "Pattern cross grid kresling miura sheet strip uncreased waterbomb triangulate "
+    "pattern": "Pattern cross cut grid kresling miura sheet strip uncreased waterbomb triangulate "
     "read_fold read_mesh read_pattern read_svg write_fold write_mesh",
     "recording": "Recording read_recording",
     "replay": "open_replay screenshot write_replay",
@@ -86,7 +87,7 @@ _MODULES = {name: module for module, names in _HOMES.items() for name in names.s
 
 __all__ = [  # noqa: RUF022  (by what they are for)
     # a sheet
-    "Pattern", "cross", "grid", "kresling", "miura", "sheet", "strip", "uncreased", "waterbomb",
+    "Pattern", "cross", "cut", "grid", "kresling", "miura", "sheet", "strip", "uncreased", "waterbomb",
     "read_pattern", "read_fold", "read_svg", "read_mesh", "write_fold", "write_mesh", "triangulate",
     "Sheet", "si", "Stack", "isotropic", "orthotropic", "MATERIALS", "material", "bridge_stiffness", "layered_rigidity",
     # a model and what drives it

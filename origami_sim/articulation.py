@@ -111,6 +111,9 @@ class Articulation:
     def _sides(model: Model, nodes: list[np.ndarray], crease: int) -> tuple[int | None, int | None]:
         """Panels on the side of l and on the side of i."""
         i, j, k, m = model.creases[crease]
+        corners = len(model.position) - len(model.carriers)
+        if m >= corners:  # a hinge of its own nodes, which panels carry
+            return int(model.carriers[m - corners]), int(model.carriers[i - corners])
         found: list[int | None] = []
         for tip in (m, i):
             triangle = np.flatnonzero(np.all(np.isin(model.triangles, [j, k, tip]), axis=1))

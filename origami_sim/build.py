@@ -17,10 +17,11 @@ from origami_sim.pattern import Pattern, triangulate
 from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, stated
 from origami_sim.statements import statement
-from origami_sim.touch import Touch, Touches, refuse_overlap
+from origami_sim.thick import Hinge, Thick
+from origami_sim.touch import Touch, refuse_overlap
 
 
-class Sheet(Grounds, Electrodes, Touches):
+class Sheet(Grounds, Electrodes, Thick):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -85,7 +86,8 @@ class Sheet(Grounds, Electrodes, Touches):
                 "a damping ratio cannot be negative", field="membrane_damping", value=membrane_damping, allowed=">= 0"
             )
         self.membrane, self.membrane_damping = membrane, membrane_damping
-        self._rigidity = np.full(faces, np.nan)
+        self._rigidity, self._levels = np.full(faces, np.nan), np.zeros(faces)
+        self._hinges: dict[int, Hinge] = {}
         self._patches: list[dict] = [{} for _ in range(faces)]
         self._stated: dict[int, Stated] = {}
         self._points: list[tuple[int, float, np.ndarray]] = []
@@ -228,14 +230,6 @@ class Sheet(Grounds, Electrodes, Touches):
         self._effects = [e for e in self._effects if e != "bars"]
         losses = ("shell_membrane_relaxation", "shell_bending_relaxation") if relaxation else ()
         return self.on("shell_membrane", "shell_bending", *losses)
-
-    @statement(rigidity="N m")
-    def panel(self, panels, *, rigidity: float) -> "Sheet":
-        """Bending rigidity per width of some panels [N m], instead of E h^3 / 12 (1 - nu^2)."""
-        if not np.all(positive(rigidity)):
-            raise InputError("a bending rigidity must be positive", field="rigidity", value=rigidity, allowed="> 0 N m")
-        self._rigidity[self._index("panel", panels)] = rigidity
-        return self
 
     @statement(thickness="m", size="m", centre="m", remanence="T", density="kg/m^3")
     def patch(
@@ -446,14 +440,15 @@ class Sheet(Grounds, Electrodes, Touches):
         if "eccentric_weight" in self._effects:
             for t, (weight, offset) in self._off_plane().items():
                 p.set("eccentric_weight", "mass", weight, [t]).set("eccentric_weight", "offset", offset, [t])
-        model = self._padded(self._stand(model, p, shares))
+        model = self._padded(self._stand(model, p, shares, self._levels[mesh.triangle_face[tri]]))
         self._touching(p)
+        self._stop(p)
         for effect, name, value, entities in self._settings:
             p.set(effect, name, value, entities)
         self._share_magnets(p)
         if "touch" in self._effects:
             refuse_overlap(model, p)
-        return rigid(model, p) if self.panels == "rigid" else (model, p)
+        return self._thick(*(rigid(model, p) if self.panels == "rigid" else (model, p)))
 
     def _share_magnets(self, p: Parameters) -> None:
         """Gives effects of remanent panels that were only switched on the magnets of `magnetic_torque`."""

@@ -277,8 +277,12 @@ class Grounds(Masses):
                 share[panel, node] += 0.25 * length[e] / around
         return [(panel, node, s) for (panel, node), s in sorted(share.items(), key=lambda i: (i[0][1], i[0][0]))]
 
-    def _stand(self, model: Model, parameters: Parameters, shares: np.ndarray) -> Model:
-        """The model where it starts; the ground's stiffness and damping go into the parameters."""
+    def _stand(self, model: Model, parameters: Parameters, shares: np.ndarray, lifts: np.ndarray) -> Model:
+        """The model where it starts; the ground's stiffness and damping go into the parameters.
+
+        Args:
+            lifts: [K] by which the panels of contact points will be moved off the pattern's plane [m].
+        """
         ground = self._ground
         if ground is None or not len(model.contacts):
             return model
@@ -290,7 +294,8 @@ class Grounds(Masses):
             parameters.set(effect, "stiffness", stiffness * shares).set(effect, "damping", damping * shares)
         parameters.set("coulomb", "friction_coefficient", ground.friction)
         parameters.set("plane", "tilt", ground.tilt).set("plane", "azimuth", ground.azimuth)
-        gap = gaps(model, parameters, model.position[:, None])[:, 0]
+        there = replace(model, contact_offsets=model.contact_offsets + lifts)
+        gap = gaps(there, parameters, model.position[:, None])[:, 0]
         lowest = int(gap.argmin())
         if not ground.lift:
             if gap[lowest] < -1e-9 * size:

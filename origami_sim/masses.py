@@ -55,6 +55,7 @@ class Masses(Statements):
     _stated: dict[int, Stated]
     _points: list[tuple[int, float, np.ndarray]]
     _extra_mass: np.ndarray
+    _levels: np.ndarray
     _gravity: tuple[float, float, float] | None
 
     # what a designer states ------------------------------------------------------------------------------------
@@ -210,12 +211,15 @@ class Masses(Statements):
     def _plate(self, panel: int) -> tuple[float, np.ndarray, np.ndarray]:
         """Mass, centre of mass and second moments [3, 3] about it of a panel and its patch, uniform each."""
         thick, patch, normal = self.thickness[panel], self._patches[panel], self._normal(panel)
+        lift = self._levels[panel] * normal
         parts = [
-            triangle(self.mesh.vertices[self.mesh.triangles[t]], self.density[panel] * thick * self.area[t], thick)
+            triangle(
+                self.mesh.vertices[self.mesh.triangles[t]] + lift, self.density[panel] * thick * self.area[t], thick
+            )
             for t in self._triangles_of(panel)
         ]
         if patch:
-            middle = patch["centre"] + patch["side"] * 0.5 * (thick + patch["thickness"]) * normal
+            middle = patch["centre"] + lift + patch["side"] * 0.5 * (thick + patch["thickness"]) * normal
             parts.append(rectangle(middle, patch["size"], patch["thickness"], normal, self._patch_mass(patch)))
         return _together(parts)
 
@@ -276,8 +280,10 @@ class Masses(Statements):
             parts: list[tuple[float, np.ndarray, np.ndarray]] = [
                 (mass, centre, spread + mass * np.outer(centre, centre))
             ]
+            lift = self._levels[panel] * self._normal(panel)
             for n in self._nodes_of(panel):  # a mass on a crease is the first panel's
-                parts.append((float(left[n]), x[n], left[n] * np.outer(x[n], x[n])))
+                at = x[n] + lift
+                parts.append((float(left[n]), at, left[n] * np.outer(at, at)))
                 left[n] = 0.0
             parts += [(m, at, m * np.outer(at, at)) for p, m, at in self._points if p == panel]
             mass, centre, spread = _together(parts)

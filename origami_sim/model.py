@@ -43,7 +43,8 @@ class Model:
         names: labels by family ("crease", "panel", "contact", "node"), for reports.
         channels: recorded channels that errors of the measurement tell apart; 1: the same for all.
         panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, see `bodies.rigid`).
-        carriers: panels of the last nodes, which stand for the mass of rigid panels and are corners of no triangle.
+        carriers: panels of the last nodes, which are corners of no triangle: they stand for the mass of rigid panels,
+            or belong to hinges off their middle planes.
         pad_triangles: [4 Q] triangles that carry the corners of patches, of those that can touch other parts.
         pad_weights: [4 Q, 3] barycentric weights of these corners. pad_heights: [4 Q] of the patches' middle planes
             above the panels' [m]. pad_thickness: [Q] [m].

@@ -6,7 +6,7 @@ from ..errors import InputError
 from .build import cross, grid, kresling, miura, strip, waterbomb
 from .crease_pattern import ASSIGNMENTS, Pattern
 from .fold import read_fold, write_fold
-from .mesh import read_mesh, sheet, uncreased, write_mesh
+from .mesh import cut, read_mesh, sheet, uncreased, write_mesh
 from .svg import read_svg
 from .topology import open_cuts
 from .triangulate import Triangulation, hinge_angles, triangulate
@@ -16,6 +16,7 @@ __all__ = [
     "Pattern",
     "Triangulation",
     "cross",
+    "cut",
     "grid",
     "hinge_angles",
     "kresling",

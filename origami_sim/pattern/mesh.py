@@ -12,6 +12,7 @@ from .crease_pattern import Pattern
 from .files import read_bytes, write_atomic
 from .polygon import clip_ears, project
 from .sizing import metres_of
+from .topology import edge_key, sides_of_edges
 from .triangulate import hinge_angles, triangulate
 from .units import metres_per
 
@@ -108,6 +109,32 @@ def uncreased(pattern: Pattern) -> Pattern:
     for e in pattern.edges_assigned("U"):
         out.assignments[e], out.fold_angles[e] = "F", 0.0
     out.notes = [note for note in pattern.notes if "without an assignment" not in note]
+    return out
+
+
+def cut(pattern: Pattern, edges) -> Pattern:
+    """Return the pattern with slits: the sheet parts along these edges, whose ends stay joined within the sheet.
+
+    Args:
+        edges: their indices, or pairs of vertices.
+
+    Raises:
+        InputError: no such edge, or one on the border.
+    """
+    out, found = replace(pattern, assignments=list(pattern.assignments), fold_angles=pattern.fold_angles.copy()), {}
+    for e, (a, b) in enumerate(pattern.edges.tolist()):
+        found[edge_key(a, b)] = e
+    sides = sides_of_edges(pattern.faces)
+    for edge in edges:
+        e = found.get(edge_key(*map(int, edge)), -1) if np.ndim(edge) else int(edge)
+        if not 0 <= e < pattern.edge_count or len(sides.get(edge_key(*pattern.edges[e].tolist()), ())) < 2:
+            raise InputError(
+                "only an edge between two panels can be cut",
+                field="edges",
+                value=[*map(int, edge)] if np.ndim(edge) else e,
+                allowed=f"0 to {pattern.edge_count - 1}, or two vertices of an inner edge",
+            )
+        out.assignments[e], out.fold_angles[e] = "C", np.nan
     return out
 
 

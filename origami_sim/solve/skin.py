@@ -50,7 +50,7 @@ class Surface:
 
 def surface(model: Model) -> Surface:
     """The surface of a model."""
-    whole = (model.triangles, model.triangle_panel, model.pad_triangles)
+    whole = (model.triangles, model.triangle_panel, model.pad_triangles, _links(model))
     real = (model.position, model.pad_weights, model.pad_heights, model.pad_thickness)
     given = [np.asarray(a, np.int32).tobytes() for a in whole], [np.asarray(a, float).tobytes() for a in real]
     return _surface(*map(tuple, given))
@@ -58,7 +58,7 @@ def surface(model: Model) -> Surface:
 
 @functools.lru_cache(maxsize=16)
 def _surface(whole: tuple[bytes, ...], real: tuple[bytes, ...]) -> Surface:
-    triangles, panels, carried = (np.frombuffer(a, np.int32) for a in whole)
+    triangles, panels, carried, links = (np.frombuffer(a, np.int32) for a in whole)
     nodes, weights, lift, thickness = (np.frombuffer(a, float) for a in real)
     nodes, weights, triangles = nodes.reshape(-1, 3), weights.reshape(-1, 3), triangles.reshape(-1, 3)
     carrier = triangles[carried].reshape(-1, 3)
@@ -77,7 +77,7 @@ def _surface(whole: tuple[bytes, ...], real: tuple[bytes, ...]) -> Surface:
     return Surface(
         corners=corners,
         owned=_owned(corners),
-        body=_bodies(triangles, len(nodes))[home],
+        body=_bodies(triangles, len(nodes), links.reshape(-1, 2))[home],
         home=home,
         tree=tree,
         beyond=beyond,
@@ -227,11 +227,22 @@ def _owned(corners: np.ndarray) -> np.ndarray:
     return out
 
 
-def _bodies(corners: np.ndarray, nodes: int) -> np.ndarray:
-    """Number of the body that each triangle belongs to: triangles that share a node are one."""
+def _links(model: Model) -> np.ndarray:
+    """[C, 2] a corner of each panel beside a crease that has nodes of its own, see `thick`; else none."""
+    corners = len(model.position) - len(model.carriers)
+    if not len(model.creases) or model.creases.min() < corners:
+        return np.zeros((0, 2), np.int32)
+    panels, first = np.unique(model.triangle_panel, return_index=True)
+    beside = model.carriers[model.creases[:, [0, 3]] - corners]
+    return model.triangles[first[np.searchsorted(panels, beside)], 0].astype(np.int32)
+
+
+def _bodies(corners: np.ndarray, nodes: int, links: np.ndarray) -> np.ndarray:
+    """Number of the body that each triangle belongs to: those that share a node, or a link [L, 2] of nodes, are one."""
     if not len(corners):
         return np.zeros(0, np.int32)
-    one, other = np.repeat(corners[:, 0], 2), corners[:, 1:].ravel()
+    one = np.concatenate([np.repeat(corners[:, 0], 2), links[:, 0]])
+    other = np.concatenate([corners[:, 1:].ravel(), links[:, 1]])
     joined = sp.coo_array((np.ones(len(one)), (one, other)), shape=(nodes, nodes))
     return connected_components(joined, directed=False)[1][corners[:, 0]].astype(np.int32)
 

@@ -42,6 +42,13 @@ def test_the_effect_of_the_how_to_is_one(tmp_path):
     assert isinstance(module.EFFECT, Effect) and module.EFFECT.fitted == ("coefficient",)
 
 
+def test_thick_panels_stop_where_their_page_says(capsys):
+    page = "docs/how-to/thick-panels.md"
+    exec(compile(code(page), page, "exec"), {})
+    said = re.search(r"```\n(top.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    assert said is not None and capsys.readouterr().out == said[1]
+
+
 @pytest.mark.parametrize(
     "page", ["README.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
 )
