@@ -28,7 +28,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, recast
 
 UNFITTED = 0.05
-"""Posterior of a set up to which it is not worth a fit: what is sure and what is listed holds ten times as much."""
+"""Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
 
 FAR = 1.5
 """Root mean square over the noise that the best set leaves, above which further sets are fitted whatever is expected.
