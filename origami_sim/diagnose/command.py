@@ -278,7 +278,7 @@ def _earlier(folder: Path) -> list[str] | None:
     """Recordings of the diagnosis in a folder, none if it is empty or was interrupted; None: things of others."""
     try:
         found = json.loads((folder / JSON).read_text())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):  # not there, no JSON, nested deeply
         found = None
     if isinstance(found, dict) and "verdict" in found and isinstance(found.get("recordings"), list):
         return [str(name) for name in found["recordings"]]
