@@ -289,7 +289,8 @@ def _run(args) -> int:
     from origami_sim.results import check_writable
     from origami_sim.scene import scene_settings
 
-    pattern = Path(args.scene).suffix.lower() in PATTERNS
+    given = Path(args.scene)
+    pattern = given.suffix.lower() in PATTERNS or (given.suffix.lower() not in (".py", ".toml", "") and given.is_file())
     module = import_module("origami_sim.folding.command") if pattern else device_module(args.scene)
     name = Path(args.scene).stem if pattern else module.__name__.rpartition(".")[2]
     if pattern:

@@ -171,6 +171,8 @@ def _sheet(data: Mapping[str, Any], path: Path) -> Sheet:
     for key in ("pattern", "sheet"):
         if not isinstance(data.get(key), dict):
             raise InputError(f"a design needs a {key}", file=path, field=key, allowed=f"{key} = {{ ... }}")
+    if "pattern" in data["sheet"]:
+        raise InputError("a pattern is no argument of the sheet", file=path, field="sheet.pattern", allowed="[pattern]")
     sheet = called(Sheet, {"pattern": _pattern(data["pattern"], path), **data["sheet"]}, "sheet", path)
     for number, entry in enumerate(_list(data.get("statements", []), path), 1):
         name, arguments = next(iter(entry.items()))

@@ -54,7 +54,7 @@ def called(function: Callable, arguments: Any, field: str, path: Path) -> Any:
     positional = given.pop(listed, ()) if listed else ()
     try:
         return function(*positional, **given)
-    except (TypeError, ValueError, IndexError) as e:
+    except (TypeError, ValueError, LookupError, AttributeError) as e:  # a value of another type than its own
         if isinstance(e, InputError):
             raise
         raise InputError(f"cannot be stated so ({e})", file=path, field=field, value=arguments) from None
