@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
-PATTERNS = (".svg", ".fold", ".obj", ".stl")
+PATTERNS = (".svg", ".fold", ".cp", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -54,8 +54,8 @@ class _Bar:
 
 
 _DIAGNOSE_HELP = """\
-writes report.html, diagnosis.json, patched.toml (for run --calibration, and for --model) and a replay; data and patch
-as soon as the verdict stands. Interrupted, the same command goes on where it stopped.
+writes report.html, diagnosis.json, patched.toml (for --calibration; of a scene for --model, too) and a replay; data and
+patch as soon as the verdict stands. Interrupted, the same command goes on where it stopped.
 
 exit codes: 10 ADEQUATE (nothing is found missing), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
 makes the difference), 13 MECHANISM (an effect is missing), 14 TIE (several explain it alike), 15 SEVERAL (more than one
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     p = command("run", _run, summary, "origami-sim run box --set gap=2.54mm; origami-sim run crane.svg --set size=15cm")
     names = ", ".join(import_module("origami_sim.scenes").NAMES)
     yours = "or a device of yours: my_flap.py, package.module:build, my_flap.toml"
-    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold); {yours}")
+    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold, .cp); {yours}")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (with unit)")
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
@@ -130,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("recording", help="CSV or Parquet file")
     what = "scene or device that models what was recorded: pendulum_chain, my_flap.py"
-    p.add_argument("--scene", "--model", required=True, metavar="SCENE", help=what)
+    p.add_argument("--scene", "--model", metavar="SCENE", help=f"{what} (default: what the sidecar names)")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
@@ -150,7 +150,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.epilog = f"{p.epilog}\n\n{_DIAGNOSE_HELP}"
     p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
-    p.add_argument("--model", required=True, metavar="SCENE", help="a scene, its calibration (TOML), or my_flap.py")
+    what = "a scene, its calibration (TOML), or my_flap.py (default: what the sidecar names)"
+    p.add_argument("--model", metavar="SCENE", help=what)
+    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a device")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
@@ -287,7 +289,8 @@ def _run(args) -> int:
     from origami_sim.results import check_writable
     from origami_sim.scene import scene_settings
 
-    pattern = Path(args.scene).suffix.lower() in PATTERNS
+    given = Path(args.scene)
+    pattern = given.suffix.lower() in PATTERNS or (given.suffix.lower() not in (".py", ".toml", "") and given.is_file())
     module = import_module("origami_sim.folding.command") if pattern else device_module(args.scene)
     name = Path(args.scene).stem if pattern else module.__name__.rpartition(".")[2]
     if pattern:
@@ -348,19 +351,24 @@ def _compare(args) -> int:
     from origami_sim.device import device_module
     from origami_sim.recording import read_recording
     from origami_sim.results import check_writable
-    from origami_sim.scene import check_recorded_scene, scene_settings
+    from origami_sim.scene import check_recorded_scene, recorded_model, scene_settings
 
-    module = device_module(args.scene)
-    scene = module.__name__.rpartition(".")[2]
-    if not hasattr(module, "replicate"):
-        allowed = "pendulum_chain, or a device of yours"
-        raise InputError("this scene cannot replicate a recording", field="--scene", value=args.scene, allowed=allowed)
     for name in ("duration", "threshold"):
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
+    module = None if args.scene is None else device_module(args.scene)  # a wrong name is told before files are read
+    recording = None
+    if module is None:
+        recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+        module = device_module(recorded_model(recording, "--scene"))
+    scene = module.__name__.rpartition(".")[2]
+    if not hasattr(module, "replicate"):
+        allowed = "pendulum_chain, or a device of yours"
+        raise InputError("this scene cannot replicate a recording", field="--scene", value=scene, allowed=allowed)
     settings = scene_settings(module).override(args.set, "--set")
-    recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+    if recording is None:
+        recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
     check_recorded_scene(recording, scene, "origami-sim diagnose --model")
     duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")

@@ -18,7 +18,6 @@
 are those of the builders of patterns and of the statements of `Sheet`.
 """
 
-import inspect
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,7 +28,8 @@ import numpy as np
 
 from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
-from origami_sim.drive import CHANNELS, Drive, Signal, ramp, series, sine
+from origami_sim.drive import CHANNELS, Drive, Signal
+from origami_sim.drive_file import as_table, called, check_known, read_drive
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import write_text
 from origami_sim.model import Model, Parameters
@@ -37,7 +37,7 @@ from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.quantities import converted
-from origami_sim.sources import NUMBERS, STRENGTHS, coil, coil_pair, dipole, field_table, magnet
+from origami_sim.sources import NUMBERS, STRENGTHS
 
 _KEYS = ("about", "pattern", "sheet", "statements", "model", "names", "parameters", "drive", "run")
 _BUILDERS: dict[str, Callable[..., Pattern]] = {
@@ -49,7 +49,6 @@ _STATEMENTS = (
     *("on", "set", "crease", "yields", "shell", "panel", "patch", "magnetise", "soften", "fix", "name"),
     *("gravity", "body", "mass", "point_mass", "contact", "feet", "ground", "touch", "electrode", "hinge", "mitre"),
 )
-_WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
 
 
 @dataclass
@@ -104,12 +103,12 @@ def read_design(path: str | Path) -> Design:
             raise InputError(f"unknown key{nearest(key, _KEYS)}", file=path, field=key, allowed=", ".join(_KEYS))
     try:
         source = read_model(data, path) if "model" in data else _sheet(data, path)
-        run = _table(data.get("run", {}), "run", path)
+        run = as_table(data.get("run", {}), "run", path)
         for key in run:
-            _check(key, ("duration", "rate"), "run", path)
+            check_known(key, ("duration", "rate"), "run", path)
         return Design(
             source,
-            _drive(_table(data.get("drive", {}), "drive", path), path),
+            read_drive(as_table(data.get("drive", {}), "drive", path), path),
             float(converted(run.get("duration", 0.0), "s", "run.duration")),
             float(converted(run.get("rate", 60.0), "Hz", "run.rate")),
             str(data.get("about", "")),
@@ -168,21 +167,17 @@ def write_design(
 # reading --------------------------------------------------------------------------------------------------------------
 
 
-def _table(value: Any, key: str, path: Path) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError("is a table", file=path, field=key, value=value, allowed="{ name = value, ... }")
-    return value
-
-
 def _sheet(data: Mapping[str, Any], path: Path) -> Sheet:
     for key in ("pattern", "sheet"):
         if not isinstance(data.get(key), dict):
             raise InputError(f"a design needs a {key}", file=path, field=key, allowed=f"{key} = {{ ... }}")
-    sheet = _called(Sheet, {"pattern": _pattern(data["pattern"], path), **data["sheet"]}, "sheet", path)
+    if "pattern" in data["sheet"]:
+        raise InputError("a pattern is no argument of the sheet", file=path, field="sheet.pattern", allowed="[pattern]")
+    sheet = called(Sheet, {"pattern": _pattern(data["pattern"], path), **data["sheet"]}, "sheet", path)
     for number, entry in enumerate(_list(data.get("statements", []), path), 1):
         name, arguments = next(iter(entry.items()))
-        _check(name, _STATEMENTS, f"statements[{number}]", path)
-        _called(getattr(sheet, name), arguments, f"statements[{number}].{name}", path)
+        check_known(name, _STATEMENTS, f"statements[{number}]", path)
+        called(getattr(sheet, name), arguments, f"statements[{number}].{name}", path)
     return sheet
 
 
@@ -195,35 +190,6 @@ def _list(value: Any, path: Path) -> list[dict[str, Any]]:
             allowed="[ { crease = { stiffness = ... } }, ... ]",
         )
     return value
-
-
-def _check(name: str, known, field: str, path: Path) -> None:
-    if name not in known:
-        raise InputError(
-            f"there is no such thing{nearest(name, known)}", file=path, field=field, value=name,
-            allowed=", ".join(known),
-        )  # fmt: skip
-
-
-def _called(function: Callable, arguments: Any, field: str, path: Path) -> Any:
-    """A function with arguments of a file; those that it does not have are refused."""
-    given = dict(_table(arguments, field, path))
-    parameters = inspect.signature(function).parameters
-    free = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
-    listed = next((n for n, p in parameters.items() if p.kind is p.VAR_POSITIONAL), None)
-    for name in given:
-        if not free:
-            _check(name, parameters, field, path)
-    for name, p in parameters.items():
-        if p.default is p.empty and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL) and name not in given:
-            raise InputError("lacks a value", file=path, field=f"{field}.{name}")
-    positional = given.pop(listed, ()) if listed else ()
-    try:
-        return function(*positional, **given)
-    except (TypeError, ValueError, IndexError) as e:
-        if isinstance(e, InputError):
-            raise
-        raise InputError(f"cannot be stated so ({e})", file=path, field=field, value=arguments) from None
 
 
 def _pattern(given: dict[str, Any], path: Path) -> Pattern:
@@ -253,70 +219,15 @@ def _pattern(given: dict[str, Any], path: Path) -> Pattern:
             allowed=", ".join([*_BUILDERS, "fold", "vertices"]),
         )
     name, arguments = next(iter(given.items()))
-    _check(name, _BUILDERS, "pattern", path)
-    values = _table(arguments, f"pattern.{name}", path)
+    check_known(name, _BUILDERS, "pattern", path)
+    values = as_table(arguments, f"pattern.{name}", path)
     in_si = {n: converted(v, "rad" if n in _ANGLES else "m", f"pattern.{name}.{n}") for n, v in values.items()}
-    return _called(_BUILDERS[name], in_si, f"pattern.{name}", path)
+    return called(_BUILDERS[name], in_si, f"pattern.{name}", path)
 
 
 def _check_all(given: Mapping[str, Any], known: tuple[str, ...], path: Path) -> None:
     for name in given:
-        _check(name, known, "pattern", path)
-
-
-_SOURCES = {"dipole": dipole, "coil": coil, "coil_pair": coil_pair, "magnet": magnet, "table": field_table}
-
-
-def _source(entry: Any, number: int, path: Path) -> Any:
-    """One source, { coil = { ... } }; the file of a table is beside the design."""
-    field = f"drive.sources[{number}]"
-    if not isinstance(entry, dict) or len(entry) != 1:
-        raise InputError("is no source", file=path, field=field, value=entry, allowed="{ coil = { ... } }")
-    kind, arguments = next(iter(entry.items()))
-    _check(kind, _SOURCES, field, path)
-    given = dict(_table(arguments, f"{field}.{kind}", path))
-    strength, unit = STRENGTHS.get(kind, ("current", "A"))
-    units = {strength: unit, "position": "m", "radius": "m", "length": "m", "axis": "1"}
-    for name, unit in units.items():
-        if isinstance(given.get(name), list):
-            given[name] = [_wave(v, unit, f"{field}.{name}", path) for v in given[name]]
-        elif isinstance(given.get(name), dict):
-            given[name] = _wave(given[name], unit, f"{field}.{name}", path)
-    if "file" in given:
-        given["table"] = path.parent / str(given.pop("file"))
-    return _called(_SOURCES[kind], given, f"{field}.{kind}", path)
-
-
-def _drive(given: dict[str, Any], path: Path) -> Drive:
-    listed = given.get("sources", [])
-    if not isinstance(listed, list):
-        raise InputError("sources are a list", file=path, field="drive.sources", allowed="[ { coil = { ... } }, ... ]")
-    sources = [_source(entry, n, path) for n, entry in enumerate(listed, 1)]
-    given = {n: v for n, v in given.items() if n != "sources"}
-    groups = [int(n.removeprefix("voltage_")) for n in given if n.removeprefix("voltage_").isdecimal()]
-    drive = Drive(voltage=[0.0] * (max(groups, default=0) + 1), sources=sources)
-    units = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1"}
-    signals = {}
-    for name, value in given.items():
-        _check(name, drive.signals, "drive", path)
-        unit = units[name.partition("_")[0]]
-        signals[name] = _wave(value, unit, f"drive.{name}", path)
-    return drive.replace(**signals)
-
-
-def _wave(value: Any, unit: str, field: str, path: Path) -> Any:
-    if not isinstance(value, dict):
-        return converted(value, unit, field)
-    for kind, (wave, first) in _WAVES.items():
-        if kind in value:
-            rest = {n: converted(v, unit, field) if n in ("start", "offset") else v for n, v in value.items()}
-            amount = converted(rest.pop(kind), unit, field)
-            return _called(wave, {first: amount, **rest}, field, path)
-    if "times" in value and set(value) <= {"times", "values", "scale"}:
-        values = converted(value.get("values", []), unit, field)
-        return _called(series, {**value, "values": values}, field, path)
-    whole = {n: converted(v, unit, field) if n in ("offset", "amplitude") else v for n, v in value.items()}
-    return _called(Signal, whole, field, path)
+        check_known(name, known, "pattern", path)
 
 
 # writing --------------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ Nothing is executed but a file or module that the user names: a sidecar only say
 import importlib
 import importlib.util
 import inspect
+import os
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -30,6 +31,7 @@ from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters
 from origami_sim.quantities import ANY, Quantity, converted, parsed
 from origami_sim.recording import Recording, applied_drive
+from origami_sim.recording.placed import surrounded
 from origami_sim.scene import (
     NAMES,
     Outcome,
@@ -81,10 +83,16 @@ def device_module(given: str) -> ModuleType:
             raise InputError("there is no such device file", file=path)
         return _of(_executed(path), path, path.stem, function or "build")
     if function:
+        if os.getcwd() not in sys.path:  # a module here is one, after everything installed
+            sys.path.append(os.getcwd())
         try:
             found = importlib.import_module(place)
-        except ImportError as e:
+        except (ImportError, ValueError) as e:
             raise InputError(f"the module cannot be imported ({e})", field="device", value=place) from None
+        except Exception as e:  # the module's own code
+            raise InputError(
+                f"the module cannot be imported ({type(e).__name__}: {e})", field="device", value=place
+            ) from e
         return _of(found, Path(found.__file__ or place), place.rpartition(".")[2], function)
     beside = f"; '{given}.py' is here, and named with its suffix" if Path(f"{given}.py").is_file() else ""
     raise InputError(
@@ -185,7 +193,9 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
         model, parameters, drive, *_ = out.build(s)
         rate = round(1.0 / float(np.median(np.diff(recording.times))))
         duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
-        stated = {n: v for n, v in applied_drive(recording).signals.items() if not v.is_zero}
+        applied = applied_drive(recording)
+        stated = {n: applied[n] for n in applied.levels if not applied[n].is_zero and not n.startswith("source_")}
+        drive = surrounded(drive, recording)
         lasts = {"duration": duration, "rate": rate}
         return motion_of(s, model, parameters, drive.replace(**stated), **lasts, progress=progress), s
 

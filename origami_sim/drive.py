@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,6 +107,11 @@ class Signal:
             t = t[..., 0]
         return np.stack([np.interp(t, self.times, column) for column in self.values.T], axis=-1)
 
+    def seen_from(self, start: float) -> "Signal":
+        """The same signal on a clock that shows 0 at `start` [s] of this one."""
+        phase = self.phase + 2 * math.pi * np.asarray(self.frequency) * start
+        return replace(self, phase=phase, times=None if self.times is None else self.times - start)
+
     def sampled(self, duration: float) -> np.ndarray:
         """Times (n,) from 0 to `duration` [s], fine enough for the wave and with the series' own."""
         fastest = float(np.max(np.abs(self.frequency) * (np.asarray(self.amplitude) != 0)))
@@ -200,6 +205,9 @@ class Drive:
         units = [*["T"] * 3, *["T/m"] * 9, "K", "1", "s", *["V"] * len(voltages)]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
         self.signals = {n: as_signal(v, u) for n, v, u in zip(names, values, units, strict=True)}
+        self._place(sources)
+
+    def _place(self, sources: Sequence["Source | Sequence[Source]"]) -> None:
         if sources:
             from origami_sim.sources import NUMBERS, flattened  # which need signals
 
@@ -226,6 +234,18 @@ class Drive:
         out = object.__new__(Drive)
         out.signals, out.grid, out.placed = dict(signals), self.grid, self.placed
         return out
+
+    def with_sources(self, sources: Sequence["Source | Sequence[Source]"]) -> "Drive":
+        """The same channels with these sources of a field in place of its own."""
+        out = self.with_signals({n: s for n, s in self.signals.items() if not n.startswith("source_")})
+        out.placed = ()
+        out._place(sources)
+        return out
+
+    @property
+    def levels(self) -> list[str]:
+        """Channels that say how strong something is, and not where a source is, how large, or how old the device."""
+        return [n for n in self.signals if n != "origin" and (n[:7] != "source_" or n.endswith("_strength"))]
 
     @property
     def fingerprint(self) -> bytes:

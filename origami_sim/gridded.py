@@ -287,6 +287,8 @@ def _read_csv(cls, path: Path) -> FieldTable:
 
 def _gridded(cls, columns: np.ndarray, path: Path) -> FieldTable:
     """The table of rows x, y, z, Bx, By, Bz in any order."""
+    if not len(columns):
+        raise InputError("a table of a field needs rows", file=path, allowed=f">= {LEAST} places along each axis")
     if not np.isfinite(columns[:, :3]).all():
         row = int(np.argmin(np.isfinite(columns[:, :3]).all(axis=1)))
         raise InputError("a row has no place", file=path, field=f"row {row + 2}", allowed="numbers for x, y and z")

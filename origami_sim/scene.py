@@ -428,15 +428,44 @@ def scene_module(name: str) -> ModuleType:
 
 def check_recorded_scene(recording: "Recording", scene: str, option: str) -> None:
     """Refuses a recording of which the sidecar says that it is of another scene; `option` would take that one."""
-    stated = (recording.metadata.get("scene") or {}).get("name")
+    found = recording.metadata.get("scene") or {}
+    stated = found.get("name")
     if stated is not None and stated != scene:
         raise InputError(
             "the recording is of another scene",
             file=recording.metadata.get("sidecar"),
             field="scene.name",
             value=stated,
-            allowed=f"{option} {stated}, or a sidecar for {scene}",
+            allowed=f"{option} {found.get('stated') or stated}, or a sidecar for {scene}",
         )
+
+
+def recorded_model(recording: "Recording", option: str) -> str:
+    """The scene or design file that the sidecar of a recording names, for who names none with `option`.
+
+    Raises:
+        InputError: it names none, or one of Python code: that is executed only if the user names it.
+    """
+    sidecar = recording.metadata.get("sidecar")
+    stated = (recording.metadata.get("scene") or {}).get("stated")
+    if stated is None:
+        allowed = f"a scene ({', '.join(NAMES)}), my_flap.py, or model = ... in the sidecar"
+        raise InputError(
+            "neither the command nor the sidecar names a model", file=sidecar, field=option, allowed=allowed
+        )
+    if stated in NAMES:
+        return stated
+    beside = Path(str(sidecar)).parent / stated
+    if stated.endswith(".toml"):  # a design, in which nothing is executed
+        return str(beside)
+    named = stated if re.search(r"(?<!\.py):\w+$", stated) else str(beside)
+    raise InputError(
+        "the model is Python code, which is executed only if you name it yourself",
+        file=sidecar,
+        field="model",
+        value=stated,
+        allowed=f"{option} {named}",
+    )
 
 
 def extended(build: Callable) -> Callable:

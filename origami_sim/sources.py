@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,10 @@ class Source:
     kind: str
     numbers: tuple[Signal, ...]
     table: FieldTable | None = None
+
+    def seen_from(self, start: float) -> "Source":
+        """The same source on a clock that shows 0 at `start` [s] of this one."""
+        return replace(self, numbers=tuple(s.seen_from(start) for s in self.numbers))
 
 
 def dipole(moment: Value, *, position: Vector = (0, 0, 0), axis: Vector = (0, 0, 1)) -> Source:

@@ -369,3 +369,50 @@ def test_a_bad_model_is_one_sentence(old, new, said, tmp_path):
     with pytest.raises(InputError, match=said) as e:
         read_design(path)
     assert str(e.value).startswith(str(path))
+
+
+# models that a sidecar names -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("stated", "option"), [("my_flap.py", "my_flap.py"), ("my_flap:build", "my_flap:build")])
+def test_code_that_only_a_sidecar_names_is_not_executed(flap, call, tmp_path, stated, option):
+    record(tmp_path)
+    (tmp_path / "my_flap.py").write_text("raise SystemExit(99)")
+    side = (tmp_path / "swing.toml").read_text().replace('name = "my_flap.py"\n', "")
+    (tmp_path / "swing.toml").write_text(f'model = "{stated}"\n{side}')
+    for command in ("compare", "diagnose"):
+        code, _, err = call(command, "swing.csv")
+        assert code == 2 and "executed only if you name it" in err and option in err and err.count("\n") == 1
+
+
+def test_a_module_here_is_found_by_its_function(flap, call, tmp_path):
+    record(tmp_path, "my_flap:build")
+    code, out, err = call("compare", "swing.csv", "--model", "my_flap:build", "--duration", "0.1")
+    assert (code, err) == (0, "") and "hinge" in out
+
+
+def test_a_sidecar_that_names_no_model_says_what_is_missing(flap, call, tmp_path):
+    record(tmp_path)
+    side = (tmp_path / "swing.toml").read_text().replace('name = "my_flap.py"\n', "")
+    (tmp_path / "swing.toml").write_text(side)
+    code, _, err = call("compare", "swing.csv")
+    assert code == 2 and "neither the command nor the sidecar names a model" in err
+
+
+def test_a_pattern_is_no_argument_of_the_sheet(tmp_path):
+    file = tmp_path / "a.toml"
+    file.write_text(
+        'pattern = { strip = { lengths = [0.01], width = 0.01 } }\nsheet = { thickness = 1e-3, pattern = "x" }'
+    )
+    with pytest.raises(InputError, match=r"sheet\.pattern"):
+        read_design(file)
+
+
+def test_the_age_of_a_device_is_a_channel_of_a_design(tmp_path):
+    file = tmp_path / "a.toml"
+    text = "pattern = { strip = { lengths = [0.01, 0.01], width = 0.01 } }\nsheet = { thickness = 1e-3 }\n[drive]\n"
+    file.write_text(text + 'origin = "1 min"\n')
+    assert read_design(file).drive["origin"](0.0) == pytest.approx(60.0)
+    file.write_text(text + "source_0_x = 1\n")
+    with pytest.raises(InputError, match="source_0_x"):
+        read_design(file)

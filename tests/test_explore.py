@@ -368,3 +368,11 @@ def test_a_bad_sweep_is_one_sentence(call, tmp_path, given, said):
     code, _, err = call("sweep", "my_flap.py", "--vary", given)
     assert code == 2 and said in err and err.count("\n") == 1
     assert not (tmp_path / "runs").exists()
+
+
+def test_what_a_sweep_kept_may_be_damaged(tmp_path):
+    from origami_sim.explore.sweep import ROWS, _Kept
+
+    good = b'{"key": "a", "row": {"x": 1.0}}\n'
+    (tmp_path / ROWS).write_bytes(good + b"[" * 100_000 + b'\n\xff\n{"key": "b", "row": 3}\n[1]\n')
+    assert _Kept(tmp_path).rows == {"a": {"x": 1.0}}

@@ -36,6 +36,7 @@ from origami_sim.scene import (
     Settings,
     check_recorded_scene,
     read_calibration,
+    recorded_model,
     scene_module,
     scene_settings,
     settings_of,
@@ -51,8 +52,10 @@ def run(args: Namespace) -> int:
     """The command; returns the verdict's exit code."""
     say = (lambda *_, **__: None) if args.json else print
     folder = Path(args.out or "runs/diagnose")
-    _check_folder(folder, args.model)
+    _check_folder(folder)
     data = read_recordings(args.recordings, args.sidecar)
+    given = args.model or recorded_model(data[0], "--model")
+    _check_model(folder, given)
     replaced = _earlier(folder)
     if replaced and set(replaced) != {r.name for r in data}:
         say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
@@ -60,10 +63,11 @@ def run(args: Namespace) -> int:
         say(lint_report(recording))
     for note in data.notes:
         say(f"note: {note}")
-    module, settings = model_of(args.model, data)
+    module, settings = model_of(given, data)
+    settings = settings if args.calibration is None else scene_settings(module, args.calibration)
     name = module.__name__.rpartition(".")[2]
     overrides = _overrides(data, name)
-    if overrides and args.model.endswith(".toml"):
+    if overrides and given.endswith(".toml"):
         say("note: the sidecar's overrides are left out: --model states the numbers of this object itself.")
     else:
         settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
@@ -88,7 +92,7 @@ def run(args: Namespace) -> int:
     options = replace(_options(args, settings), possible=getattr(module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
     keep, progress = Keep(folder / RESUME), Progress()
-    files = keep.write = Files(folder, settings, name, keep)
+    files = keep.write = Files(folder, settings, given if is_device(given) else name, keep)
     try:
         with ending_as_interrupted():
             found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
@@ -105,7 +109,7 @@ def run(args: Namespace) -> int:
     if args.json:
         print(json.dumps(_summary(found, files.made), allow_nan=False))
     else:
-        print("\n".join(_text(found, files.made)))
+        print("\n".join(_text(found, files.made, files.scene)))
     return found.exit_code
 
 
@@ -145,7 +149,8 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
     Raises:
         InputError: no such scene, a calibration of none, a sidecar that names another scene or none that exists.
     """
-    stated = (data[0].metadata.get("scene") or {}).get("name")
+    found = data[0].metadata.get("scene") or {}
+    stated = found.get("name")
     if is_device(given):
         module = device_module(given)
         check_recorded_scene(data[0], module.__name__, "--model")
@@ -155,7 +160,7 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
             "the sidecar's scene does not exist",
             file=data[0].metadata.get("sidecar"),
             field="scene.name",
-            value=stated,
+            value=found["stated"],
             allowed=f"{', '.join(NAMES)}; or a device that --model names by its file, {stated}.py",
         )
     if not given.endswith(".toml"):
@@ -240,9 +245,16 @@ def _options(args: Namespace, settings: Settings) -> Options:
     return replace(options, motion=motion, panels=args.panels, segment=args.segment, start=args.start_at)
 
 
-def _check_folder(folder: Path, model: str) -> None:
-    """Refuses, before anything is computed, a folder that cannot be written, or whose patch is the model itself,
-    or that holds other things than a diagnosis."""
+def _check_model(folder: Path, model: str) -> None:
+    """Refuses a folder whose patch is the model itself."""
+    if Path(model).resolve() == (folder / PATCH).resolve():
+        raise InputError(
+            "the model would be overwritten", file=model, field="--out", value=str(folder), allowed="another folder"
+        )
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuses, before anything is computed, a folder that cannot be written or that holds other things."""
     allowed = "a folder that can be written"
     try:
         existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
@@ -253,10 +265,6 @@ def _check_folder(folder: Path, model: str) -> None:
         raise InputError(fault, file=folder, field="--out", allowed=allowed) from None
     if not existing.is_dir():
         raise InputError("is a file", file=existing, field="--out", allowed=allowed)
-    if Path(model).resolve() == (folder / PATCH).resolve():
-        raise InputError(
-            "the model would be overwritten", file=model, field="--out", value=str(folder), allowed="another folder"
-        )
     if _earlier(folder) is None:
         raise InputError(
             "is a folder with other things in it, not a diagnosis",
@@ -270,7 +278,7 @@ def _earlier(folder: Path) -> list[str] | None:
     """Recordings of the diagnosis in a folder, none if it is empty or was interrupted; None: things of others."""
     try:
         found = json.loads((folder / JSON).read_text())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):  # not there, no JSON, nested deeply
         found = None
     if isinstance(found, dict) and "verdict" in found and isinstance(found.get("recordings"), list):
         return [str(name) for name in found["recordings"]]
@@ -317,7 +325,8 @@ class Files:
     replays and the patched calibration may fail; a note then says so.
 
     Attributes:
-        folder: where they are. made: those that are there: "data", "calibration", "report", and a list "replays".
+        folder: where they are. scene: what `run` calls the scene or device.
+        made: those that are there: "data", "calibration", "report", and a list "replays".
     """
 
     def __init__(self, folder: Path, settings: Settings, scene: str, keep: Keep):
@@ -416,7 +425,7 @@ def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
     }
 
 
-def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
+def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> list[str]:
     lines = ["", f"{d.verdict}: {d.sentence}", "", f"{'explanation':48s} {'probability':>11s} {'log odds':>9s}"]
     for c in d.candidates[:8]:
         if c.failed:
@@ -441,5 +450,5 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> list[str]:
     lines += [f"replay: origami-sim replay {r}" for r in replays]
     if "calibration" in files:
         far = "   (the closest explanation, which is not enough)" if d.verdict == "UNKNOWN" and d.patch else ""
-        lines.append(f"patched: origami-sim run {d.subject} --calibration {files['calibration']}{far}")
+        lines.append(f"patched: origami-sim run {scene} --calibration {files['calibration']}{far}")
     return [*lines, f"{sum(d.seconds.values()):.0f} s of computing"]

@@ -79,7 +79,7 @@ def _menu(forward: Rollouts, possible: Possible) -> list[Trial]:
             )
     if longer > 1.05 and forward.start == "fit":
         add(f"let it run {longer:.2g} times as long", stretch=longer)
-    varying = [n for d in forward.drives for n, s in d.signals.items() if not s.is_zero]
+    varying = [n for d in forward.drives for n in d.levels if not d[n].is_zero]
     if varying:
         names = ", ".join(sorted({n.split("_")[0] for n in varying}))
         for gain in possible.levels:
@@ -164,7 +164,7 @@ def _variant(
         values = np.zeros((len(times), b.values.shape[1]))
         out.blocks.append(replace(b, pose=pose, rates=rates, times=times, values=values, reach=None, lasting=0.0))
     if ring_down is not None:
-        out.drives = [d.replace(**{n: 0.0 for n in d.signals}) for d in forward.drives]
+        out.drives = [d.replace(**dict.fromkeys(d.levels, 0.0)) for d in forward.drives]
     if gain != 1.0 or speed != 1.0:
         out.drives = [_changed(d, gain, speed) for d in forward.drives]
     if held:
@@ -197,8 +197,8 @@ def _held(drive: Drive, span: float) -> Drive:
     """Every channel at the value of its that is furthest from zero, from the start on."""
     at = np.linspace(0.0, span, 1000)
     changed = {}
-    for name, s in drive.signals.items():
-        values = np.broadcast_to(np.squeeze(s(at)), at.shape)
+    for name in drive.levels:
+        values = np.broadcast_to(np.squeeze(drive[name](at)), at.shape)
         changed[name] = float(values[np.argmax(np.abs(values))])
     return drive.replace(**changed)
 
@@ -208,15 +208,15 @@ def _changed(drive: Drive, gain: float, speed: float) -> Drive:
     for name, s in drive.signals.items():
         if s.is_zero:
             continue
-        times = None if s.times is None else s.times / speed
+        times, factor = None if s.times is None else s.times / speed, gain if name in drive.levels else 1.0
         changed[name] = Signal(
-            offset=gain * np.asarray(s.offset),
-            amplitude=gain * np.asarray(s.amplitude),
+            offset=factor * np.asarray(s.offset),
+            amplitude=factor * np.asarray(s.amplitude),
             frequency=speed * np.asarray(s.frequency),
             phase=s.phase,
             times=times,
             values=s.values,
-            scale=gain * np.asarray(s.scale),
+            scale=factor * np.asarray(s.scale),
         )
         if times is not None and s.values is not None and speed > 1.0:  # a run must not outlast its drive: repeat it
             span = times[-1] - times[0]

@@ -15,6 +15,7 @@ from origami_sim.observe import _index, body_point
 from origami_sim.recording import Channel, Recording, by_component
 from origami_sim.recording.drives import UNITS
 from origami_sim.recording.units import quantity
+from origami_sim.sources import STRENGTHS
 
 BENT = 0.3
 """Fold [rad] of a second pose that is asked: flat creases may lie where a channel has an extremum."""
@@ -175,11 +176,13 @@ def assumed(recording: Recording, drive: Drive) -> list[str]:
     file = recording.metadata.get("sidecar")
     stated = {c for name, d in recording.drive.items() for c in by_component(name, d, file=file)}
     own = {}
-    for name, s in drive.signals.items():
-        if name not in stated and not s.is_zero:
+    units = UNITS | {f"source_{k}_strength": STRENGTHS[kind][1] for k, (kind, _) in enumerate(drive.placed)}
+    for name in drive.levels:
+        s = drive[name]
+        if name not in stated and not s.is_zero and not (recording.sources and name.startswith("source_")):
             sampled = 0.0 if s.values is None else np.abs(s.scale) * np.abs(s.values).max()
             largest = float(np.max(np.abs(s.offset) + np.abs(s.amplitude) + sampled))
-            own[name] = f"{name} up to {quantity(largest, UNITS[name.split('_')[0]])}"
+            own[name] = f"{name} up to {quantity(largest, units.get(name) or UNITS[name.split('_')[0]])}"
     if not own:
         return []
     return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]

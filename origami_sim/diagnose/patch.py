@@ -246,7 +246,7 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
     """Writes the calibration with refitted settings, their new uncertainty, and the missing effects switched on.
 
     Returns:
-        The file; `origami-sim run SCENE --calibration FILE` and `origami-sim diagnose ... --model FILE` read it.
+        The file; `origami-sim run SCENE --calibration FILE` and `origami-sim diagnose ... --calibration FILE` read it.
     """
     best = patched(diagnosis)
     numbers = {n.label: n for n in best.numbers} if best is not None else {}

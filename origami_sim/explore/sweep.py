@@ -219,11 +219,11 @@ class _Kept:
         self.path = None if folder is None else Path(folder) / ROWS
         self.rows: dict[str, dict[str, Any]] = {}
         if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
+            for line in self.path.read_bytes().splitlines():
                 try:
                     entry = json.loads(line)
-                    self.rows[entry["key"]] = entry["row"]
-                except (ValueError, KeyError, TypeError):
+                    self.rows[entry["key"]] = dict(entry["row"])
+                except (ValueError, KeyError, TypeError, RecursionError):
                     continue
 
     def add(self, rows: Mapping[str, Any]) -> None:

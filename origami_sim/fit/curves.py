@@ -97,7 +97,7 @@ class Curves(Worlds, ABC):
 
     def _default(self) -> Drive:
         """What acts where a recording states nothing."""
-        return self.drive.replace(**dict.fromkeys(self.drive.signals, 0.0))
+        return self.drive.replace(**dict.fromkeys([*self.drive.levels, "origin"], 0.0))
 
     def _driven(self, recording: Recording) -> Recording:
         """The recording with the drives that the simulator knows."""
@@ -200,8 +200,8 @@ class Curves(Worlds, ABC):
             levels: of the drives, over those that were recorded.
         """
         out: list[tuple[str, Curves]] = [("repeat the same curve", self._other())]
-        if any(not s.is_zero for d in self.drives for s in d.signals.values()):
-            names = sorted({n.split("_")[0] for d in self.drives for n, s in d.signals.items() if not s.is_zero})
+        names = sorted({n.split("_")[0] for d in self.drives for n in d.levels if not d[n].is_zero})
+        if names:
             for gain in levels:
                 words = "reversed" if gain == -1.0 else f"at {gain:g} times the level"
                 other = self._other()
@@ -378,8 +378,8 @@ def at_once(drive: Drive, name: str) -> float:
 def _gained(drive: Drive, gain: float) -> Drive:
     return drive.replace(
         **{
-            n: replace(s, offset=gain * np.asarray(s.offset), scale=gain * np.asarray(s.scale))
-            for n, s in drive.signals.items()
+            n: replace(drive[n], offset=gain * np.asarray(drive[n].offset), scale=gain * np.asarray(drive[n].scale))
+            for n in drive.levels
         }
     )
 

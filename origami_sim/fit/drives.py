@@ -6,15 +6,17 @@ from scipy.interpolate import CubicSpline
 from origami_sim.drive import SAMPLES_PER_SECOND, Drive, Signal, series
 from origami_sim.errors import InputError
 from origami_sim.recording import Recording, by_component
+from origami_sim.recording.placed import surrounded
 
 
 def drive_of(recording: Recording, default: Drive) -> Drive:
-    """The drive that was recorded, over the model's own.
+    """The drive and the sources that were recorded, over the model's own.
 
     Raises:
         InputError: what `by_component` refuses, or a drive that this model lacks.
     """
     changed: dict[str, Signal] = {}
+    default = surrounded(default, recording)
     file = recording.metadata.get("sidecar")
     for name, drive in recording.drive.items():
         clock = (recording.times if drive.times is None else drive.times) - recording.times[0]

@@ -405,7 +405,7 @@ def _off(parameters: Parameters, name: str) -> bool:
 def _driven(recordings: Sequence[Recording], drive: Drive) -> set[str]:
     names = {n for n, s in drive.signals.items() if not s.is_zero}
     names |= {n for r in recordings for n, c in r.drive.items() if np.any(c.values)}
-    if drive.placed:  # magnets and coils make a field
+    if drive.placed or any(r.sources for r in recordings):  # magnets and coils make a field
         names |= {"field", "gradient"}
     return {n.split("_")[0] for n in names} | ({"drive"} if names else set())
 

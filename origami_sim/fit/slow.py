@@ -127,7 +127,8 @@ class Slow(Curves):
         return float(np.clip(ACCURATE * min(seen), FINEST, COARSEST)) if seen else TOLERANCE
 
     def _read(self, worlds, recording: Recording, curve: np.ndarray) -> np.ndarray:
-        model, dims = worlds[0][0], len(self.components)
+        model = worlds[0][0]
+        dims = sum(1 if c.values.ndim == 1 else c.values.shape[1] for c in recording.channels.values())
         distort = [e for e in model.effects if get(e).family == "measurement" and get(e).apply is not None]
         if not distort:
             return curve[:, :dims]
@@ -198,7 +199,7 @@ def restless(recordings: Sequence[Recording], drives: Sequence[Drive]) -> list[s
     """Sentences on recordings that begin under a drive, of which nobody says since when it acts."""
     out = []
     for r, d in zip(recordings, drives, strict=True):
-        if r.start is None and any(np.any(levels(d, 0.0, 1)[k]) for k, n in enumerate(d.signals) if n != "origin"):
+        if r.start is None and any(np.any(d[n](0.0)) for n in d.levels):
             out.append(
                 f"'{r.name}' begins under a drive, which is taken to have come on at its first frame: state start = "
                 '"equilibrium" if the device had rested in it.'
@@ -207,8 +208,8 @@ def restless(recordings: Sequence[Recording], drives: Sequence[Drive]) -> list[s
 
 
 def _silenced(drive: Drive) -> Drive:
-    """Nothing but the device's age."""
-    return drive.replace(**{n: 0.0 for n in drive.signals if n != "origin"})
+    """Nothing but the device's age, and sources without strength."""
+    return drive.replace(**dict.fromkeys(drive.levels, 0.0))
 
 
 def _paced(drive: Drive, speed: float) -> Drive:

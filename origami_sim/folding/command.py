@@ -36,7 +36,7 @@ def check(args) -> None:
         raise InputError(
             "a mesh has a shape, but no fold to go to",
             file=args.scene,
-            allowed="FOLD with edges_assignment or edges_foldAngle, or SVG as for Origami Simulator; in Python, "
+            allowed="FOLD with edges_assignment or edges_foldAngle, .cp, or SVG as for Origami Simulator; in Python, "
             "Sheet(read_mesh(file)) keeps the shape",
         )
 

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.pattern import Pattern, read_pattern, read_svg
+from origami_sim.pattern import Pattern, read_cp, read_pattern, read_svg
 
 from .consistency import vertices
 from .elastic import Elastic
 
+DRAWN = {".svg": read_svg, ".cp": read_cp}
+"""Readers of drawings."""
 DISTANCES = (2.5e-4, 5e-4, 1e-3, 1.4e-3, 2e-3, 2.8e-3, 4e-3, 5.6e-3)
 """Distances tried, as shares of the drawing's diagonal: 0.1 to 2 mm on a sheet of 20 cm. Half and double of
 all fold the same of 20 public patterns."""
@@ -37,7 +39,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     """Read a pattern from a file and mend what keeps its panels from closing; see `pattern.read_pattern`.
 
     Args:
-        path: FOLD or SVG file.
+        path: FOLD, SVG or .cp file.
         size: longest side [m]. scale: length of one unit [m], instead of it.
         merge: of drawings: points closer than this share of the diagonal are one; None finds it.
 
@@ -47,13 +49,16 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     Raises:
         InputError: as `read_pattern`; `merge` for a file that is no drawing.
     """
-    drawing = Path(path).suffix.lower() == ".svg"
+    drawing = DRAWN.get(Path(path).suffix.lower())
     if merge is not None:
-        if not drawing:
-            raise InputError("only drawings have points to merge", file=path, field="merge", value=merge, allowed="SVG")
-        return read_svg(path, size=size, scale=scale, merge_tolerance=merge)
+        if drawing is None:
+            allowed = "SVG, .cp"
+            raise InputError(
+                "only drawings have points to merge", file=path, field="merge", value=merge, allowed=allowed
+            )
+        return drawing(path, size=size, scale=scale, merge_tolerance=merge)
     pattern = read_pattern(path, size=size, scale=scale)
-    if not drawing:
+    if drawing is None:
         return pattern
     gap, split = _gaps(pattern)
     if not split:
@@ -61,7 +66,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     best, least, chosen = pattern, BETTER * gap, None
     for distance in DISTANCES:
         try:
-            other = read_svg(path, size=size, scale=scale, merge_tolerance=distance)
+            other = drawing(path, size=size, scale=scale, merge_tolerance=distance)
             gap, _ = _gaps(other)
         except InputError:  # points merged that should not be: no pattern any more
             continue

@@ -1,9 +1,10 @@
-"""Crease patterns: read them from FOLD, SVG and meshes, build them, triangulate them."""
+"""Crease patterns: read them from FOLD, SVG, .cp and meshes, build them, triangulate them."""
 
 from pathlib import Path
 
 from ..errors import InputError
 from .build import cross, grid, kresling, miura, strip, waterbomb
+from .cp import read_cp
 from .crease_pattern import ASSIGNMENTS, Pattern
 from .fold import read_fold, write_fold
 from .mesh import cut, read_mesh, sheet, uncreased, write_mesh
@@ -22,6 +23,7 @@ __all__ = [
     "kresling",
     "miura",
     "open_cuts",
+    "read_cp",
     "read_fold",
     "read_mesh",
     "read_pattern",
@@ -35,16 +37,16 @@ __all__ = [
     "write_mesh",
 ]
 
-READERS = {".fold": read_fold, ".svg": read_svg, ".obj": read_mesh, ".stl": read_mesh}
+READERS = {".fold": read_fold, ".svg": read_svg, ".cp": read_cp, ".obj": read_mesh, ".stl": read_mesh}
 
 
 def read_pattern(path, *, size=None, scale=None) -> Pattern:
     """Read a crease pattern by the file's suffix, with the defaults of its reader.
 
     Args:
-        path: FOLD, SVG, OBJ or STL file.
+        path: FOLD, SVG, .cp, OBJ or STL file.
         size: longest side of the pattern [m]. scale: length of one unit of the file [m], instead of `size`. Without
-            either, the file's own physical unit holds; FOLD and SVG without one become 0.2 m, meshes are in metres.
+            either, the file's own physical unit holds; patterns without one become 0.2 m, meshes are in metres.
 
     Raises:
         InputError: unknown suffix, missing file, both size and scale, or what the reader refuses.

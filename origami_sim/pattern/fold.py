@@ -13,6 +13,7 @@ from ..errors import InputError
 from .assemble import assemble
 from .checks import check_edges, check_vertices
 from .crease_pattern import ASSIGNMENTS, Pattern
+from .drawn import PRIORITY
 from .files import read_bytes, write_atomic
 from .fold_json import Frame, parse_json, resolve_frame
 from .planar import check_planar_graph, drop_holes, planar_faces
@@ -35,6 +36,8 @@ OWN_KEYS = (
 """Keys that become fields of `Pattern`; every other key goes to `extra`."""
 ORIENTATION_KEYS = ("faces_edges", "faces_faces", "edges_faces", "vertices_faces", "faceOrders")
 """Derived keys that a reversed face makes wrong."""
+EDGE_NUMBERS = ("faces_edges", "vertices_edges", "edgeOrders")
+"""Keys that hold numbers of edges."""
 PLANARITY_TOLERANCE = 1e-4
 """Distance from the common plane, relative to the pattern's size, up to which faces are derived."""
 RADIANS_PER_DEGREE = np.pi / 180.0
@@ -91,6 +94,15 @@ def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -
     fold_angles = _angles(data, "edges_foldAngle", count)
     rest_angles = _angles(data, "edges_osim:restAngle", count)
     stiffness = data.numbers("edges_osim:stiffness", count, 0.0, np.inf, "0 or more [N m/rad]")
+    if edges:
+        kept = _distinct(edges, letters, fold_angles, notes)
+        if len(kept) < count:
+            letters, (fold_angles, rest_angles, stiffness) = (
+                letters and [letters[e] for e in kept],
+                (None if a is None else a[kept] for a in (fold_angles, rest_angles, stiffness)),
+            )
+            _keep_edges(keys, kept, count)
+            edges, count = [edges[e] for e in kept], len(kept)
     _note_angles(letters, fold_angles, notes)
     if not edges:
         notes.append("edges_vertices is not given: edges are the sides of the faces.")
@@ -156,6 +168,38 @@ def _default_angles(pattern) -> None:
 def _angles(data, field, count):
     degrees = data.numbers(field, count, -180.0, 180.0, "-180 to 180 degrees")
     return None if degrees is None else degrees * RADIANS_PER_DEGREE
+
+
+def _distinct(edges, letters, fold_angles, notes) -> list[int]:
+    """Return which edges stay, in order, if of those between the same two vertices one does: as where drawn lines lie
+    on each other the one that comes first in `PRIORITY`, and of these one with a fold angle."""
+    chosen: dict[tuple[int, int], int] = {}
+    differ = set()
+
+    def rank(e):
+        letter = PRIORITY.find(letters[e]) if letters else 0
+        return letter if letter >= 0 else len(PRIORITY), fold_angles is None or np.isnan(fold_angles[e])
+
+    for e, pair in enumerate(edges):
+        key = edge_key(*pair)
+        other = chosen.setdefault(key, e)
+        if other != e:
+            if letters and letters[other] != letters[e]:
+                differ.add(key)
+            chosen[key] = min(other, e, key=rank)
+    if len(chosen) < len(edges):
+        contrary = f", {len(differ)} of them with different letters: {PRIORITY} in order" if differ else ""
+        notes.append(f"{len(edges) - len(chosen)} edges were listed more than once and are one{contrary}.")
+    return sorted(chosen.values())
+
+
+def _keep_edges(keys, kept, count) -> None:
+    """Shorten the lists of all edges to those that are kept; drop those that number edges."""
+    for key, value in list(keys.items()):
+        if key in EDGE_NUMBERS:
+            del keys[key]
+        elif key.startswith("edges_") and isinstance(value, list) and len(value) == count:
+            keys[key] = [value[e] for e in kept]
 
 
 def _note_angles(letters, fold_angles, notes) -> None:

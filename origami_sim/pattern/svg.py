@@ -4,25 +4,13 @@ Stroke colours: black border, red mountain, blue valley, green cut, yellow facet
 times 180 degrees is the target fold angle of mountains and valleys.
 """
 
-import math
-from collections import Counter
-
-import numpy as np
-
 from ..errors import InputError
-from .assemble import assemble
-from .checks import COORDINATE_LIMIT, check_number
+from .checks import check_number
 from .crease_pattern import Pattern
+from .drawn import drawn_pattern
 from .files import read_bytes
-from .holes import facets_of_holes
-from .planar import drop_holes, merge_distance, planar_faces, split_segments
-from .sizing import metres_of
 from .svg_drawing import read_drawing
-from .topology import edge_key, face_sides
 
-PRIORITY = "BCMVFU"
-"""Which assignment an edge keeps where lines lie on each other."""
-MAX_SEGMENTS = 20_000
 FLATNESS = 1e-3
 """Largest distance of a curve from its chords, relative to the drawing's longest side: some 9 chords for a quarter
 circle as wide as half the sheet. Half of it makes 1.4 times as many panels along a curve, double 0.7 times."""
@@ -45,9 +33,7 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
     Raises:
         InputError: malformed XML, an entity, bad numbers, or nothing usable in the drawing.
     """
-    for name, value in (("merge_tolerance", merge_tolerance), ("flatness", flatness)):
-        if value is not None:
-            check_number(name, value, low=1e-9, high=0.05, allowed="a share of the drawing, 1e-9 to 0.05")
+    check_number("flatness", flatness, low=1e-9, high=0.05, allowed="a share of the drawing, 1e-9 to 0.05")
     drawing = read_drawing(read_bytes(path), flatness, file=path)
     if not drawing.strokes:
         colours = ", ".join(drawing.unknown) or "none"
@@ -59,13 +45,17 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
             allowed="black, red, blue, green, yellow, magenta",
         )
     notes: list[str] = []
-    with np.errstate(over="ignore", invalid="ignore"):
-        extent = float(np.ptp(drawing.segments.reshape(-1, 2), axis=0).max())
-    if not np.isfinite(extent) or not extent > 0.0:
-        raise InputError("the drawing has no usable size", file=path, value=extent, allowed="a finite size above 0")
-    metres = metres_of(extent, size=size, scale=scale, stated=drawing.metres, notes=notes, file=path)
     _note_leftovers(drawing, notes)
-    return _pattern(drawing, metres, merge_tolerance, notes, path)
+    return drawn_pattern(
+        drawing.segments,
+        drawing.strokes,
+        size=size,
+        scale=scale,
+        stated=drawing.metres,
+        merge_tolerance=merge_tolerance,
+        notes=notes,
+        file=path,
+    )
 
 
 def _note_leftovers(drawing, notes) -> None:
@@ -75,70 +65,3 @@ def _note_leftovers(drawing, notes) -> None:
         notes.append(f"{count} shapes in the unknown colour {colour} were left out.")
     for what, count in drawing.skipped.items():
         notes.append(f"{count} {what} left out.")
-
-
-def _pattern(drawing, scale, merge_tolerance, notes, file) -> Pattern:
-    starts, ends = (drawing.segments[:, n] * [scale, -scale] for n in (0, 1))
-    everything = np.vstack([starts, ends])
-    size = float(np.ptp(everything, axis=0).max())
-    if not np.abs(everything).max() < COORDINATE_LIMIT or not size > 1e-9:
-        allowed = f"1e-9 m or more across, within {COORDINATE_LIMIT:g} m of the origin"
-        raise InputError("the drawing has no usable size", file=file, value=size, allowed=allowed)
-    if len(starts) > MAX_SEGMENTS:
-        raise InputError("too many line segments", file=file, value=len(starts), allowed=f"up to {MAX_SEGMENTS}")
-    if merge_tolerance is None:
-        tolerance = merge_distance(starts, ends)
-    else:
-        tolerance = merge_tolerance * float(np.linalg.norm(np.ptp(everything, axis=0)))
-    long_enough = np.linalg.norm(ends - starts, axis=1) > tolerance
-    strokes = [stroke for stroke, keep in zip(drawing.strokes, long_enough, strict=True) if keep]
-    if not strokes:
-        raise InputError("all lines are shorter than the merge tolerance", file=file, value=tolerance)
-    points, pieces = split_segments(starts[long_enough], ends[long_enough], tolerance, file=file)
-
-    chosen = _edges(pieces, strokes, notes)
-    facets, holed = facets_of_holes(points, np.array(list(chosen)))
-    if holed:
-        chosen |= {key: ("F", 1.0) for key in facets}
-        notes.append(f"{holed} panels with a hole or a loose part in them were cut into facets.")
-    found = planar_faces(points, np.array(list(chosen)), file=file)
-    faces, holes = drop_holes(found, {key for key, (letter, _) in chosen.items() if letter == "B"})
-    if not faces:
-        raise InputError("the lines enclose no face", file=file, allowed="a closed black border")
-    if holes:
-        notes.append(f"{holes} regions enclosed by border lines alone were taken as holes.")
-    beside = Counter(edge_key(*side) for face in faces for side in face_sides(face))
-    edges = [key for key in chosen if beside[key]]
-    if len(edges) < len(chosen):
-        notes.append(f"{len(chosen) - len(edges)} line pieces that enclose nothing were left out.")
-    outer = [key for key in edges if beside[key] == 1 and chosen[key][0] not in "BC"]
-    if outer:
-        notes.append(f"{len(outer)} coloured edges on the outside of the sheet were taken as border.")
-        chosen |= dict.fromkeys(outer, ("B", 1.0))
-    used = sorted({v for face in faces for v in face})
-    renumbered = {v: n for n, v in enumerate(used)}
-    signs = {"M": -math.pi, "V": math.pi, "F": 0.0}
-    return assemble(
-        np.column_stack([points[used], np.zeros(len(used))]),
-        [tuple(renumbered[v] for v in face) for face in faces],
-        edges=[(renumbered[a], renumbered[b]) for a, b in edges],
-        assignments=[chosen[key][0] for key in edges],
-        fold_angles=[signs.get(chosen[key][0], math.nan) * chosen[key][1] for key in edges],
-        notes=notes,
-        file=file,
-    )
-
-
-def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:
-    """Return (letter, opacity) by edge key, one for each, the higher `PRIORITY` where lines coincide."""
-    chosen: dict[tuple[int, int], tuple[str, float]] = {}
-    conflicts = set()
-    for a, b, s in pieces:
-        key, stroke = edge_key(a, b), strokes[s]
-        other = chosen.setdefault(key, stroke)
-        if other != stroke:
-            conflicts.add(key)
-            chosen[key] = min(other, stroke, key=lambda st: PRIORITY.index(st[0]))
-    if conflicts:
-        notes.append(f"{len(conflicts)} edges are drawn twice in different colours or opacities: {PRIORITY} in order.")
-    return chosen

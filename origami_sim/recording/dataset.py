@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
 from origami_sim.recording.reader import read_recording
@@ -230,6 +231,13 @@ def _equal_values(one: Recording, other: Recording) -> bool:
 
 def _equal_drives(one: Recording, other: Recording) -> bool:
     same = (one.gravity, one.start) == (other.gravity, other.start) and one.drive.keys() == other.drive.keys()
+    around = [Drive(sources=r.sources) for r in (one, other)]
+    same &= around[0].fingerprint == around[1].fingerprint and len(one.sources) == len(other.sources)
+    same = same and all(
+        np.array_equal(np.asarray(v, float), np.asarray(w, float), equal_nan=True)
+        for s, t in zip(*(d.signals.values() for d in around), strict=True)
+        for v, w in zip(vars(s).values(), vars(t).values(), strict=True)
+    )
     return same and all(
         d.constant == other.drive[k].constant and np.array_equal(d.values, other.drive[k].values)
         for k, d in one.drive.items()

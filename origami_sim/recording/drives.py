@@ -7,6 +7,7 @@ import numpy as np
 
 from origami_sim.drive import CHANNELS, Drive, series
 from origami_sim.errors import InputError
+from origami_sim.recording.placed import surrounded
 from origami_sim.recording.recording import DriveChannel, Recording
 
 UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1"}
@@ -36,7 +37,10 @@ def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
         if family in UNITS:
             signals |= _signals(name, drive, recording, step)
     groups = [int(name.removeprefix("voltage_")) for name in signals if name.startswith("voltage_")]
-    return Drive(voltage=[0.0] * (max(groups, default=0) + 1)).replace(**signals)
+    applied = surrounded(Drive(voltage=[0.0] * (max(groups, default=0) + 1)), recording).replace(**signals)
+    if step is None or not recording.sources:
+        return applied
+    return applied.held(float(recording.times[step] - recording.times[0]))
 
 
 def by_component(name: str, drive: DriveChannel, *, file: object = None) -> dict[str, np.ndarray]:

@@ -13,6 +13,7 @@ from origami_sim.files import read_bytes
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.lint import Series, lint
 from origami_sim.recording.noise import noise_report
+from origami_sim.recording.placed import placed_sources
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.recording.table import Table, read_table
@@ -93,6 +94,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
         gravity=side.gravity,
         start=side.start,
         motion=side.motion,
+        sources=placed_sources(side.sources, table, times, side.file),
     )
 
 

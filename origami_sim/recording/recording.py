@@ -10,6 +10,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.camera import Camera
+from origami_sim.sources import Source
 
 if TYPE_CHECKING:
     from origami_sim.recording.noise import NoiseReport
@@ -124,6 +125,7 @@ class Recording:
         gravity: which way it pointed; None: as the model has it.
         start: how the motion begins at the first frame; None if that is not stated.
         motion: "dynamic", or "quasistatic" where inertia does not count; None if that is not stated.
+        sources: magnets, coils and tables around the device, on the recording's clock; none: as the model has them.
     """
 
     name: str
@@ -134,6 +136,7 @@ class Recording:
     gravity: "Gravity | None" = None
     start: "Start | None" = None
     motion: str | None = None
+    sources: tuple[Source, ...] = ()
 
     def __repr__(self) -> str:
         driven = f"; driven by {', '.join(self.drive)}" if self.drive else ""

@@ -53,8 +53,12 @@
     file = "supply.csv"                 # columns of another table, with its time_column, time_unit and shift [s]
     times = [0.0, 1.0]                  # or samples stated here [s], with values = [0.0, 5.0]
 
-    [scene]
-    name = "pendulum_chain"             # the scene that simulates this object, or the device: "my_flap.py"
+    [[drive.sources]]                   # optional: a magnet, coil or table of a field around it, as in a design file;
+    coil = { current = "2 A", radius = "5 cm", position = [0, 0, { column = "z", unit = "mm" }] }   # a column: it moved
+
+    [scene]                             # or, for the name alone, model = "my_flap.py" at the top
+    name = "pendulum_chain"             # the scene that simulates this object, or the device: "my_flap.py",
+                                        # "package.module:build"; nothing of it is executed unless --model names it, too
     overrides = { mass_1 = 0.09 }       # settings of this object that differ; not over a calibration of its own
 
     [priors]                            # optional, for a diagnosis: standard deviations of what is known of the object
@@ -101,6 +105,7 @@ from origami_sim.errors import InputError
 from origami_sim.files import read_toml
 from origami_sim.possible import Possible
 from origami_sim.recording.camera import rotation_matrix
+from origami_sim.recording.placed import columns_of
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
 from origami_sim.recording.stated import MOTIONS, Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
@@ -115,6 +120,7 @@ _TOP_KEYS = (
     "licence",
     "allow_gaps",
     "allow_swaps",
+    "model",
     "motion",
     "select",
     "time",
@@ -163,6 +169,7 @@ class Sidecar:
     channels: dict[str, dict[str, Any]]
     cameras: dict[str, dict[str, Any]]
     drive: dict[str, dict[str, Any]]
+    sources: Any
     scene: dict[str, Any]
     priors: dict[str, float | str]
     gravity: Gravity | None
@@ -186,6 +193,8 @@ class Sidecar:
             raise InputError("the time needs a column or a rate_hz", file=path, field="time")
         scene = Section(path, "scene.", top.table("scene"), _SCENE_KEYS)
         source = _source_spec(path, tree.get("source"))
+        drives = dict(top.table("drive"))
+        sources = drives.pop("sources", [])
         cameras = {name: _camera_spec(path, name, table) for name, table in top.table("cameras").items()}
         texts = {key: text for key in ("description", "licence") if (text := top.text(key, None))}
         return cls(
@@ -199,10 +208,9 @@ class Sidecar:
             time={"column": time.text("column", None), "unit": time.unit("time", default="s"), "rate_hz": rate},
             channels={name: _channel_spec(path, name, table, cameras) for name, table in channels.items()},
             cameras=cameras,
-            drive={name: _drive_spec(path, name, table) for name, table in top.table("drive").items()},
-            scene={"name": _device(scene.text("name", None)), "overrides": scene.table("overrides")}
-            if scene.values
-            else {},
+            drive={name: _drive_spec(path, name, table) for name, table in drives.items()},
+            sources=sources,
+            scene=_scene_spec(top, scene),
             priors={name: prior_spec(top, name) for name in top.table("priors")},
             gravity=gravity_spec(path, tree.get("gravity")),
             start=start_spec(path, tree.get("start")),
@@ -214,7 +222,7 @@ class Sidecar:
     def columns(self) -> list[str]:
         """Numeric columns that the file must have."""
         specs = [*self.channels.values(), *(spec for spec in self.drive.values() if spec["file"] is None)]
-        named = [column for spec in specs for column in spec["columns"]]
+        named = [*(column for spec in specs for column in spec["columns"]), *columns_of(self.sources)]
         time = [self.time["column"]] if self.time["column"] is not None else []
         return list(dict.fromkeys(time + named))
 
@@ -255,9 +263,20 @@ def _possible_spec(path: Path, given: dict[str, Any]) -> dict[str, Any]:
     return given
 
 
+def _scene_spec(top: Section, scene: Section) -> dict[str, Any]:
+    """The scene or device of the recording as it is stated, its name, and the settings of this object."""
+    model, name = top.text("model", None), scene.text("name", None)
+    if model is not None and name is not None:
+        top.refuse("give either model or [scene] name", "model", model)
+    if model is None and not scene.values:
+        return {}
+    stated = model or name
+    return {"name": _device(stated), "stated": stated, "overrides": scene.table("overrides")}
+
+
 def _device(stated: str | None) -> str | None:
-    """The name of a scene or device; of a device's file, which nothing here opens, its stem."""
-    return stated and re.sub(r"(.*/)?(\w+)\.(py|toml)(:\w+)?", r"\2", stated)
+    """The name of a scene or device; of a device's file or module, which nothing here opens, its stem."""
+    return stated and re.sub(r"(.*/)?(\w+)\.(py|toml)(:\w+)?|([\w.]+\.)?(\w+):\w+", r"\2\6", stated)
 
 
 def _source_spec(path: Path, given: object) -> dict[str, Any]:

@@ -28,6 +28,9 @@ UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 def glb(film: Film, *, keyframes: int = KEYFRAMES) -> bytes:
     """A run as an animated binary glTF file."""
     frames = np.unique(np.linspace(0, len(film.times) - 1, min(keyframes, len(film.times))).round().astype(int))
+    seconds = (film.times[frames] - film.times[frames[0]]).astype(np.float32)
+    later = np.append(True, np.diff(np.maximum.accumulate(seconds)) > 0)  # of frames that float32 cannot tell apart one
+    frames, seconds = frames[later], seconds[later]
     out = _Buffer()
     corners, _ = film.faces()
     base = np.array([COLOURS[k] for k in film.kinds], float).reshape(-1, 3)
@@ -63,7 +66,7 @@ def glb(film: Film, *, keyframes: int = KEYFRAMES) -> bytes:
         ],
     }
     if len(frames) > 1:
-        times = out.accessor((film.times[frames] - film.times[frames[0]]).astype(np.float32), "SCALAR", bounds=True)
+        times = out.accessor(seconds, "SCALAR", bounds=True)
         weights = np.eye(len(frames), dtype=np.float32)[:, 1:].reshape(-1)  # the first frame is the mesh itself
         output = out.accessor(weights, "SCALAR")
         document["animations"] = [

@@ -283,7 +283,6 @@ BAD = {
     ),
     "zero-area": square(vertices_coords=[[0, 0], [1, 1], [2, 2], [0, 1]]),
     "zero-length": square(vertices_coords=[[0, 0], [0, 0], [1, 1], [0, 1]]),
-    "edge listed twice": square(edges_vertices=[[0, 1], [1, 0], [2, 3], [3, 0], [0, 2]]),
     "wrong array length .*edges_assignment.*5 entries": square(edges_assignment=["B"]),
     "wrong array length .*edges_foldAngle": square(edges_foldAngle=[0]),
     "unknown letter .*'X'.*B M V F U C J": square(edges_assignment=list("BBBBX")),
@@ -309,6 +308,34 @@ BAD = {
         "faces_vertices": [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]],
     },
 }
+
+
+def test_edges_listed_twice_are_one():
+    again = square(
+        edges_vertices=[[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [2, 0], [1, 0]],
+        edges_assignment=list("BBBBFVB"),
+        edges_foldAngle=[None, None, None, None, 0, 90, None],
+        edges_osim__stiffness=[0, 0, 0, 0, 1, 2, 0],
+        edges_own=[0, 1, 2, 3, 4, 5, 6],
+        faces_edges=[[0, 1, 5], [4, 2, 3]],
+    )
+    pattern = fold_pattern(again)
+    assert pattern.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 0], [2, 0]]
+    assert pattern.assignments == list("BBBBV")
+    assert pattern.fold_angles[4] == pytest.approx(math.pi / 2) and pattern.stiffness[4] == 2
+    assert pattern.extra["edges_own"] == [0, 1, 2, 3, 5] and "faces_edges" not in pattern.extra
+    assert any("2 edges were listed more than once and are one, 1 of them with different" in n for n in pattern.notes)
+
+
+def test_of_equal_edges_the_one_with_an_angle_stays():
+    again = square(
+        edges_vertices=[[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [0, 2]],
+        edges_assignment=list("BBBBMM"),
+        edges_foldAngle=[None, None, None, None, None, -40],
+    )
+    pattern = fold_pattern(again)
+    assert np.degrees(pattern.fold_angles[4]) == pytest.approx(-40)
+    assert any("listed more than once and are one." in n for n in pattern.notes)
 
 
 @pytest.mark.parametrize("words", BAD)

@@ -256,3 +256,20 @@ def test_a_panel_with_a_hole_is_cut_into_facets(tmp_path, inner, faces_of_hole):
     assert any("1 panels with a hole" in note for note in pattern.notes)
     assert all(len(set(f)) == len(f) for f in pattern.faces)
     triangulate(pattern)
+
+
+def test_many_lines_through_one_place_need_no_more_memory():
+    from origami_sim.pattern.planar import merge_points
+
+    there = np.array([0.3, 0.7]) + 1e-16 * np.arange(40_000)[:, None]  # pairs of them would be 800 million
+    points, place = merge_points(np.vstack([[0.0, 0.0], there, [1.0, 0.0]]), 1e-4)
+    assert len(points) == 3 and place[0] == 0 and set(place[1:-1]) == {1} and place[-1] == 2
+    assert points[1] == pytest.approx([0.3, 0.7])
+
+
+def test_a_heap_of_points_is_refused():
+    from origami_sim.pattern.planar import merge_points
+
+    heap = np.random.default_rng(0).normal(0, 1e-5, (6000, 2))
+    with pytest.raises(InputError, match="too many points"):
+        merge_points(heap, 1e-3)

@@ -95,7 +95,7 @@ overrides = { thickness = 1e-3 }
     np.testing.assert_allclose(recording.drive["field"].values, [5e-3, 6e-3, 7e-3, 8e-3])
     np.testing.assert_allclose(recording.drive["gravity"].values, [0.0, 0.0, -9.80665])
     assert recording.drive["gravity"].constant and not recording.drive["field"].constant
-    assert recording.metadata["scene"] == {"name": "box", "overrides": {"thickness": 1e-3}}
+    assert recording.metadata["scene"] == {"name": "box", "stated": "box", "overrides": {"thickness": 1e-3}}
     assert recording.metadata["licence"] == "MIT"
 
 

@@ -271,3 +271,9 @@ def test_five_thousand_frames_of_twelve_markers_load(tmp_path):
     for k, channel in enumerate(recording.channels.values()):
         np.testing.assert_allclose(channel.values, points[:, k], atol=1e-7)
         assert channel.noise == pytest.approx(1e-5, rel=0.1)
+
+
+def test_a_cell_of_a_megabyte_is_no_header(tmp_path):
+    from origami_sim.recording.trackers._text import head
+
+    assert head(b"a,b\n" + b"z" * 200_000 + b"\nc\n", 3) == [["a", "b"], [], ["c"]]

@@ -20,7 +20,13 @@ def plain(data: bytes) -> bytes:
 def head(data: bytes, count: int) -> list[list[str]]:
     """Cells of the first lines, for detection: never raises."""
     lines = plain(data).decode("utf-8", errors="replace").split("\n")[:count]
-    return [[cell.strip() for cell in row] for line in lines for row in csv.reader([line.replace("\0", "")])] or [[]]
+    rows = []
+    for line in lines:
+        try:
+            rows += [[cell.strip() for cell in row] for row in csv.reader([line.replace("\0", "")])]
+        except csv.Error:  # a cell of a megabyte: no header of any format
+            rows.append([])
+    return rows or [[]]
 
 
 def header(path: Path, data: bytes, count: int) -> tuple[list[list[str]], bytes]:

@@ -1,0 +1,92 @@
+"""Magnets, coils and tables around a recorded device, as its sidecar states them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from origami_sim.drive import Drive, Signal, series
+from origami_sim.drive_file import read_signal, read_sources
+from origami_sim.errors import InputError
+from origami_sim.recording.recording import Recording
+from origami_sim.recording.table import Table
+from origami_sim.recording.units import si_unit, unit_factor
+from origami_sim.sources import Source
+
+
+def columns_of(stated: Any) -> Iterator[str]:
+    """Columns that `{ column = "..." }` names anywhere in what a sidecar states."""
+    if isinstance(stated, dict):
+        if isinstance(stated.get("column"), str):
+            yield stated["column"]
+        stated = list(stated.values())
+    if isinstance(stated, list):
+        for part in stated:
+            yield from columns_of(part)
+
+
+def placed_sources(stated: Any, table: Table, times: np.ndarray, path: Path) -> tuple[Source, ...]:
+    """The sources, on the recording's clock.
+
+    Args:
+        stated: the list of the sidecar. table, times: of the recording [s]. path: the sidecar.
+
+    Raises:
+        InputError: what `read_sources` refuses, a column of another unit or with holes, or a wave that does not cover
+            the recording.
+    """
+
+    def read(value: Any, unit: str, field: str, path: Path) -> Any:
+        if isinstance(value, dict) and "column" in value:
+            return _measured(value, unit, field, table, times, path)
+        signal = read_signal(value, unit, field, path)
+        own = signal.times if isinstance(signal, Signal) else None
+        if own is not None and (own[0] > times[0] or own[-1] < times[-1]):
+            raise InputError(
+                "does not cover the recording",
+                file=path,
+                field=field,
+                value=[float(own[0]), float(own[-1])],
+                allowed=f"samples from {times[0]:g} s to {times[-1]:g} s",
+            )
+        return signal if own is None else _lasting(signal)
+
+    try:
+        return read_sources(stated, path, read=read)
+    except InputError as e:
+        raise e if e.file is not None else InputError(str(e), file=path) from None
+    except (TypeError, ValueError, IndexError, OverflowError) as e:  # a list where a number belongs, and the like
+        raise InputError(f"cannot be stated so ({e})", file=path, field="drive.sources") from None
+
+
+def _measured(value: dict[str, Any], unit: str, field: str, table: Table, times: np.ndarray, path: Path) -> Signal:
+    """A number that was measured for every frame."""
+    column, given = value["column"], value.get("unit", unit)
+    allowed = f'{{ column = "...", unit = "..." }}, with a unit of {unit}'
+    if set(value) - {"column", "unit"} or not isinstance(column, str) or not isinstance(given, str):
+        raise InputError("is no column", file=path, field=field, value=value, allowed=allowed)
+    factor = 1.0 if given == unit else unit_factor(given, file=path, field=field)
+    if given != unit and si_unit(given) != unit:
+        raise InputError("the column has another unit", file=path, field=field, value=given, allowed=allowed)
+    values = table.stack([column]) * factor
+    lost = np.flatnonzero(~np.isfinite(values))
+    if lost.size:
+        place = table.position(int(lost[0]))
+        raise InputError(f"the column misses a value at {place}", file=table.file, field=column)
+    return _lasting(series(times, values)) if len(times) > 1 else Signal(offset=float(values[0]))
+
+
+def _lasting(signal: Signal) -> Signal:
+    """The signal with its last value held for as long again and a second: a run may end after the last frame."""
+    assert signal.times is not None and signal.values is not None
+    end = 2 * signal.times[-1] - signal.times[0] + 1.0
+    held = np.append(signal.times, end), np.append(signal.values, signal.values[-1])
+    return Signal(signal.offset, signal.amplitude, signal.frequency, signal.phase, *held, signal.scale)
+
+
+def surrounded(drive: Drive, recording: Recording) -> Drive:
+    """The drive with the sources that a recording states in place of its own, from the first frame on."""
+    if not recording.sources:
+        return drive
+    return drive.with_sources([s.seen_from(float(recording.times[0])) for s in recording.sources])
