@@ -196,7 +196,7 @@ def extended(
         fitted = _fitted(out, forward, key)
         if fitted.failed:
             out.failed[key] = fitted.failed
-            del out.log[key], out.total[key]
+            del out.log[key], out.total[key], out.promise[key], out.estimates[key]
             continue
         _add(out, forward, key, fitted, prior)
     return out

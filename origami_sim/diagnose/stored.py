@@ -160,7 +160,7 @@ class Stored:
             chance = p.probabilities()
             chosen = [p.label(best_of(p, chance, c)) if c else "nominal" for c in d.credible]
         elif word != "UNTESTABLE":
-            chosen = [p.suspect(n).label for n in d.best]
+            chosen = [p.suspect(n).label for n in d.best if p.suspect(n).effect in d.lead]
         return {"verdict": word, "chosen": chosen, "probability": probability}
 
     def save(self, path: str | Path) -> Path:

@@ -101,7 +101,8 @@ def decide(p: Posterior, shares: Callable[[Key], Sequence[Share]]) -> Decision:
         return as_("", classes[top])
     if not lead or beside:
         return as_("MEASUREMENT" if all(map(_of_recorder, may_be)) else "TIE", total, tie=True)
-    word = "MEASUREMENT" if _of_recorder(class_of(p, best)) else "SEVERAL" if len(best) > 1 else "MECHANISM"
+    named = [n for n in best if p.suspect(n).effect in lead]
+    word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if len(named) > 1 else "MECHANISM"
     return as_(word, sum(v for c, v in classes.items() if c >= lead))
 
 
@@ -144,16 +145,21 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         more = f" and {len(d.credible) - 4} more" if len(d.credible) > 4 else ""
         text = f"These recordings do not decide between {joined(each)}{more}. "
         return Judgement(d.word, f"{text}The best is {say(shown)}, which {explained}.", d.probability, names, **common)
-    explained = explained if len(suspects) < 2 else explained.replace("explains", "explain", 1)
-    verb = "they" if len(suspects) > 1 else "it"
+    # the shown set may hold more than what surely acts: of that, each effect by its own probability
+    named = [s for s in suspects if s.effect in d.lead]
+    chosen = [s.label for s in named]
     if d.word == "MEASUREMENT":
-        text = f"The measurement, not the device, explains the mismatch: {say(shown)}"
+        text = f"The measurement, not the device, explains the mismatch: {say(shown, only=d.lead)}"
     else:
-        text = f"Found: {say(shown)}{_elsewhere(p, chance, d.lead, d.best)}"
-    text += f", p = {d.probability:.2f}; {verb} {explained}."
+        text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
+    who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
+    explained = explained if who == "it" else explained.replace("explains", "explain", 1)
+    text += f", p = {d.probability:.2f}; {who} {explained}."
     more = 1.0 - classes.get(d.lead, 0.0) / d.probability
     if more > ALONE:
-        text += f" Something small acts besides (p = {more:.2f}); these recordings do not tell what it is."
+        each = _besides(classes, d.lead)
+        likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""
+        text += f" Something acts besides (p = {more:.2f}), and these recordings do not tell what{likely}."
     return Judgement(d.word, text, d.probability, chosen, **common)
 
 
@@ -233,6 +239,17 @@ def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[f
         if sum(classes[c] for c in likely[:n]) >= ALONE:
             return lead, likely[:n]
     return lead, []
+
+
+def _besides(classes: dict[frozenset[str], float], lead: frozenset[str]) -> list[tuple[str, float]]:
+    """The most probable effects that act beside others, with their probabilities."""
+    chance: dict[str, float] = {}
+    for c, value in classes.items():
+        if c >= lead:
+            for effect in c - lead:
+                chance[effect] = chance.get(effect, 0.0) + value
+    likely = sorted(chance.items(), key=lambda item: (-item[1], item[0]))[:LISTED]
+    return [(e, v) for e, v in likely if v > 1.0 - CREDIBLE]
 
 
 def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> Key:

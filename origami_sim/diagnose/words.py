@@ -1,6 +1,6 @@
 """Words for what a diagnosis found."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -29,12 +29,14 @@ def distinct(fits: Sequence[Fit]) -> list[str]:
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 
 
-def say(f: Fit, *, sites: bool = True) -> str:
-    """The effects of a fit with their sites, if asked, strengths and intervals."""
+def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> str:
+    """The effects of a fit, all or `only` some, with their sites, if asked, strengths and intervals."""
     out = []
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
     for s in f.hypothesis.suspects:
+        if only is not None and s.effect not in only:
+            continue
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
         t, d = value[id(n)], deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
