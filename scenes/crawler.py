@@ -40,8 +40,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         x, owner, width = x[-1] - x[::-1], owner[::-1], width[::-1]
     cells = np.diff(x)
     sheet = Sheet(strip(list(cells), list(width)), thickness=s.thickness, modulus=s.modulus, density=s.density,
-                  membrane=s.membrane, membrane_damping=s.membrane_damping,
-                  triangulation="diagonal" if s.guided else "center")  # fmt: skip
+                  membrane=s.membrane, membrane_damping=s.membrane_damping)
     if s.guided:
         sheet.fix(nodes=range(2 * len(x)), axes="y")
 
@@ -63,7 +62,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     lossy = stiffness if s.patch_loss else stiffness**2 * (share[:-1] + share[1:] + ends)
     sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=lossy * s.loss_time)
     # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not, and soften bare cells
-    sheet.panel(np.arange(len(cells)), rigidity=bonded * (s.twist if s.guided else 1.0))
+    sheet.panel(np.arange(len(cells)), rigidity=bonded * s.twist)
     for number, size, sign, factor in (
         (1, (s.big_length, s.big_width), s.polarity, s.big_moment),
         (2, (s.small_length, s.small_width), -s.polarity, 1.0),

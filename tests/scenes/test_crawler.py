@@ -157,6 +157,7 @@ def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
 
 @SLOW
 def test_free_strip_walks_like_the_guided_one(default):
+    """Until it turns aside: the diagonals of its cells lean to one side."""
     free, _ = walk(4, guided=False)
     assert free[2:].mean() == pytest.approx(default[3:].mean(), rel=0.25)
 
