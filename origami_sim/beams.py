@@ -1,6 +1,7 @@
 """Strips of two nodes per station that stand for plane beams."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from origami_sim.build import Sheet
 from origami_sim.model import Model, Parameters
@@ -14,8 +15,8 @@ def diagonal_share(cell: float, width: float) -> float:
     return (width**2 / (width**2 + cell**2)) ** 2
 
 
-def as_beam(model: Model, parameters: Parameters, axial: float):
-    """Makes a strip of two nodes per station a plane beam of axial stiffness E A [N].
+def as_beam(model: Model, parameters: Parameters, axial: ArrayLike):
+    """Makes a strip of two nodes per station a plane beam of axial stiffness E A [N], one or by cell.
 
     Both corners of a station weigh alike, so that nothing twists. The bars along the strip get all of E A: by the rule
     for triangles they would get less the narrower the cells are, and the weight would stretch fine meshes.
@@ -23,8 +24,9 @@ def as_beam(model: Model, parameters: Parameters, axial: float):
     pairs = parameters["inertia", "mass"].reshape(-1, 2)
     parameters.set("inertia", "mass", np.repeat(pairs.mean(axis=1), 2))
     length = parameters["bars", "rest_length"][:, 0]
-    along = np.flatnonzero(np.isclose(np.abs(np.diff(model.position[model.bars], axis=1)[:, 0, 0]), length))
-    stiffness = axial / 2 / length[along]
+    along = np.flatnonzero(np.abs(np.diff(model.bars, axis=1)[:, 0]) == 2)  # from a station's node to the next one's
+    cell = model.bars[along].min(axis=1) // 2
+    stiffness = np.broadcast_to(axial, len(pairs) - 1)[cell] / 2 / length[along]
     if ("bar_viscosity", "viscosity") in parameters:
         factor = np.sqrt(stiffness / parameters["bars", "stiffness"][along, 0])
         viscosity = parameters["bar_viscosity", "viscosity"][along, 0]

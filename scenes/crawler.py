@@ -7,6 +7,7 @@ Forward (+x) is towards the small patch. The strip is a chain of narrow cells; e
 
 import numpy as np
 
+from origami_sim.beams import as_beam
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, sine
 from origami_sim.gait import stride_table
@@ -38,9 +39,14 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     if s.heading < 0:  # turned by 180 degrees about z
         x, owner, width = x[-1] - x[::-1], owner[::-1], width[::-1]
     cells = np.diff(x)
-    sheet = Sheet(strip(list(cells), list(width)), thickness=s.thickness, modulus=s.modulus, density=s.density,
-                  membrane=s.membrane, membrane_damping=s.membrane_damping,
-                  triangulation="diagonal" if s.guided else "center")  # fmt: skip
+    sheet = Sheet(
+        strip(list(cells), list(width)),
+        thickness=s.thickness,
+        modulus=s.modulus,
+        density=s.density,
+        membrane=s.membrane,
+        membrane_damping=s.membrane_damping,
+    )
     if s.guided:
         sheet.fix(nodes=range(2 * len(x)), axes="y")
 
@@ -56,11 +62,13 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     border = (patch_width[1:] > 0) != (patch_width[:-1] > 0)  # there the sheet bends on for c h under the patch
     ends = np.where(border, s.end_correction * s.thickness / (bare * width[1:-1]), 0.0)
     stiffness = 1.0 / (half[:-1] + half[1:] + ends)
-    # only the bare sheet bends enough to lose energy; the same loss time on the sandwich would only cost time step
-    lossy = stiffness if s.patch_loss else np.minimum(stiffness, bare * width[1:-1] / s.cell)
+    # the sheet alone loses energy: each half cell at the rate at which its share of the hinge's angle bends the sheet;
+    # of a cell, not of a hinge, so that the borders of the patches lose on any mesh what the sheet beside them does
+    share = half**2 * bare * middle / (0.5 * cells)
+    lossy = stiffness if s.patch_loss else stiffness**2 * (share[:-1] + share[1:] + ends)
     sheet.crease(stiffness=stiffness).set("crease_viscosity", viscosity=lossy * s.loss_time)
-    # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not
-    sheet.panel(np.arange(len(cells)), rigidity=bonded * (s.twist if s.guided else 1.0))
+    # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not, and soften bare cells
+    sheet.panel(np.arange(len(cells)), rigidity=bonded * s.twist)
     for number, size, sign, factor in (
         (1, (s.big_length, s.big_width), s.polarity, s.big_moment),
         (2, (s.small_length, s.small_width), -s.polarity, 1.0),
@@ -71,7 +79,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
                         poling=(s.heading * sign, 0, 0), remanence=s.remanence * factor,
                         density=s.patch_density)  # fmt: skip
 
-    # feet at both ends, belly everywhere: two points per station share the ground's stiffness
+    # a foot at either end, two points each; the belly everywhere, with a stiffness per length, whatever the cells
     last = len(cells) - 1
     feet, ends = [], ((0, x[0], width[0]), (last, x[-1], width[-1]))
     for panel, at, w in ends:
@@ -83,10 +91,11 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     for k in range(1, len(x) - 1):
         for cell in (k - 1, k):
             belly += [sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2) for y in (-1, 1)]
-    sheet.set("ground", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
-    sheet.set("friction", stiffness=s.ground_stiffness / 2, damping=s.ground_damping / 2)
+    along = 0.5 * (cells[1:] + cells[:-1])  # what a station stands for
     for effect in ("ground", "friction"):
-        sheet.set(effect, belly, stiffness=s.ground_stiffness / 4, damping=s.ground_damping / 4)
+        sheet.set(effect, feet, stiffness=s.foot_stiffness / 2, damping=s.foot_stiffness / 2 * s.ground_time)
+        stiff = np.repeat(s.ground_stiffness / 4 * along, 4)
+        sheet.set(effect, belly, stiffness=stiff, damping=stiff * s.ground_time)
     sheet.set("coulomb", friction_coefficient=s.belly_friction)
     sheet.set("coulomb", feet, friction_coefficient=s.foot_friction)
     sheet.set("directional_friction", feet, backward_excess=s.foot_friction_back - s.foot_friction)
@@ -98,6 +107,12 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     sheet.gravity((0, 0, -s.gravity))
     model, parameters = sheet.build()
+    if s.guided:
+        as_beam(
+            model,
+            parameters,
+            s.membrane * (s.modulus * s.thickness * middle + mae.modulus * s.patch_thickness * patch_width),
+        )
     if not s.patch_height:  # a planar chain carries its masses on its line
         model = model.with_effects(without=("eccentric_weight",))
         parameters = parameters.for_model(model)

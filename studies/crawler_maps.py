@@ -76,8 +76,8 @@ MAPS = (
 VARIED = (
     "big_moment", "remanence", "field", "frequency", "foot_friction", "foot_friction_back", "belly_friction", "span",
     "overhang", "rear_width", "front_width", "thickness", "modulus", "density", "patch_density", "foot_height",
-    "foot_mass", "adhesion", "loss_time", "decay_rate", "ground_stiffness", "ground_damping", "big_length",
-    "small_length", "small_width", "big_width", "patch_thickness",
+    "foot_mass", "adhesion", "loss_time", "decay_rate", "ground_stiffness", "foot_stiffness", "ground_time",
+    "big_length", "small_length", "small_width", "big_width", "patch_thickness",
 )  # fmt: skip
 """Parameters that are changed by 5 % when a candidate is tried."""
 
@@ -366,7 +366,7 @@ def checks(t: Trial, names: Sequence[str] = VARIED, *, change: float = 0.05) -> 
     out = {"as it is": t}
     if names is VARIED:
         out["step / 2"] = Trial(s, t.cycles, 0.5 * t.step)
-        out["cell x 0.7"] = Trial(s.replace(cell=0.7 * s.cell), t.cycles)
+        out["cell / 2"] = Trial(s.replace(cell=0.5 * s.cell), t.cycles)
     for name in names:
         for factor in (1 - change, 1 + change):
             value = getattr(s, name) * factor
@@ -408,7 +408,7 @@ def judge(found: Mapping[str, Result]) -> Verdict:
     }
     varied = {n: c for n, c in changes.items() if n.endswith("%")}
     worst = max(varied, key=lambda n: abs(varied[n]))
-    return Verdict(base.stride, base.spread, changes.get("step / 2", np.nan), changes.get("cell x 0.7", np.nan), worst,
+    return Verdict(base.stride, base.spread, changes.get("step / 2", np.nan), changes.get("cell / 2", np.nan), worst,
                    varied[worst], changes)  # fmt: skip
 
 

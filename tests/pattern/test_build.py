@@ -98,6 +98,26 @@ def test_kresling_matches_the_published_layout():
     assert not np.isnan(pattern.rest_angles[split.crease_edge]).any()
 
 
+@pytest.mark.parametrize("twist", [0.4, -0.4])
+def test_a_kresling_cell_is_a_screw_of_the_hand_of_its_twist(twist):
+    """Seen from above the lower ring counts and the upper ring turns counter-clockwise; bars are chords of a helix."""
+    n, radius, height = 6, 0.03, 0.02
+    pattern = kresling(n, radius=radius, height=height, twist=twist)
+    lower, upper = pattern.vertices[:n], pattern.vertices[n:]
+    step = np.arctan2(np.cross(lower, np.roll(lower, -1, 0))[:, 2], (lower * np.roll(lower, -1, 0)).sum(1))
+    np.testing.assert_allclose(step, 2 * np.pi / n, rtol=1e-12)
+    np.testing.assert_allclose(np.cross(lower, upper)[:, 2], radius**2 * np.sin(twist), rtol=1e-12)
+
+    def chord(turn):
+        return np.sqrt(height**2 + (2 * radius * np.sin(turn / 2)) ** 2)
+
+    # the diagonal leads from i to the next node's, which lies a side ahead whatever the hand
+    lengths = {frozenset(e): float(np.linalg.norm(np.subtract(*pattern.vertices[list(e)]))) for e in pattern.edges}
+    for i in range(n):
+        assert lengths[frozenset((i, n + i))] == pytest.approx(chord(twist))
+        assert lengths[frozenset((i, n + (i + 1) % n))] == pytest.approx(chord(twist + 2 * np.pi / n))
+
+
 @pytest.mark.parametrize(
     ("build", "words"),
     [

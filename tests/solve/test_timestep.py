@@ -259,6 +259,18 @@ def test_single_spring_and_dashpot_have_the_closed_form_limit():
     assert spectral_radius(np.array([m]), np.array([[k]]), np.array([[c]]), 1.01 * stable_step(model, p).limit) > 1
 
 
+@pytest.mark.parametrize("c", [0.0, 0.7])
+def test_the_step_that_is_taken_is_stable_where_the_limit_is_exact(c):
+    """One node on one spring: the bound is the limit itself, so any step beyond it rings up, whatever it is called."""
+    k, m = 50.0, 0.02
+    model = make_model([[0, 0, 0], [1, 0, 0]], bars=[(0, 1)], free=[[0, 0, 0], [1, 0, 0]])
+    p = quiet(model, {("bars", "stiffness"): k, ("bar_viscosity", "viscosity"): c, ("inertia", "mass"): m})
+    dt = stable_step(model, p).dt
+    assert dt < 2 / np.sqrt(k / m)
+    assert spectral_radius(np.array([m]), np.array([[k]]), np.array([[c]]), dt) <= 1 + 1e-12
+    assert simulate(model, p, Drive(), duration=10 * dt, rate=1 / dt, state=start(model)).dt <= dt
+
+
 def test_limit_is_that_of_the_worst_world():
     model, p = bars_only()
     softer = p.copy().set("bars", "stiffness", p["bars", "stiffness"] * np.array([0.1, 1.0, 0.5]))

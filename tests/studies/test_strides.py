@@ -109,9 +109,9 @@ def test_candidates_want_steady_neighbours():
 
 def test_verdict_counts_a_failure_as_a_change():
     ok, worse, failed = Result((25.0,) * 4, 1e-6), Result((26.0,) * 4, 1e-6), Result((), 0.0, "unstable")
-    v = judge({"as it is": ok, "step / 2": ok, "cell x 0.7": ok, "span +5 %": worse, "field +5 %": failed})
+    v = judge({"as it is": ok, "step / 2": ok, "cell / 2": ok, "span +5 %": worse, "field +5 %": failed})
     assert (v.worst, v.worst_change, v.accepted) == ("field +5 %", 1.0, False)
-    assert judge({"as it is": ok, "step / 2": ok, "cell x 0.7": ok, "span +5 %": worse}).accepted
+    assert judge({"as it is": ok, "step / 2": ok, "cell / 2": ok, "span +5 %": worse}).accepted
 
 
 def test_worlds_are_stacked_side_by_side():

@@ -1,0 +1,164 @@
+/* The crawler as a chain in a plane: point masses, springs along and across, couples of magnets, ground and feet.
+
+   Written apart from the package, of which it uses nothing: no triangles, no fold angles, other damping along the
+   chain, a symplectic Euler step that takes the losses of hinges and cells with the velocity at its end (else steps
+   shrink with the fourth power of the cells). See planar_crawler.py. Lengths in m, angles counted from x to z. */
+
+#include <math.h>
+#include <string.h>
+
+#define MOST 512
+#define BAND 6 /* a hinge joins three stations of two coordinates */
+
+typedef struct {
+    int cells;                                    /* stations are one more */
+    double rigidity[MOST], loss[MOST];            /* of hinges at stations [N m, N m s]; the ends have none */
+    double axial[MOST], dashpot[MOST];            /* of cells [N/m, N s/m] */
+    double length[MOST], couple[MOST];            /* of cells [m], moment along the cell [A m^2] */
+    double lift[MOST];                            /* of cells: weight times its height above the line [N m] */
+    double mass[MOST];                            /* of stations [kg] */
+    double kn[MOST], cn[MOST];                    /* of stations: ground [N/m, N s/m], feet at both ends */
+    double belly, foot;                           /* depths below the line [m] */
+    double mu, mu_forward, mu_back;               /* friction of the belly, of the feet */
+    double field, frequency, gravity, decay;
+} Device;
+
+typedef struct { double x, z; } V;
+
+/* adds dt c g g^T for a rate that is g . v over k coordinates from `first` */
+static void lose(double (*a)[BAND], int first, int k, const double *g, double c)
+{
+    for (int i = 0; i < k; i++)
+        for (int j = 0; j <= i; j++) a[first + i][j - i + BAND - 1] += c * g[i] * g[j];
+}
+
+/* one contact of cell j's end n, o along the cell's normal below the line; adds its force, updates its bristle; what
+   its dashpots add to the system goes into the matrix */
+static void touch(const V *p, const V *v, V *f, double (*matrix)[BAND], int j, int n, double o, double length, double kn, double cn,
+                  double mu_forward, double mu_back, double dt, double *bristle)
+{
+    const int a = j, b = j + 1;
+    const double ux = (p[b].x - p[a].x) / length, uz = (p[b].z - p[a].z) / length;
+    const double gap = p[n].z - o * ux;           /* the normal is (-uz, ux) */
+    if (gap >= 0) { *bristle = 0; return; }
+    const double turn = (ux * (v[b].z - v[a].z) - uz * (v[b].x - v[a].x)) / length;
+    const double vx = v[n].x + o * ux * turn, vz = v[n].z + o * uz * turn;
+    double load = -kn * gap - cn * vz;
+    if (load <= 0) { *bristle = 0; return; }
+    double s = *bristle + vx * dt, pull = -kn * s - cn * vx;
+    /* it slides, or is about to, against the pull; the body's forward direction is that of u along the ground */
+    const double along = (pull > 0 ? -1.0 : 1.0) * (ux > 0 ? 1.0 : -1.0);
+    const double limit = load * (along > 0 ? mu_forward : mu_back);
+    const double side = n == a ? 1 : 0, r = o / length;
+    const double up[4] = {r * uz * uz, side - r * uz * ux, -r * uz * uz, 1 - side + r * uz * ux};
+    const double on[4] = {side + r * ux * uz, -r * ux * ux, 1 - side - r * ux * uz, r * ux * ux};
+    load += cn * vz; /* the dashpots act with the velocity at the end of the step */
+    lose(matrix, 2 * a, 4, up, dt * cn);
+    if (fabs(pull) > limit) {
+        pull = pull > 0 ? limit : -limit;
+        s = -pull / kn;
+    } else {
+        pull += cn * vx;
+        lose(matrix, 2 * a, 4, on, dt * cn);
+    }
+    *bristle = s;
+    const double c = o * (ux * pull + uz * load) / length;
+    f[n].x += pull; f[n].z += load;
+    f[b].x -= c * uz; f[b].z += c * ux;
+    f[a].x += c * uz; f[a].z -= c * ux;
+}
+
+/* solves a x = b by Cholesky's decomposition; a holds the lower band, row by row, its diagonal last; x goes into b */
+static void solve(int n, double (*a)[BAND], double *b)
+{
+    for (int i = 0; i < n; i++) {
+        const int first = i < BAND - 1 ? 0 : i - BAND + 1;
+        for (int j = first; j <= i; j++) {
+            double s = a[i][j - i + BAND - 1];
+            for (int k = j < BAND ? first : (first > j - BAND + 1 ? first : j - BAND + 1); k < j; k++)
+                s -= a[i][k - i + BAND - 1] * a[j][k - j + BAND - 1];
+            a[i][j - i + BAND - 1] = j < i ? s * a[j][BAND - 1] : 1 / sqrt(s); /* the diagonal's inverse is kept */
+        }
+        double s = b[i];
+        for (int k = first; k < i; k++) s -= a[i][k - i + BAND - 1] * b[k];
+        b[i] = s * a[i][BAND - 1];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        double s = b[i];
+        for (int k = i + 1; k < n && k < i + BAND; k++) s -= a[k][i - k + BAND - 1] * b[k];
+        b[i] = s * a[i][BAND - 1];
+    }
+}
+
+/* runs so many steps and stores the centre of mass [x] at the end of each period of `every` steps */
+int run(const Device *d, double *state, double dt, long steps, long every, double *out)
+{
+    static _Thread_local V f[MOST];
+    static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[2 * MOST], a[2 * MOST][BAND];
+    const int n = d->cells;
+    V *p = (V *)state, *v = p + n + 1;
+    double total = 0;
+    memset(bristle, 0, sizeof bristle);
+    for (int i = 0; i <= n; i++) total += d->mass[i];
+    for (long k = 0; k < steps; k++) {
+        memset(a, 0, 2 * (n + 1) * sizeof *a);
+        const double b = d->field * sin(2 * M_PI * d->frequency * k * dt);
+        for (int i = 0; i <= n; i++) {
+            f[i].x = -d->decay * d->mass[i] * v[i].x;
+            f[i].z = -d->mass[i] * (d->gravity + d->decay * v[i].z);
+        }
+        for (int j = 0; j < n; j++) {
+            const double dx = p[j + 1].x - p[j].x, dz = p[j + 1].z - p[j].z, l = sqrt(dx * dx + dz * dz);
+            len[j] = l; ux[j] = dx / l; uz[j] = dz / l;
+            const double t = d->axial[j] * (l - d->length[j]);
+            f[j].x += t * ux[j]; f[j].z += t * uz[j];
+            f[j + 1].x -= t * ux[j]; f[j + 1].z -= t * uz[j];
+            c[j] = d->couple[j] * b * ux[j] + d->lift[j] * uz[j];
+        }
+        for (int i = 1; i < n; i++) {
+            const double angle = atan2(ux[i - 1] * uz[i] - uz[i - 1] * ux[i], ux[i - 1] * ux[i] + uz[i - 1] * uz[i]);
+            const double m = d->rigidity[i] * angle;
+            c[i] -= m; c[i - 1] += m;
+        }
+        for (int j = 0; j < n; j++) {
+            const double q = c[j] / len[j];
+            f[j].x += q * uz[j]; f[j].z -= q * ux[j];
+            f[j + 1].x -= q * uz[j]; f[j + 1].z += q * ux[j];
+        }
+        touch(p, v, f, a, 0, 0, d->foot, len[0], d->kn[0], d->cn[0], d->mu_forward, d->mu_back, dt, bristle);
+        touch(p, v, f, a, n - 1, n, d->foot, len[n - 1], d->kn[n], d->cn[n], d->mu_forward, d->mu_back, dt,
+              bristle + 2 * n);
+        for (int i = 1; i < n; i++) {
+            if (p[i].z > d->belly) { bristle[2 * i] = bristle[2 * i + 1] = 0; continue; }
+            touch(p, v, f, a, i - 1, i, d->belly, len[i - 1], d->kn[i] / 2, d->cn[i] / 2, d->mu, d->mu, dt,
+                  bristle + 2 * i);
+            touch(p, v, f, a, i, i, d->belly, len[i], d->kn[i] / 2, d->cn[i] / 2, d->mu, d->mu, dt,
+                  bristle + 2 * i + 1);
+        }
+        double x = 0;
+        for (int i = 0; i <= n; i++) {
+            a[2 * i][BAND - 1] += d->mass[i]; a[2 * i + 1][BAND - 1] += d->mass[i];
+            v[i].x = d->mass[i] * v[i].x + dt * f[i].x; v[i].z = d->mass[i] * v[i].z + dt * f[i].z;
+        }
+        for (int j = 0; j < n; j++) {
+            const double g[4] = {-ux[j], -uz[j], ux[j], uz[j]};
+            lose(a, 2 * j, 4, g, dt * d->dashpot[j]);
+        }
+        for (int i = 1; i < n; i++) {
+            const double hx = -uz[i - 1] / len[i - 1], hz = ux[i - 1] / len[i - 1];
+            const double qx = -uz[i] / len[i], qz = ux[i] / len[i];
+            const double g[6] = {hx, hz, -hx - qx, -hz - qz, qx, qz};
+            lose(a, 2 * i - 2, 6, g, dt * d->loss[i]);
+        }
+        solve(2 * (n + 1), a, (double *)v);
+        for (int i = 0; i <= n; i++) {
+            p[i].x += dt * v[i].x; p[i].z += dt * v[i].z;
+        }
+        if ((k + 1) % every == 0) {
+            for (int i = 0; i <= n; i++) x += d->mass[i] * p[i].x;
+            *out++ = x / total;
+            if (!isfinite(x)) return 1;
+        }
+    }
+    return 0;
+}
