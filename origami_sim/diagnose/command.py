@@ -52,6 +52,8 @@ def run(args: Namespace) -> int:
     """The command; returns the verdict's exit code."""
     say = (lambda *_, **__: None) if args.json else print
     folder = Path(args.out or "runs/diagnose")
+    if args.model:
+        _check_model(folder, args.model)
     _check_folder(folder)
     data = read_recordings(args.recordings, args.sidecar)
     given = args.model or recorded_model(data[0], "--model")

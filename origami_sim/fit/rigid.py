@@ -93,15 +93,20 @@ class RigidRollouts(Rollouts):
         batch = self._batch(model, parameters, drive, state, tolerance=TOLERANCE)
         if isinstance(batch, RigidBatch):
             batch.finest = FINEST
-        raw = film(batch, recording, shots.ends + 1 if shots.ends else shots.frames, 1, shots.step)
-        ends = self._arrived(shots, batch.state()) if shots.ends else None
-        if shots.ends and shots.frames > shots.ends + 1:
-            raw += film(batch, recording, shots.frames - shots.ends - 1, 1, shots.step, first=False)
+        begun, arrived, raw = 0, [], []
+        stops = [shots.ends + n for n in ((0, 1, 2) if shots.clocked else (1,))] if shots.ends else []
+        for frame in stops:
+            raw += film(batch, recording, frame - begun, 1, shots.step, first=not begun)
+            arrived.append(self._arrived(shots, batch.state()))
+            begun = frame
+        if shots.frames > begun:
+            raw += film(batch, recording, shots.frames - begun, 1, shots.step, first=not begun)
+        ends = np.stack(arrived) if arrived else None
         out = np.concatenate(raw)
         lost = batch.status() >= 0
         out[:, :, lost] = np.nan
         if ends is not None:
-            ends[:, lost] = np.nan
+            ends[..., lost] = np.nan
         return out, ends
 
     def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:

@@ -56,7 +56,8 @@ class Shots:
         recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
             [s]. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
             step: between frames [s]. frames: of each rollout. ends:
-            the frame at which the next blocks begin; 0: none is tied to them.
+            the frame at which the next blocks begin; 0: none is tied to them. clocked: whether a clock runs fast or
+            slow, so that they begin a little before or after that frame.
     """
 
     recording: int
@@ -68,6 +69,7 @@ class Shots:
     step: float
     frames: int
     ends: int
+    clocked: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +206,8 @@ class Rollouts(Worlds, ABC):
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
         once = Parameters.join([p for _, p in worlds])
         late, shown = lateness(model, once, k, begins, self.start == "fit")
+        longer = lateness(model, once, k, begins + blocks[0].lasting, self.start == "fit")[0] - late
+        clocked = bool(ends and np.any(longer))
         last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
         frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, group]
@@ -214,7 +218,8 @@ class Rollouts(Worlds, ABC):
             first = np.stack([memories[b.first][:, part][:, moves] for b in blocks], axis=2)
             memory = first.reshape(len(first), -1)
         chosen = [worlds[m] for m in moves]
-        shots = Shots(r, blocks, chosen, late[moves], some, memory, step, max(frames, ends + 1), ends)
+        frames = max(frames, ends + 2 if clocked else ends + 1)
+        shots = Shots(r, blocks, chosen, late[moves], some, memory, step, frames, ends, clocked)
         raw, arrived = self._filmed(shots)
         turning = angle_mask(recording)
         begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
@@ -233,7 +238,10 @@ class Rollouts(Worlds, ABC):
         else:
             values = spline(grid, plain)(times)
         values = values.reshape(len(times), -1, k, count)
-        tied = None if arrived is None else arrived[:, columns].reshape(-1, k, count)
+        tied = None
+        if arrived is not None:
+            near = arrived[..., columns]
+            tied = (carried(near, longer.ravel(), step) if clocked else near[0]).reshape(-1, k, count)
         return (
             [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
             None if tied is None else [tied[:, :, b].T for b in range(count)],
@@ -241,7 +249,10 @@ class Rollouts(Worlds, ABC):
 
     @abstractmethod
     def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
-        """Channels and depths [frames, D + k, K B] before anything measures them, and ends [L, K B] of tied blocks."""
+        """Channels and depths [frames, D + k, K B] before anything measures them, and ends [1, L, K B] of tied blocks.
+
+        If `Shots.clocked`, ends [3, L, K B]: a frame before, where the next begins as recorded, and a frame after.
+        """
 
     def _driven(self, shots: Shots, model: Model, parameters: Parameters) -> Drive:
         """The drive that reaches every rollout."""
@@ -402,6 +413,19 @@ def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple
             first.append(k)
         of.append(found[key])
     return first, np.array(of)
+
+
+def carried(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:
+    """Shifts and rates [L, W] a time `longer` (W,) [s] after the second of three frames `ends` [3, L, W].
+
+    Rates are a parabola through the three, and shifts its integral through theirs.
+    """
+    m = ends.shape[1] // 2
+    (q0, q1, q2), (v0, v1, v2) = ends[:, :m], ends[:, m:]
+    a, j = (v2 - v0) / (2 * step), (v2 - 2 * v1 + v0) / step**2
+    v = (q2 - q0) / (2 * step) - j * step**2 / 6
+    shift = q1 + longer * (v + longer * (a / 2 + longer * j / 6))
+    return np.concatenate([shift, v1 + longer * (a + longer * j / 2)])
 
 
 def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):

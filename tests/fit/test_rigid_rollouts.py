@@ -123,6 +123,19 @@ def test_a_segment_with_an_effect_meets_the_next_one_too(tied):
     assert np.abs(whole - tied.recordings[0].channels["fold0"].values[:, None]).max() > 0.05
 
 
+def test_a_clock_that_runs_fast_or_slow_is_told_of_tied_segments():
+    """By its clock a segment lasts longer than it is recorded to: the next one begins there."""
+    recording, rate = swung(*hanging(3)), 0.02
+    slow = replace(recording, times=recording.times / (1.0 + rate))
+    forward = RigidRollouts(replace(subject(3), nominals=()), [slow], segment=0.3)
+    clock = next(s for s in suspects(forward.model, [slow], forward.drive) if s.effect == "clock_rate")
+    weights = Weights(np.full(2, SHARP), gap=SHARP)
+    f = fit(forward, Hypothesis((clock,)), weights, most=20, done=0.0)
+    # films are read between frames, 0.1 rad of a swing apart
+    assert f.theta[0] == pytest.approx(rate, rel=5e-3)
+    assert gap_of(f) < 1e-3 and max(np.abs(r).max() for r in f.residuals) < NOISE
+
+
 def test_a_floating_device_is_followed_through_its_turns():
     """Two panels that are tossed, by markers: six coordinates of the root and a fold, tied as well."""
     sheet = Sheet(strip([0.03, 0.02], 0.02), thickness=1.5e-3, modulus=1.5e6, triangulation="center")
