@@ -80,7 +80,11 @@ class OwnColumns:
             side = 1 if first.start <= first.lower else -1 if first.start >= first.upper else 0
             begin = len(self.columns)
             self.columns += [place + k for k in arranged]
-            self.groups.append(Group(tuple(range(begin, begin + len(inner))), len(strong), at, side, spread))
+            low, high = (
+                np.array([(getattr(inner[k], name) - inner[k].start) / inner[k].scale for k in arranged])
+                for name in ("lower", "upper")
+            )
+            self.groups.append(Group(tuple(range(begin, begin + len(inner))), len(strong), at, side, spread, low, high))
             place += len(inner)
 
     def sets(self, count: int) -> Sets:

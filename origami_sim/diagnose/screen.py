@@ -50,6 +50,13 @@ class Signature:
             return -1 if self.size > 0 else 1
         return 0
 
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest change (1,) of the strength, over `size`."""
+        f = self.suspect.free[0]
+        low, high = sorted(((f.lower - f.start) / self.size, (f.upper - f.start) / self.size))
+        return np.array([low]), np.array([high])
+
 
 def screen(
     forward: Predictor,

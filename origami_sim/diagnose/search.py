@@ -430,7 +430,8 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
     count, groups = len(own.columns), list(own.groups)
     for n, o in enumerate(others):
-        groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf)))
+        low, high = out.signatures[o].bounds
+        groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf), low, high))
     effects = []
     for n, (t, rows) in enumerate(zip(line.tangent, line.rows, strict=True)):
         added = np.zeros((len(t), len(others)))

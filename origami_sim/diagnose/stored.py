@@ -10,7 +10,7 @@ diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -169,7 +169,11 @@ class Stored:
         nodes = []
         for n, (key, (members, groups, others, problems)) in enumerate(self.nodes.items()):
             shares = [[s.name, s.kind, s.share] for s in self.shares[key]]
-            told = [[list(g.columns), g.strengths, g.at.tolist(), g.side, [_json(v) for v in g.spread]] for g in groups]
+            told = [
+                [list(g.columns), g.strengths, g.at.tolist(), g.side]
+                + [[_json(v) for v in values] for values in (g.spread, *g.bounds())]
+                for g in groups
+            ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
             )
@@ -212,8 +216,8 @@ class Stored:
         for n, node in enumerate(about["nodes"]):
             key = frozenset(node["members"])
             groups = [
-                Group(tuple(c), s, np.array(at, float), side, np.array([np.inf if v is None else v for v in spread]))
-                for c, s, at, side, spread in node["groups"]
+                Group(tuple(c), s, np.array(at, float), side, _wide(spread), _wide(low, -np.inf), _wide(high))
+                for c, s, at, side, spread, low, high in node["groups"]
             ]
             problems = {}
             for k, gap in enumerate(node["gaps"]):
@@ -228,6 +232,11 @@ class Stored:
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
         return cls(suspects, tuple(about["gaps"]), nodes, failed, shares, about["quiet"], about["compared"])
+
+
+def _wide(values: Sequence[float | None], none: float = np.inf) -> np.ndarray:
+    """Numbers of a file, in which infinite ones are written as null."""
+    return np.array([none if v is None else v for v in values])
 
 
 def _json(value: float) -> float | None:

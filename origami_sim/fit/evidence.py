@@ -36,6 +36,7 @@ class Group:
         at: (k,) values where the problem is linearised, from where they begin, over the scale of the column.
         side: 1 or -1 where physics allows one sign of the first strength, else 0.
         spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
+        low, high: (k,) bounds from where they begin, over the scale; None: there are none.
     """
 
     columns: tuple[int, ...]
@@ -43,6 +44,13 @@ class Group:
     at: np.ndarray
     side: int
     spread: np.ndarray
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest values (k,) of the columns."""
+        none = np.full(len(self.columns), np.inf)
+        return -none if self.low is None else self.low, none if self.high is None else self.high
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +110,7 @@ class Sets:
     """Sets of groups that have as many columns each, laid out for `Summed.of`.
 
     Attributes:
-        columns: [n, k]. at, spread, side: [n, k] of the columns, see `Group`. strength: [n, k] whether it is one.
+        columns: [n, k]. at, spread, side, low, high: [n, k] of the columns, see `Group`. strength: [n, k] if it is one.
         back: [n, C] values of the strengths that the problem is linearised with and that a set lacks.
     """
 
@@ -111,6 +119,8 @@ class Sets:
     spread: np.ndarray
     side: np.ndarray
     strength: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
     back: np.ndarray
 
     @classmethod
@@ -131,6 +141,8 @@ class Sets:
             each(lambda g: g.spread),
             each(lambda g: [g.side] + [0] * (len(g.columns) - 1), int),
             each(lambda g: [n < g.strengths for n in range(len(g.columns))], bool),
+            each(lambda g: g.bounds()[0]),
+            each(lambda g: g.bounds()[1]),
             back,
         )
 
@@ -173,12 +185,16 @@ class Summed:
             move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
             value = sets.at + move
         sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
+        sided = np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0)
+        # what lies beyond a bound explains nothing
+        value = np.clip(value, sets.low, sets.high)
+        move = value - sets.at
         left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
         out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
         slab = log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
         out += np.sum(np.where(sets.strength, slab, shape), axis=1)
-        out += np.sum(np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0), axis=1)
+        out += np.sum(sided, axis=1)
         return out, value
 
 

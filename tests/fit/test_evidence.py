@@ -1,5 +1,6 @@
 """The evidence of sets of effects: against integrals over grids, and against the frequencies of what was drawn."""
 
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -105,6 +106,20 @@ def test_one_effect(d, side):
             assert found < exact + LAPLACE < -2.0
         else:
             assert found == pytest.approx(exact, abs=LAPLACE)
+
+
+def test_what_lies_beyond_a_bound_explains_nothing():
+    """An effect of d' 20 whose strength may be 5: its evidence is that of what 5 explains, but for the tail's width."""
+    toy, rng = Toy([1.0]), np.random.default_rng(1)
+    residual = toy.drawn(rng, np.array([20.0 / toy.norms[0]]))
+    free, most = groups([0]), np.array([5.0 / toy.norms[0]])
+    bound = [replace(free[0], low=-most, high=most)]
+    d = np.linspace(-5.0, 5.0, 8001)
+    left = residual - np.outer(d / toy.norms[0], toy.effects[:, 0])
+    exact = logsumexp(toy.log_density(left) + slab(d)) + np.log(d[1] - d[0]) - toy.log_density(residual)
+    (unbound,), (found,) = (gained(toy, residual, [(0,)], made) for made in (free, bound))
+    assert unbound > 150.0 > 100.0 > found
+    assert found == pytest.approx(exact, abs=4.0)  # the tail is 1/15 wide, and not sqrt(2 pi): 3.6 in log evidence
 
 
 @pytest.mark.parametrize("sides", [(0, 0), (1, 0)])
