@@ -92,7 +92,7 @@ def _positions(forward: Predictor, fit: Fit, r: int, mine: list[int]) -> dict[in
     nowhere = np.zeros((len(recording.times), 3))
     markers = {f"node {i}": Channel(f"node {i}", "marker", nowhere, "m", 1.0, {"node": i}) for i in range(count)}
     other = copy.copy(forward)
-    other.recordings, other._built = list(forward.recordings), {}
+    other.recordings, other._built = list(forward.recordings), {}  # type: ignore[attr-defined]
     other.recordings[r] = replace(recording, channels=markers)
     other.blocks = [
         replace(b, values=np.zeros((len(b.times), 3 * count)), begin=None) if n in mine else b

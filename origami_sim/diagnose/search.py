@@ -46,12 +46,6 @@ LEADING = 12
 It bounds the time of a search.
 """
 
-DOUBT = 2.0
-"""Times as much as a linear estimate promises that a single effect may explain, in log evidence, before any was fitted.
-
-Fits of single effects then tell how far these recordings mislead such estimates.
-"""
-
 OWED = 1.0
 """Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
@@ -229,24 +223,13 @@ def _worth(out: Posterior, key: Key, leader: Node | None = None) -> float:
 
 
 def _alone(out: Posterior, best: Key) -> Key | None:
-    """A single effect to fit where the best set is far off: it may do what several were expected to."""
-    known = {out.suspect(n).effect for n in best}
+    """A single effect to fit where the best set is far off, and no effect of it or that was fitted alone already.
+
+    It may do what several were expected to: what is linear promises too little.
+    """
+    known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
     singles = (k for k in out.ranked[:LEADING] if k in out.estimates)
-    single = next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
-    if single is None:
-        return None
-    none: Key = frozenset()
-    nothing, base = _worth(out, none), out.nodes[none].fit
-    fitted = [k for k in out.nodes if len(k) == 1 and out.promise.get(k, -np.inf) > nothing]
-    misled = [explained(base, out.nodes[k].fit) / (out.promise[k] - nothing) for k in fitted]
-    hoped = DOUBT * max([1.0, *misled]) * max(_worth(out, single) - nothing, 0.0)
-    return single if hoped >= explained(base, out.nodes[best].fit) else None
-
-
-def explained(base: Fit, f: Fit) -> float:
-    """Log evidence that a fit gains over another one by what it leaves, in white noise of the size of that."""
-    seen = np.sum([r.shape[0] - np.sum(np.isnan(r), axis=0) for r in base.residuals], axis=0)
-    return float(np.sum(seen * np.log(base.rms() / f.rms())))
+    return next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
 
 
 def missed(forward: Predictor, f: Fit) -> float:
