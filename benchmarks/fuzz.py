@@ -98,7 +98,7 @@ def table_files(folder: Path) -> dict[str, dict[str, bytes]]:
         "field": {"a.csv": field.encode()},
         "placed": {"a.csv": rows_of.encode(), "a.toml": placed, "map.csv": field.encode()},
         "cp": {"a.cp": cp},
-        "design": {"a.toml": DESIGN},
+        "design": {"a.toml": documented_design()},
         "model": {"a.toml": model_design(folder)},
         "device": {"a.py": DEVICE},
         "earlier": {"diagnosis.json": b'{"verdict": "TIE", "recordings": ["one", "two"]}',
@@ -112,21 +112,6 @@ def table_files(folder: Path) -> dict[str, dict[str, bytes]]:
     }  # fmt: skip
 
 
-DESIGN = b"""about = "a flap"
-pattern = { strip = { lengths = ["10 mm", "20 mm"], width = "20 mm" } }
-sheet = { thickness = "1 mm", triangulation = "center" }
-statements = [
-  { patch = { panel = 1, thickness = "3 mm", poling = [1, 0, 0] } },
-  { crease = { stiffness = "2 mN m/rad", loss_time = "3 ms" } },
-  { fix = { panels = [0] } },
-]
-[drive]
-field_z = { ramp = "50 mT", duration = "1 s" }
-voltage_1 = { times = [0, 1], values = [0, 5] }
-sources = [ { coil = { current = { sine = "2 A", frequency = 2 }, radius = "50 mm", position = [0, 0, "40 mm"] } } ]
-[run]
-duration = "2 s"
-"""
 DEVICE = b'''"""A flap."""
 from origami_sim import Drive, Sheet, ramp, strip
 
@@ -138,6 +123,15 @@ def build(gap="2 mm", field="50 mT", layers=2):
     sheet.patch(1, thickness="3 mm", poling=(1, 0, 0)).crease(stiffness="2 mN m/rad", loss_time="3 ms")
     return sheet.fix(panels=[0]), Drive(field=(0, 0, ramp(field, 1.0)))
 '''
+
+
+def documented_design() -> bytes:
+    """The design file of the page on them, which is the module's docstring, with waves of every kind."""
+    from origami_sim import design
+
+    shown = (line[4:] for line in (design.__doc__ or "").splitlines() if line.startswith("    "))
+    text = "\n".join(shown).replace('"2 A"', '{ sine = "2 A", frequency = 2 }')
+    return text.replace("[drive]", "[drive]\nvoltage_1 = { times = [0, 1], values = [0, 5] }\n").encode()
 
 
 def model_design(folder: Path) -> bytes:

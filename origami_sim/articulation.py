@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from origami_sim.model import Model, dihedral_angles
+from origami_sim.model import Model, beside, carried_sides, dihedral_angles
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Articulation:
         root = fixed[0] if fixed else int(np.argmax([len(n) for n in nodes])) if nodes else 0
         if not fixed and not self.floating:  # held by single nodes: the panel that holds most of them
             root = int(np.argmax([held[n].sum() for n in nodes]))
-        sides = [self._sides(model, nodes, c) for c in range(len(model.creases))]
+        sides = self._sides(model)
         reached, order, queue = {root}, [], deque([root])
         while queue:
             parent = queue.popleft()
@@ -108,17 +108,12 @@ class Articulation:
         return self._owner
 
     @staticmethod
-    def _sides(model: Model, nodes: list[np.ndarray], crease: int) -> tuple[int | None, int | None]:
-        """Panels on the side of l and on the side of i."""
-        i, j, k, m = model.creases[crease]
-        corners = len(model.position) - len(model.carriers)
-        if m >= corners:  # a hinge of its own nodes, which panels carry
-            return int(model.carriers[m - corners]), int(model.carriers[i - corners])
-        found: list[int | None] = []
-        for tip in (m, i):
-            triangle = np.flatnonzero(np.all(np.isin(model.triangles, [j, k, tip]), axis=1))
-            found.append(int(model.triangle_panel[triangle[0]]) if len(triangle) else None)
-        return found[0], found[1]
+    def _sides(model: Model) -> list[tuple[int | None, int | None]]:
+        """Panels left and right of each crease, on the side of l and on the side of i."""
+        if len(carried := carried_sides(model)):
+            return list(map(tuple, carried.tolist()))
+        panels = [*model.triangle_panel.tolist(), None]  # -1: none
+        return [(panels[left], panels[right]) for left, right in beside(model.triangles, model.creases).tolist()]
 
     @property
     def size(self) -> int:

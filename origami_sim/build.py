@@ -521,9 +521,7 @@ class Sheet(Grounds, Electrodes, Thick):
         """Moments [N m] at which the thinner panel beside each crease is plastic through and through."""
         mesh, out = self.mesh, np.zeros(len(creases))
         for n, c in enumerate(creases):
-            axis = mesh.creases[c, 1:3]
-            beside = {int(mesh.triangle_face[t]) for t, nodes in enumerate(mesh.triangles) if {*axis} <= {*nodes}}
-            thin = min(beside, key=lambda p: self.thickness[p])
+            thin = min(sorted(self._beside[c].tolist()), key=lambda p: self.thickness[p])
             stress = material(self._names[thin]).yield_stress
             if not stress > 0:
                 allowed = ", ".join(m.name for m in MATERIALS.values() if m.yield_stress > 0)
@@ -533,7 +531,7 @@ class Sheet(Grounds, Electrodes, Thick):
                     value=self._names[thin],
                     allowed=f"moment=..., or {allowed}",
                 )
-            width = np.linalg.norm(np.diff(mesh.vertices[axis], axis=0))
+            width = np.linalg.norm(np.diff(mesh.vertices[mesh.creases[c, 1:3]], axis=0))
             out[n] = stress * width * self.thickness[thin] ** 2 / 4
         return out
 

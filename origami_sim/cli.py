@@ -357,18 +357,18 @@ def _compare(args) -> int:
         value = getattr(args, name)
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
-    module = None if args.scene is None else device_module(args.scene)  # a wrong name is told before files are read
-    recording = None
-    if module is None:
-        recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
-        module = device_module(recorded_model(recording, "--scene"))
+    sidecar = args.sidecar or _sidecar(Path(args.recording))
+    given, recording = args.scene, None
+    if given is None:
+        recording = read_recording(args.recording, sidecar)
+        given = recorded_model(recording, "--scene")
+    module = device_module(given)
     scene = module.__name__.rpartition(".")[2]
     if not hasattr(module, "replicate"):
         allowed = "pendulum_chain, or a device of yours"
         raise InputError("this scene cannot replicate a recording", field="--scene", value=scene, allowed=allowed)
     settings = scene_settings(module).override(args.set, "--set")
-    if recording is None:
-        recording = read_recording(args.recording, args.sidecar or _sidecar(Path(args.recording)))
+    recording = recording or read_recording(args.recording, sidecar)  # what is wrong with names is told before
     check_recorded_scene(recording, scene, "origami-sim diagnose --model")
     duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")

@@ -29,7 +29,7 @@ import numpy as np
 from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
 from origami_sim.drive import CHANNELS, Drive, Signal
-from origami_sim.drive_file import as_table, called, check_known, read_drive
+from origami_sim.drive_file import as_table, called, check_known, read_drive, stated_in
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import write_text
 from origami_sim.model import Model, Parameters
@@ -101,7 +101,7 @@ def read_design(path: str | Path) -> Design:
     for key in data:
         if key not in _KEYS:
             raise InputError(f"unknown key{nearest(key, _KEYS)}", file=path, field=key, allowed=", ".join(_KEYS))
-    try:
+    with stated_in(path, "is no design"):
         source = read_model(data, path) if "model" in data else _sheet(data, path)
         run = as_table(data.get("run", {}), "run", path)
         for key in run:
@@ -113,12 +113,6 @@ def read_design(path: str | Path) -> Design:
             float(converted(run.get("rate", 60.0), "Hz", "run.rate")),
             str(data.get("about", "")),
         )
-    except InputError as e:
-        if e.file is not None:
-            raise
-        raise InputError(str(e), file=path) from None
-    except (TypeError, ValueError, IndexError, OverflowError) as e:  # a list where a number belongs, and the like
-        raise InputError(f"is no design ({e})", file=path) from None
 
 
 def write_design(

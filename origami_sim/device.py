@@ -193,11 +193,9 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
         model, parameters, drive, *_ = out.build(s)
         rate = round(1.0 / float(np.median(np.diff(recording.times))))
         duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
-        applied = applied_drive(recording)
-        stated = {n: applied[n] for n in applied.levels if not applied[n].is_zero and not n.startswith("source_")}
-        drive = surrounded(drive, recording)
-        lasts = {"duration": duration, "rate": rate}
-        return motion_of(s, model, parameters, drive.replace(**stated), **lasts, progress=progress), s
+        stated = {n: v for n, v in applied_drive(recording).signals.items() if not v.is_zero}
+        drive = surrounded(drive, recording).replace(**stated)
+        return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress), s
 
     out.raw, out.build = raw, extended(whole)
     out.run = own.get("run", run)

@@ -28,6 +28,8 @@ the numbers of the sources, `source_0_strength`, `source_0_x`, ...
 
 The origin is the age [s] of the device at the start: laws of time count from it.
 """
+UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1", "origin": "s"}
+"""SI unit of each family of channels, which is what stands before the first underscore."""
 
 SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 """How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
@@ -161,6 +163,11 @@ def series(times, values, *, scale=1.0) -> Signal:
     return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
 
 
+def held_to(end: float, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Samples, the last of them held to a second after `end` [s], which is no earlier."""
+    return np.append(times, end + 1.0), np.append(values, values[-1:], axis=0)
+
+
 def as_signal(value, unit: str = ANY) -> Signal:
     """The signal of a number or of a quantity, which must have that unit."""
     return value if isinstance(value, Signal) else Signal(offset=converted(value, unit, unit))
@@ -202,9 +209,8 @@ class Drive:
             raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
         values: list = [*field, *(g for row in gradient for g in row), temperature, load, origin, *voltages]
-        units = [*["T"] * 3, *["T/m"] * 9, "K", "1", "s", *["V"] * len(voltages)]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
-        self.signals = {n: as_signal(v, u) for n, v, u in zip(names, values, units, strict=True)}
+        self.signals = {n: as_signal(v, UNITS[n.partition("_")[0]]) for n, v in zip(names, values, strict=True)}
         self._place(sources)
 
     def _place(self, sources: Sequence["Source | Sequence[Source]"]) -> None:
@@ -245,7 +251,7 @@ class Drive:
     @property
     def levels(self) -> list[str]:
         """Channels that say how strong something is, and not where a source is, how large, or how old the device."""
-        return [n for n in self.signals if n != "origin" and (n[:7] != "source_" or n.endswith("_strength"))]
+        return [n for n in self.signals if n != "origin" and (not n.startswith("source_") or n.endswith("_strength"))]
 
     @property
     def fingerprint(self) -> bytes:

@@ -8,19 +8,30 @@ sources = [ { coil = { current = "2 A", radius = "50 mm", position = [0, 0, { ra
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from origami_sim.drive import Drive, Signal, ramp, series, sine
+from origami_sim.drive import UNITS, Drive, Signal, ramp, series, sine
 from origami_sim.errors import InputError, nearest
 from origami_sim.quantities import converted
 from origami_sim.sources import STRENGTHS, coil, coil_pair, dipole, field_table, flattened, magnet
 
 _WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
 
-_UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1", "origin": "s"}
-"""SI unit of each family of channels."""
+
+@contextmanager
+def stated_in(path: Path, said: str, field: str | None = None) -> Iterator[None]:
+    """Whatever inside refuses what a file states becomes a sentence that names the file."""
+    try:
+        yield
+    except InputError as e:
+        if e.file is not None:
+            raise
+        raise InputError(str(e), file=path) from None
+    except (TypeError, ValueError, IndexError, OverflowError) as e:  # a list where a number belongs, and the like
+        raise InputError(f"{said} ({e})", file=path, field=field) from None
 
 
 def as_table(value: Any, key: str, path: Path) -> dict[str, Any]:
@@ -108,7 +119,7 @@ def read_drive(given: dict[str, Any], path: Path) -> Drive:
     signals = {}
     for name, value in given.items():
         check_known(name, plain.signals, "drive", path)
-        signals[name] = read_signal(value, _UNITS[name.partition("_")[0]], f"drive.{name}", path)
+        signals[name] = read_signal(value, UNITS[name.partition("_")[0]], f"drive.{name}", path)
     return plain.replace(**signals).with_sources(sources)
 
 

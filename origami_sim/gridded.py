@@ -168,8 +168,9 @@ class FieldTable:
     def divergence(self) -> float:
         """Divergence at the places over one step of the grid, relative to the field, both as root mean squares.
 
-        A field of free space has none, so it is the error of the gradient: between the places it is some 0.4 times as
-        large, and three times the error of a component of the gradient.
+        A field of free space has none, so it is the error of the gradient: between the places of the table of a dipole
+        it is 0.36 to 0.45 times as large (steps of 5 to 1.7 mm), and three times the error of a component of the
+        gradient, to 2 %.
         """
         whole = np.sqrt(np.mean(self.values**2))
         return float(np.sqrt(np.mean(self._at_places[1] ** 2)) * self.steps.max() / whole) if whole else 0.0

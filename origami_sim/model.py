@@ -430,6 +430,23 @@ def _unit(v: np.ndarray) -> np.ndarray:
     return v / np.where(length > 0, length, 1.0)
 
 
+def carried_sides(model: Model) -> np.ndarray:
+    """[C, 2] panels left and right of creases with nodes of their own, which panels carry (see `thick`); else none."""
+    corners = len(model.position) - len(model.carriers)
+    if not len(model.creases) or model.creases.min() < corners:
+        return np.zeros((0, 2), np.int32)
+    return model.carriers[model.creases[:, [3, 0]] - corners]
+
+
+def beside(triangles: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+    """[H, 2] triangles [T, 3] left and right of hinges [H, 4], at their l and at their i; -1 where there is none."""
+    found: dict[frozenset[int], int] = {}
+    for t, corners in enumerate(triangles.tolist()):
+        found.setdefault(frozenset(corners), t)
+    sides = [[found.get(frozenset((j, k, tip)), -1) for tip in (m, i)] for i, j, k, m in hinges.tolist()]
+    return np.array(sides, int).reshape(-1, 2)
+
+
 def dihedral_angles(x: np.ndarray, hinges: np.ndarray) -> np.ndarray:
     """Fold angles in (-pi, pi] [rad] of hinges [H, 4] at positions [N, ..., 3]: shape [H, ...]."""
     if len(hinges) == 0:

@@ -12,6 +12,7 @@ edges that are a gap g apart, cut at m from square, and faces a distance d beyon
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Self
 
@@ -22,7 +23,7 @@ from scipy.optimize import minimize_scalar
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.masses import positive
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, beside
 from origami_sim.quantities import converted
 from origami_sim.statements import statement
 from origami_sim.touch import Touches
@@ -40,8 +41,8 @@ GIVE = 0.02
 It is chosen, as about a degree. The same crease is stopped 0.45 degrees beyond at half of this and 1.33 at double.
 """
 
-WORDS = ("top", "middle", "bottom")
-"""Where a hinge may lie, in terms of both panels."""
+WORDS = {"top": 0.5, "middle": 0.0, "bottom": -0.5}
+"""Where a hinge may lie, in terms of both panels: height over their middle planes, in thicknesses."""
 
 
 @dataclass(frozen=True)
@@ -164,12 +165,10 @@ class Thick(Touches):
 
     # what follows from it ----------------------------------------------------------------------------------------
 
-    def _beside(self, crease: int) -> tuple[int, int]:
-        """Panels left and right of a crease."""
-        i, j, k, m = self.mesh.creases[crease]
-        corners = self.mesh.triangles
-        sides = [np.flatnonzero(np.isin(corners, [j, k, tip]).all(axis=1))[0] for tip in (m, i)]
-        return int(self.mesh.triangle_face[sides[0]]), int(self.mesh.triangle_face[sides[1]])
+    @cached_property
+    def _beside(self) -> np.ndarray:
+        """[C, 2] panels left and right of each crease."""
+        return self.mesh.triangle_face[beside(self.mesh.triangles, self.mesh.creases)]
 
     def _faces(self, panel: int) -> tuple[float, float]:
         """Heights of the bottom and the top of a panel over the pattern's plane [m]."""
@@ -181,13 +180,9 @@ class Thick(Touches):
         at = self._hinges.get(crease, Hinge()).at
         if not isinstance(at, str):
             return at
-        found = []
-        for panel in self._beside(crease):
-            low, high = self._faces(panel)
-            found.append({"top": high, "bottom": low, "middle": 0.5 * (low + high)}[at])
-        one, other = found
+        left, right = self._beside[crease]
+        one, other = (float(self._levels[p] + WORDS[at] * self.thickness[p]) for p in (left, right))
         if abs(one - other) > 1e-9 * self.thickness.max():
-            left, right = self._beside(crease)
             raise InputError(
                 f"the {at} of panel {left} lies at {one * 1e3:.4g} mm, that of panel {right} at {other * 1e3:.4g} mm",
                 field=f"hinge of crease {crease}.at",
@@ -199,7 +194,7 @@ class Thick(Touches):
     def stops(self, crease: int) -> tuple[float, float]:
         """Fold angles at which the edges of a crease's panels meet, as valley and as mountain [rad], both >= 0."""
         hinge, z = self._hinges.get(crease, Hinge()), self._height(crease)
-        sides = [self._faces(panel) for panel in self._beside(crease)]
+        sides = [self._faces(panel) for panel in self._beside[crease]]
         half = 0.5 * hinge.gap
         valley = meeting([Edge(high - z, low - z, half, hinge.top, hinge.bottom) for low, high in sides])
         mountain = meeting([Edge(z - low, z - high, half, hinge.bottom, hinge.top) for low, high in sides])
@@ -239,9 +234,11 @@ class Thick(Touches):
         Raises:
             InputError: with bars, a hinge or panel off the pattern's plane; a hinge off it where the pattern is folded.
         """
-        heights = np.array([self._height(c) for c in range(len(self.mesh.creases))])
-        off = [c for c in range(len(heights)) if heights[c] or np.any(self._levels[list(self._beside(c))])]
-        if not off:
+        if not (self._hinges or self._levels.any()):
+            return model, parameters
+        heights, sides = np.array([self._height(c) for c in range(len(self.mesh.creases))]), self._beside
+        off = np.flatnonzero(np.any(self._levels[sides] != 0, axis=1) | (heights != 0))
+        if not len(off):
             return model, parameters
         if self.panels != "rigid":
             raise InputError(
@@ -252,14 +249,13 @@ class Thick(Touches):
             )
         normals = np.array([self._normal(p) for p in range(self.pattern.face_count)])
         for c in np.flatnonzero(heights).tolist():
-            left, right = self._beside(c)
+            left, right = sides[c]
             if normals[left] @ normals[right] < 1 - 1e-9:
                 raise InputError(
                     "hinges off the pattern's plane are stated on a flat pattern",
                     field=f"hinge of crease {c}",
                     allowed="a pattern that is flat there",
                 )
-        sides = np.array([self._beside(c) for c in range(len(heights))]).reshape(-1, 2)
         return parted(
             model, parameters, self._levels[:, None] * normals, heights[:, None] * normals[sides[:, 0]], sides
         )

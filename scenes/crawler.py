@@ -92,9 +92,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         for cell in (k - 1, k):
             belly += [sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2) for y in (-1, 1)]
     along = 0.5 * (cells[1:] + cells[:-1])  # what a station stands for
+    stiff = np.repeat(s.ground_stiffness / 4 * along, 4)
     for effect in ("ground", "friction"):
         sheet.set(effect, feet, stiffness=s.foot_stiffness / 2, damping=s.foot_stiffness / 2 * s.ground_time)
-        stiff = np.repeat(s.ground_stiffness / 4 * along, 4)
         sheet.set(effect, belly, stiffness=stiff, damping=stiff * s.ground_time)
     sheet.set("coulomb", friction_coefficient=s.belly_friction)
     sheet.set("coulomb", feet, friction_coefficient=s.foot_friction)

@@ -11,9 +11,9 @@ along +z presses on midspan like a dead load 2 M A B, until the arch leaves side
 
 The strip is a shell between two held rows of cells, of a nearly incompressible standard linear solid: a Maxwell branch
 relaxes beside the elasticity, in bending and in stretching. What flattens an arch between clamps compresses it, so that
-the loss in stretching decides whether a sudden field snaps it. The material is as published; the
-clamp's tilt is assumed, and a step of 5 mT snaps the arch if it is 1.7 mrad. The
-recorded motion is drawn beside the simulated one where the recording is present.
+the loss in stretching decides whether a sudden field snaps it. The material is as published; the clamp's tilt is
+assumed, and a step of 5 mT snaps the arch if it is 1.7 mrad. The recorded motion is drawn beside the simulated one
+where the recording is present.
 """
 
 from collections.abc import Sequence
@@ -215,7 +215,7 @@ def loop(s: Settings) -> Loop:
     return Loop(s.loop_field * path.factor, rest - midspan(model, path.x), path.stable, path.limit_points, path, rest)
 
 
-def mesh_study(s: Settings, meshes: Sequence[tuple[int, int]] = MESHES) -> dict[str, np.ndarray]:
+def mesh_study(s: Settings, meshes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Limit point, stroke and height of the buckled state by number of cells along and across the strip."""
     loops = [loop(s.replace(cells=float(n), rows=float(m))) for n, m in meshes]
     return {

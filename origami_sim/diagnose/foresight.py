@@ -4,12 +4,14 @@ A fit that lacks an effect leaves coloured noise, in which the effect hardly sho
 it would leave itself: all is linear, the residuals that follow are looked at as those of a fit are (`implied`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from origami_sim.diagnose.implied import OwnColumns, left_by
-from origami_sim.fit.evidence import Summed, log_slab, problem, summed
+from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -21,6 +23,7 @@ class Foresight:
     """A fit in white noise of the size of what it leaves.
 
     Attributes:
+        own: groups of the fit's own effects. numbers: of the model, whose columns come first.
         white: its problem. root: [k, P + C + 1] with the same least squares as nominal numbers, effects and residual
             once the starts suit each. parts: per segment [n D, P + C + 1], what is left of each then, over the noise.
     """
@@ -28,11 +31,11 @@ class Foresight:
     forward: Predictor
     fit: Fit
     weights: Weights
+    own: Sequence[Group]
+    numbers: int
     white: Summed
     root: np.ndarray
     parts: list[np.ndarray]
-    nominal: int
-    own: int
 
     @classmethod
     def of(cls, forward: Predictor, f: Fit, own: OwnColumns, effects: list[np.ndarray], hyper: Hyper) -> "Foresight":
@@ -41,31 +44,27 @@ class Foresight:
         plain = Weights(f.weights.deviation, gap=f.weights.gap)
         line = f.linear.reweighted(f.weights, plain)
         theirs = [recast(e, r, f.weights, plain) for e, r in zip(effects, line.rows, strict=True)]
-        none = [np.zeros((r.count, 0)) for r in line.rows]
-        white = summed(problem(line, own.nominal, own.precision, own.away, theirs, none), 0.0, hyper.flaws[0])
-        count = len(own.nominal)
-        columns = [
-            np.concatenate([t[:, own.nominal], e, r[:, None]], axis=1)
-            for t, e, r in zip(line.tangent, theirs, line.residual, strict=True)
-        ]
-        known = np.zeros((count, columns[0].shape[1]))
-        known[:, :count] = np.diag(own.precision[own.nominal])
-        known[:, -1] = own.precision[own.nominal] * own.away[own.nominal]
-        root = np.asarray(np.linalg.qr(np.concatenate([*line.cleared(columns), known]), mode="r"))
+        columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
+        whole = with_priors(line.cleared(columns), own.precision[own.nominal], own.away[own.nominal])
+        root = np.asarray(np.linalg.qr(whole, mode="r"))
+        white = summed(without_numbers(whole, count, theirs[0].shape[1], -line.spread), 0.0, hyper.flaws[0])
         parts = [s[: r.data] for s, r in zip(line.smoothed(columns), line.rows, strict=True)]
-        return cls(forward, f, plain, white, root, parts, count, len(own.columns))
+        return cls(forward, f, plain, own.groups, count, white, root, parts)
 
-    def gain(self, columns: list[int], hyper: Hyper) -> float:
-        """Log evidence that effects of these columns gain over the fit, each in noise of its own."""
-        new = len([c for c in columns if c >= self.own])
-        gain = self._likely(columns) - self._likely(list(range(self.own)))
+    def gain(self, groups: Sequence[Group], hyper: Hyper) -> float:
+        """Log evidence that effects gain over the fit, each in noise of its own."""
+        new = sum(g.strengths for g in groups if g not in self.own)
+        gain = self._likely(groups) - self._likely(self.own)
         d = np.sqrt(2.0 * max(gain, 1.0) / max(new, 1))
         return gain + new * (float(log_slab(np.array(d), hyper)) + 0.5 * float(np.log(2.0 * np.pi)))
 
-    def _likely(self, columns: list[int]) -> float:
-        """Log likelihood of what is left once these columns and all numbers explain what they can."""
-        use = [*range(self.nominal), *(self.nominal + c for c in columns)]
-        change = np.linalg.lstsq(self.root[:, use], self.root[:, -1], rcond=1e-10)[0]
+    def _likely(self, groups: Sequence[Group]) -> float:
+        """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part."""
+        use = [*range(self.numbers), *(self.numbers + c for g in groups for c in g.columns)]
+        none = np.full(self.numbers, np.inf)
+        low = np.concatenate([-none, *(np.minimum(g.bounds()[0] - g.at, -1e-12) for g in groups)])
+        high = np.concatenate([none, *(np.maximum(g.bounds()[1] - g.at, 1e-12) for g in groups)])
+        change = lsq_linear(self.root[:, use], self.root[:, -1], (low, high)).x
         left = []
         for b, part in zip(self.fit.blocks, self.parts, strict=True):
             seen = self.forward.blocks[b].seen()

@@ -16,7 +16,7 @@ from origami_sim.fit.residual_process import residual_process
 from origami_sim.fit.weights import Weights, recast
 
 ROUNDS = 4
-"""Times that gaps and levels follow each other. With two, probabilities of four swings change by 3e-5."""
+"""Times that gaps and levels follow each other. With two, probabilities of a swing change by 3e-5."""
 
 
 def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from origami_sim.diagnose.budget import Share, budget
 from origami_sim.diagnose.implied import OwnColumns
@@ -219,15 +218,21 @@ def class_of(p: Posterior, key: Key) -> frozenset[str]:
     return frozenset(p.suspect(n).effect for n in key)
 
 
+def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
+    """Posterior of each effect, whatever acts besides."""
+    out: dict[str, float] = {}
+    for c, value in classes.items():
+        for effect in c:
+            out[effect] = out.get(effect, 0.0) + value
+    return out
+
+
 def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
     """Effects that act together with at least `ALONE`; and the few explanations that add to them, if one surely does.
 
     What is added is listed where `LISTED` explanations or fewer hold `ALONE`.
     """
-    marginal: dict[str, float] = {}
-    for c, value in classes.items():
-        for effect in c:
-            marginal[effect] = marginal.get(effect, 0.0) + value
+    marginal = of_each(classes)
     lead: frozenset[str] = frozenset()
     for effect in sorted(marginal, key=lambda e: (-marginal[e], e)):
         larger = lead | {effect}
@@ -243,11 +248,7 @@ def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[f
 
 def _besides(classes: dict[frozenset[str], float], lead: frozenset[str]) -> list[tuple[str, float]]:
     """The most probable effects that act beside others, with their probabilities."""
-    chance: dict[str, float] = {}
-    for c, value in classes.items():
-        if c >= lead:
-            for effect in c - lead:
-                chance[effect] = chance.get(effect, 0.0) + value
+    chance = of_each({c - lead: value for c, value in classes.items() if c >= lead})
     likely = sorted(chance.items(), key=lambda item: (-item[1], item[0]))[:LISTED]
     return [(e, v) for e, v in likely if v > 1.0 - CREDIBLE]
 
@@ -337,4 +338,4 @@ def _of_recorder(effects: frozenset[str]) -> bool:
 
 def log_odds(p: Posterior, key: Key) -> float:
     """Log posterior odds of a set over the model without an effect."""
-    return float(logsumexp(p.log[key]) - logsumexp(p.log[frozenset()]))
+    return p.total[key] - p.total[frozenset()]

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from origami_sim.effects._effect import Memory, Parameter, scalar
+from origami_sim.effects.crease_relaxation import branch
 
 COMPONENTS = ("11", "22", "12", "66", "16", "26")
 """Entries of the matrix that are parameters; 6 stands for the shear (Jones 1999, Mechanics of Composite Materials)."""
@@ -49,12 +51,11 @@ BRANCHES = (1, 2, 3)
 
 @wp.func
 def relaxed(q: wp.vec3d, change: wp.vec3d, dt: scalar, share: scalar, time: scalar):
-    """A Maxwell branch's stress over the stiffness after a step; exact for a strain that changes evenly within it."""
-    r = dt / time
-    grow = scalar(1.0) - scalar(0.5) * r
-    if r > scalar(1.0e-6):
-        grow = (scalar(1.0) - wp.exp(-r)) / r
-    return wp.exp(-r) * q + (share * grow) * change
+    """A Maxwell branch's stress over the stiffness after a step: what is left, and what the change adds as in a crease.
+
+    Exact for a strain that changes evenly within the step.
+    """
+    return wp.exp(-dt / time) * q + branch(scalar(0.0), scalar(1.0), dt, share, time) * change
 
 
 @wp.func
@@ -64,12 +65,12 @@ def maxwell(
     q1: wp.vec3d,
     q2: wp.vec3d,
     q3: wp.vec3d,
-    s11: scalar,
-    s22: scalar,
-    s12: scalar,
-    s66: scalar,
-    s16: scalar,
-    s26: scalar,
+    stiffness_11: scalar,
+    stiffness_22: scalar,
+    stiffness_12: scalar,
+    stiffness_66: scalar,
+    stiffness_16: scalar,
+    stiffness_26: scalar,
     share_1: scalar,
     time_1: scalar,
     share_2: scalar,
@@ -77,16 +78,28 @@ def maxwell(
     share_3: scalar,
     time_3: scalar,
 ):
-    """What three branches resist a change with, and their memory after it."""
+    """The law of three branches: what they resist a change with, and their memory after it."""
     p1 = relaxed(q1, change, dt, share_1, time_1)
     p2 = relaxed(q2, change, dt, share_2, time_2)
     p3 = relaxed(q3, change, dt, share_3, time_3)
-    return weighed(p1 + p2 + p3, s11, s22, s12, s66, s16, s26), p1, p2, p3
+    resisting = weighed(
+        p1 + p2 + p3, stiffness_11, stiffness_22, stiffness_12, stiffness_66, stiffness_16, stiffness_26
+    )
+    return resisting, p1, p2, p3
 
 
-def branches() -> tuple[Parameter, ...]:
-    """Share of the stiffness and relaxation time of the branches, silent at first."""
-    return tuple(
+def instantaneous(parameters: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Largest stiffness of the branches for a strain of unit norm that comes at once."""
+    return largest(parameters) * sum(np.asarray(parameters[f"share_{i}"]) for i in BRANCHES)
+
+
+def relaxation(symbol: str, unit: str, meaning: str) -> dict[str, Any]:
+    """What effects by which a stiffness relaxes have in common, but for their law.
+
+    Branches are silent at first. Each remembers its stress over the stiffness: a strain or a curvature, in the
+    triangle's axes.
+    """
+    branches = tuple(
         p
         for i in BRANCHES
         for p in (
@@ -97,13 +110,13 @@ def branches() -> tuple[Parameter, ...]:
             Parameter(f"time_{i}", f"tau{i}", "s", 1.0, (1e-6, math.inf), f"relaxation time {i}", typical=0.01),
         )
     )  # fmt: skip
-
-
-def memories() -> tuple[Memory, ...]:
-    """Stress of each branch over the stiffness: a strain or a curvature, in the triangle's axes."""
-    return tuple(Memory(f"q{i}", 3, own=True) for i in BRANCHES)
-
-
-def instantaneous(parameters: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Largest stiffness of the branches for a strain of unit norm that comes at once."""
-    return largest(parameters) * sum(np.asarray(parameters[f"share_{i}"]) for i in BRANCHES)
+    return {
+        "memory": tuple(Memory(f"q{i}", 3, own=True) for i in BRANCHES),
+        "parameters": (*stiffnesses(symbol, unit, meaning), *branches),
+        "fitted": ("share_1", "time_1"),
+        "stated": ("stiffness_11", "stiffness_22", "stiffness_66"),
+        "needs": tuple(f"share_{i}" for i in BRANCHES),
+        "stiffness": instantaneous,
+        "source": "generalised Maxwell solid of which all moduli relax alike (standard linear solid with one branch); "
+        "exact exponential update (Simo & Hughes 1998, ch. 10)",
+    }

@@ -3,7 +3,7 @@
 import warp as wp
 
 from origami_sim.effects._effect import Effect, scalar
-from origami_sim.effects._plate import branches, instantaneous, maxwell, memories, stiffnesses
+from origami_sim.effects._plate import maxwell, relaxation
 
 
 @wp.func
@@ -44,17 +44,8 @@ EFFECT = Effect(
     name="shell_bending_relaxation",
     family="plate",
     force=resultant,
-    memory=memories(),
-    parameters=(*stiffnesses("D", "N m", "bending stiffness"), *branches()),
-    fitted=("share_1", "time_1"),
-    stated=("stiffness_11", "stiffness_22", "stiffness_66"),
-    needs=("share_1", "share_2", "share_3"),
-    stiffness=instantaneous,
+    **relaxation("D", "N m", "bending stiffness"),
     formula="M = D sum q_i,  dq_i/dt = g_i dkappa/dt - q_i / tau_i",
-    source=(
-        "generalised Maxwell solid of which all moduli relax alike (standard linear solid with one branch); exact "
-        "exponential update (Simo & Hughes 1998, ch. 10)"
-    ),
     matters="elastomer strips that swing or snap; VHB loses half its moment in 10 s",
     confused_with="relaxation in stretching, drag of the air, slow drift of the load",
     separated_by="ring-down of a strip with a free end, which only bends; hold at constant load, then recovery",

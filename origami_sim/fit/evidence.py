@@ -82,27 +82,41 @@ def problem(
             deviation of all numbers. away: (P,) prior mean minus value, over the scale.
         effects: per segment [r, C]. smooth: per segment [r, K].
     """
-    parts = [
-        np.concatenate([t[:, nominal], x, d, r[:, None]], axis=1)
-        for t, x, d, r in zip(line.tangent, effects, smooth, line.residual, strict=True)
+    more = [np.concatenate(both, axis=1) for both in zip(effects, smooth, strict=True)]
+    parts = beside_numbers(line, nominal, more)
+    whole = with_priors(line.cleared(parts), precision[nominal], away[nominal])
+    return without_numbers(whole, len(nominal), effects[0].shape[1], -line.spread)
+
+
+def beside_numbers(line: Linearisation, nominal: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
+    """Per segment [r, P + k + 1]: columns of nominal numbers, others [r, k], and the residual."""
+    return [
+        np.concatenate([t[:, nominal], x, r[:, None]], axis=1)
+        for t, x, r in zip(line.tangent, columns, line.residual, strict=True)
     ]
-    whole = np.concatenate(line.cleared(parts))
-    p = len(nominal)
-    below = np.zeros((p, whole.shape[1]))
-    below[:, :p] = np.diag(precision[nominal])
-    below[:, -1] = precision[nominal] * away[nominal]
-    # numbers without a prior: a very wide one, the same for all hypotheses
-    whole = np.concatenate([whole, below])
-    constant = -line.spread
-    if p:
-        q, r = np.linalg.qr(whole[:, :p])
-        size = np.abs(np.diag(r))
-        keep = size > 1e-10 * size.max(initial=1e-300)
-        rest = whole[:, p:] - q[:, keep] @ (q[:, keep].T @ whole[:, p:])
-        constant -= float(np.sum(np.log(size[keep])))
-    else:
-        rest = whole
-    return Problem(rest.T @ rest, effects[0].shape[1], constant)
+
+
+def with_priors(cleared: list[np.ndarray], precision: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """All segments, and below them a row for what is known of each of the numbers, whose columns come first."""
+    p = len(precision)
+    below = np.zeros((p, cleared[0].shape[1]))
+    below[:, :p] = np.diag(precision)
+    below[:, -1] = precision * away
+    return np.concatenate([*cleared, below])
+
+
+def without_numbers(whole: np.ndarray, p: int, columns: int, constant: float) -> Problem:
+    """The problem that is left of rows [., P + C + K + 1] once the first P columns are eliminated.
+
+    Numbers without a prior have a very wide one, the same for all hypotheses.
+    """
+    if not p:
+        return Problem(whole.T @ whole, columns, constant)
+    q, r = np.linalg.qr(whole[:, :p])
+    size = np.abs(np.diag(r))
+    keep = size > 1e-10 * size.max(initial=1e-300)
+    rest = whole[:, p:] - q[:, keep] @ (q[:, keep].T @ whole[:, p:])
+    return Problem(rest.T @ rest, columns, constant - float(np.sum(np.log(size[keep]))))
 
 
 @dataclass(frozen=True, eq=False)

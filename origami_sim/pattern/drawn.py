@@ -96,14 +96,26 @@ def drawn_pattern(
 
 def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:
     """Return (letter, opacity) by edge key, one for each, the higher `PRIORITY` where lines coincide."""
-    chosen: dict[tuple[int, int], tuple[str, float]] = {}
-    conflicts = set()
-    for a, b, s in pieces:
-        key, stroke = edge_key(a, b), strokes[s]
-        other = chosen.setdefault(key, stroke)
-        if other != stroke:
-            conflicts.add(key)
-            chosen[key] = min(other, stroke, key=lambda st: PRIORITY.index(st[0]))
+    drawn = [strokes[s] for *_, s in pieces]
+    stays, conflicts = foremost([piece[:2] for piece in pieces], drawn, lambda n: PRIORITY.index(drawn[n][0]))
     if conflicts:
-        notes.append(f"{len(conflicts)} edges are drawn twice in different colours or opacities: {PRIORITY} in order.")
-    return chosen
+        notes.append(f"{conflicts} edges are drawn twice in different colours or opacities: {PRIORITY} in order.")
+    return {key: drawn[n] for key, n in stays.items()}
+
+
+def foremost(pairs, marks, rank) -> tuple[dict[tuple[int, int], int], int]:
+    """Return which of the edges that join the same two vertices stays, and for how many others are marked otherwise.
+
+    Args:
+        pairs: vertices of each edge. marks: what each is marked with. rank: the number of an edge to its rank.
+
+    Returns:
+        The number of the edge of least rank, of equal ones the first, by edge key.
+    """
+    stays: dict[tuple[int, int], int] = {}
+    for n, pair in enumerate(pairs):
+        key = edge_key(*pair)
+        if (other := stays.setdefault(key, n)) != n:
+            stays[key] = min(other, n, key=rank)
+    differ = {key for n, pair in enumerate(pairs) if marks[n] != marks[stays[key := edge_key(*pair)]]}
+    return stays, len(differ)

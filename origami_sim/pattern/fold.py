@@ -13,7 +13,7 @@ from ..errors import InputError
 from .assemble import assemble
 from .checks import check_edges, check_vertices
 from .crease_pattern import ASSIGNMENTS, Pattern
-from .drawn import PRIORITY
+from .drawn import PRIORITY, foremost
 from .files import read_bytes, write_atomic
 from .fold_json import Frame, parse_json, resolve_frame
 from .planar import check_planar_graph, drop_holes, planar_faces
@@ -97,10 +97,9 @@ def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -
     if edges:
         kept = _distinct(edges, letters, fold_angles, notes)
         if len(kept) < count:
-            letters, (fold_angles, rest_angles, stiffness) = (
-                letters and [letters[e] for e in kept],
-                (None if a is None else a[kept] for a in (fold_angles, rest_angles, stiffness)),
-            )
+            letters = letters and [letters[e] for e in kept]
+            angles = (fold_angles, rest_angles, stiffness)
+            fold_angles, rest_angles, stiffness = (None if a is None else a[kept] for a in angles)
             _keep_edges(keys, kept, count)
             edges, count = [edges[e] for e in kept], len(kept)
     _note_angles(letters, fold_angles, notes)
@@ -173,24 +172,17 @@ def _angles(data, field, count):
 def _distinct(edges, letters, fold_angles, notes) -> list[int]:
     """Return which edges stay, in order, if of those between the same two vertices one does: as where drawn lines lie
     on each other the one that comes first in `PRIORITY`, and of these one with a fold angle."""
-    chosen: dict[tuple[int, int], int] = {}
-    differ = set()
+    letters = letters or "U" * len(edges)
 
     def rank(e):
-        letter = PRIORITY.find(letters[e]) if letters else 0
+        letter = PRIORITY.find(letters[e])
         return letter if letter >= 0 else len(PRIORITY), fold_angles is None or np.isnan(fold_angles[e])
 
-    for e, pair in enumerate(edges):
-        key = edge_key(*pair)
-        other = chosen.setdefault(key, e)
-        if other != e:
-            if letters and letters[other] != letters[e]:
-                differ.add(key)
-            chosen[key] = min(other, e, key=rank)
-    if len(chosen) < len(edges):
-        contrary = f", {len(differ)} of them with different letters: {PRIORITY} in order" if differ else ""
-        notes.append(f"{len(edges) - len(chosen)} edges were listed more than once and are one{contrary}.")
-    return sorted(chosen.values())
+    stays, differ = foremost(edges, letters, rank)
+    if len(stays) < len(edges):
+        contrary = f", {differ} of them with different letters: {PRIORITY} in order" if differ else ""
+        notes.append(f"{len(edges) - len(stays)} edges were listed more than once and are one{contrary}.")
+    return sorted(stays.values())
 
 
 def _keep_edges(keys, kept, count) -> None:

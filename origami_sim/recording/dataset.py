@@ -232,12 +232,8 @@ def _equal_values(one: Recording, other: Recording) -> bool:
 def _equal_drives(one: Recording, other: Recording) -> bool:
     same = (one.gravity, one.start) == (other.gravity, other.start) and one.drive.keys() == other.drive.keys()
     around = [Drive(sources=r.sources) for r in (one, other)]
-    same &= around[0].fingerprint == around[1].fingerprint and len(one.sources) == len(other.sources)
-    same = same and all(
-        np.array_equal(np.asarray(v, float), np.asarray(w, float), equal_nan=True)
-        for s, t in zip(*(d.signals.values() for d in around), strict=True)
-        for v, w in zip(vars(s).values(), vars(t).values(), strict=True)
-    )
+    same &= around[0].fingerprint == around[1].fingerprint
+    same &= all(map(np.array_equal, *((*d.slots().values(), *d.samples()) for d in around)))
     return same and all(
         d.constant == other.drive[k].constant and np.array_equal(d.values, other.drive[k].values)
         for k, d in one.drive.items()

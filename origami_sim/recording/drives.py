@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.drive import CHANNELS, Drive, series
+from origami_sim.drive import CHANNELS, Drive, held_to, series
+from origami_sim.drive import UNITS as CHANNEL_UNITS
 from origami_sim.errors import InputError
 from origami_sim.recording.placed import surrounded
 from origami_sim.recording.recording import DriveChannel, Recording
 
-UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1"}
-"""SI unit of the drives that the simulator knows; `field_x`, `gradient_zx`, `voltage_1` name single components."""
+UNITS = {family: unit for family, unit in CHANNEL_UNITS.items() if family != "origin"}
+"""SI unit of the drives that a recording may have; `field_x`, `gradient_zx`, `voltage_1` name single components."""
 
 
 def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
@@ -87,7 +88,7 @@ def _signals(name: str, drive: DriveChannel, recording: Recording, step: int | N
         return {channel: float(values[0]) for channel, values in components.items()}
     times = recording.times if drive.times is None else drive.times
     clock = times - recording.times[0]
-    after = np.append(clock, max(clock[-1], recording.times[-1] - recording.times[0]) * 2 + 1.0)  # hold the end
     if clock[0] > 0:
         raise InputError("the drive starts after the recording", field=f"drive.{name}", value=float(times[0]))
-    return {channel: series(after, np.append(values, values[-1])) for channel, values in components.items()}
+    end = 2 * max(clock[-1], recording.times[-1] - recording.times[0])
+    return {channel: series(*held_to(end, clock, values)) for channel, values in components.items()}

@@ -1,13 +1,14 @@
 """Magnets, coils and tables around a recorded device, as its sidecar states them."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from origami_sim.drive import Drive, Signal, series
-from origami_sim.drive_file import read_signal, read_sources
+from origami_sim.drive import Drive, Signal, held_to, series
+from origami_sim.drive_file import read_signal, read_sources, stated_in
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import Recording
 from origami_sim.recording.table import Table
@@ -41,8 +42,10 @@ def placed_sources(stated: Any, table: Table, times: np.ndarray, path: Path) -> 
         if isinstance(value, dict) and "column" in value:
             return _measured(value, unit, field, table, times, path)
         signal = read_signal(value, unit, field, path)
-        own = signal.times if isinstance(signal, Signal) else None
-        if own is not None and (own[0] > times[0] or own[-1] < times[-1]):
+        if not isinstance(signal, Signal) or signal.times is None or signal.values is None:
+            return signal
+        own = signal.times
+        if own[0] > times[0] or own[-1] < times[-1]:
             raise InputError(
                 "does not cover the recording",
                 file=path,
@@ -50,14 +53,11 @@ def placed_sources(stated: Any, table: Table, times: np.ndarray, path: Path) -> 
                 value=[float(own[0]), float(own[-1])],
                 allowed=f"samples from {times[0]:g} s to {times[-1]:g} s",
             )
-        return signal if own is None else _lasting(signal)
+        own, values = _lasting(own, signal.values)
+        return replace(signal, times=own, values=values)
 
-    try:
+    with stated_in(path, "cannot be stated so", "drive.sources"):
         return read_sources(stated, path, read=read)
-    except InputError as e:
-        raise e if e.file is not None else InputError(str(e), file=path) from None
-    except (TypeError, ValueError, IndexError, OverflowError) as e:  # a list where a number belongs, and the like
-        raise InputError(f"cannot be stated so ({e})", file=path, field="drive.sources") from None
 
 
 def _measured(value: dict[str, Any], unit: str, field: str, table: Table, times: np.ndarray, path: Path) -> Signal:
@@ -74,15 +74,12 @@ def _measured(value: dict[str, Any], unit: str, field: str, table: Table, times:
     if lost.size:
         place = table.position(int(lost[0]))
         raise InputError(f"the column misses a value at {place}", file=table.file, field=column)
-    return _lasting(series(times, values)) if len(times) > 1 else Signal(offset=float(values[0]))
+    return series(*_lasting(times, values))
 
 
-def _lasting(signal: Signal) -> Signal:
-    """The signal with its last value held for as long again and a second: a run may end after the last frame."""
-    assert signal.times is not None and signal.values is not None
-    end = 2 * signal.times[-1] - signal.times[0] + 1.0
-    held = np.append(signal.times, end), np.append(signal.values, signal.values[-1])
-    return Signal(signal.offset, signal.amplitude, signal.frequency, signal.phase, *held, signal.scale)
+def _lasting(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Samples with the last one held for as long again: a run may end after the last frame."""
+    return held_to(2 * times[-1] - times[0], times, values)
 
 
 def surrounded(drive: Drive, recording: Recording) -> Drive:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import warp as wp
 from scipy.sparse.csgraph import connected_components
 
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, carried_sides
 from origami_sim.solve import touching
 from origami_sim.solve.compose_touch import DEEPEST
 
@@ -228,12 +228,11 @@ def _owned(corners: np.ndarray) -> np.ndarray:
 
 
 def _links(model: Model) -> np.ndarray:
-    """[C, 2] a corner of each panel beside a crease that has nodes of its own, see `thick`; else none."""
-    corners = len(model.position) - len(model.carriers)
-    if not len(model.creases) or model.creases.min() < corners:
-        return np.zeros((0, 2), np.int32)
+    """[C, 2] a corner of each panel beside a crease that has nodes of its own; else none."""
+    beside = carried_sides(model)
+    if not len(beside):
+        return beside
     panels, first = np.unique(model.triangle_panel, return_index=True)
-    beside = model.carriers[model.creases[:, [0, 3]] - corners]
     return model.triangles[first[np.searchsorted(panels, beside)], 0].astype(np.int32)
 
 

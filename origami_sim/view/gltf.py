@@ -29,8 +29,8 @@ def glb(film: Film, *, keyframes: int = KEYFRAMES) -> bytes:
     """A run as an animated binary glTF file."""
     frames = np.unique(np.linspace(0, len(film.times) - 1, min(keyframes, len(film.times))).round().astype(int))
     seconds = (film.times[frames] - film.times[frames[0]]).astype(np.float32)
-    later = np.append(True, np.diff(np.maximum.accumulate(seconds)) > 0)  # of frames that float32 cannot tell apart one
-    frames, seconds = frames[later], seconds[later]
+    seconds, first = np.unique(seconds, return_index=True)  # of frames that float32 cannot tell apart one
+    frames = frames[first]
     out = _Buffer()
     corners, _ = film.faces()
     base = np.array([COLOURS[k] for k in film.kinds], float).reshape(-1, 3)

@@ -119,7 +119,7 @@ def test_what_lies_beyond_a_bound_explains_nothing():
     exact = logsumexp(toy.log_density(left) + slab(d)) + np.log(d[1] - d[0]) - toy.log_density(residual)
     (unbound,), (found,) = (gained(toy, residual, [(0,)], made) for made in (free, bound))
     assert unbound > 150.0 > 100.0 > found
-    assert found == pytest.approx(exact, abs=4.0)  # the tail is 1/15 wide, and not sqrt(2 pi): 3.6 in log evidence
+    assert found == pytest.approx(exact, abs=3.7)  # the tail is 1/15 wide, and not sqrt(2 pi): 3.6 in log evidence
 
 
 @pytest.mark.parametrize("sides", [(0, 0), (1, 0)])

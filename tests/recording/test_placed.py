@@ -8,6 +8,7 @@ from origami_sim.device import device_module
 from origami_sim.errors import InputError
 from origami_sim.fit.drives import drive_of
 from origami_sim.recording import applied_drive, read_recording
+from origami_sim.recording.dataset import _equal_drives
 from origami_sim.scene import scene_settings
 from origami_sim.solve.sources import field_at
 
@@ -84,6 +85,21 @@ def test_they_take_the_place_of_those_of_the_device(tmp_path):
     assert motion.creases[:, 0, 0] == pytest.approx(truth.creases[:, 0, 0], abs=1e-6)
     assert [kind for kind, _ in drive_of(r, own).placed] == ["magnet"]
     assert [kind for kind, _ in drive_of(recorded(tmp_path, ""), own).placed] == ["dipole"]
+
+
+@pytest.mark.parametrize(
+    ("sources", "equal"),
+    [
+        ("[[drive.sources]]\n" + MAGNET % '{ column = "z", unit = "mm" }', True),
+        ("[[drive.sources]]\n" + MAGNET % '{ column = "z", unit = "cm" }', False),
+        ("[[drive.sources]]\n" + MAGNET % "0", False),
+        (2 * ("[[drive.sources]]\n" + MAGNET % '{ column = "z", unit = "mm" }'), False),
+        ("", False),
+    ],
+)
+def test_recordings_with_other_magnets_were_driven_otherwise(tmp_path, sources, equal):
+    one = recorded(tmp_path, "[[drive.sources]]\n" + MAGNET % '{ column = "z", unit = "mm" }')
+    assert _equal_drives(one, recorded(tmp_path, sources)) is equal
 
 
 def test_curves_hold_them_at_each_step(tmp_path):

@@ -183,7 +183,9 @@ def test_mesh_of_the_motion(settings, ramp):
     assert snaps[1] == pytest.approx(snaps[0], rel=0.02)
 
 
-# recordings: published constants, nothing fitted ----------------------------------------------------------------------
+# recordings ----------------------------------------------------------------------------------------------------------
+# The material is as published. The clamp's tilt and the mesh were chosen with the recordings known: with a tilt of
+# 1.7 mrad the field of the snap is 1.6 % lower and a step of 5 mT snaps the arch.
 
 
 def test_recorded_ramp(settings, ramp):
