@@ -171,7 +171,8 @@ def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Pr
     those of the first explanation.
     """
     first, count = leading[0], len(leading[0].free) - len(leading[0].hypothesis.free)
-    blocks, nudges = range(len(forward.blocks)), start_steps(forward)
+    blocks = range(len(forward.blocks))
+    nudges = start_steps(forward, weights, blocks)
     each, thetas, steps, rows = [], [], [], []
     for h, f in enumerate(leading):
         rows.append(len(each))
@@ -188,7 +189,7 @@ def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Pr
     thetas += [first.theta] * forward.local
     local = np.zeros((len(each), len(forward.blocks), forward.local))
     for i in range(forward.local):
-        local[worlds + i, :, i] = nudges[i]
+        local[worlds + i, :, i] = nudges[:, i]
     parts = changed(forward, forward.shoot(each, thetas, local, blocks), weights, blocks)
     if not all(np.all(np.isfinite(c)) for c in parts):
         return None
@@ -215,8 +216,8 @@ def _line(forward: Predictor, parts: list[np.ndarray], worlds: int, nudges: np.n
     """The derivatives by starts, from changes of which the last ones are theirs."""
     rows = [b.rows(*link) for b, link in zip(forward.blocks, links(forward, range(len(parts))), strict=True)]
     slopes = []
-    for block, own, c in zip(forward.blocks, rows, parts, strict=True):
-        slope = c[worlds - 1 :].T / nudges
+    for block, own, c, nudge in zip(forward.blocks, rows, parts, nudges, strict=True):
+        slope = c[worlds - 1 :].T / nudge
         if own.start:
             slope[own.data : own.data + own.start] = np.diag(1.0 / block.known)
         slopes.append(slope)

@@ -6,6 +6,7 @@ it would leave itself: all is linear, the residuals that follow are looked at as
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -15,7 +16,7 @@ from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, su
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.weights import Weights, recast
+from origami_sim.fit.weights import Weights, log_volume, patterns, recast
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,8 @@ class Foresight:
     Attributes:
         own: groups of the fit's own effects. numbers: of the model, whose columns come first.
         white: its problem. root: [k, P + C + 1] with the same least squares as nominal numbers, effects and residual
-            once the starts suit each. parts: per segment [n D, P + C + 1], what is left of each then, over the noise.
+            once the starts suit each. parts: [R, P + C + 1], what is left then of each in the data of all segments,
+            over the noise.
     """
 
     forward: Predictor
@@ -35,7 +37,7 @@ class Foresight:
     numbers: int
     white: Summed
     root: np.ndarray
-    parts: list[np.ndarray]
+    parts: np.ndarray
 
     @classmethod
     def of(cls, forward: Predictor, f: Fit, own: OwnColumns, effects: list[np.ndarray], hyper: Hyper) -> "Foresight":
@@ -43,20 +45,24 @@ class Foresight:
         assert f.linear is not None and f.weights is not None
         plain = Weights(f.weights.deviation, gap=f.weights.gap)
         line = f.linear.reweighted(f.weights, plain)
-        theirs = [recast(e, r, f.weights, plain) for e, r in zip(effects, line.rows, strict=True)]
+        theirs = recast(effects, line.rows, f.weights, plain)
         columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
         whole = with_priors(line.cleared(columns), own.precision[own.nominal], own.away[own.nominal])
         root = np.asarray(np.linalg.qr(whole, mode="r"))
         white = summed(without_numbers(whole, count, theirs[0].shape[1], -line.spread), 0.0, hyper.flaws[0])
-        parts = [s[: r.data] for s, r in zip(line.smoothed(columns), line.rows, strict=True)]
+        parts = np.concatenate([s[: r.data] for s, r in zip(line.smoothed(columns), line.rows, strict=True)])
         return cls(forward, f, plain, own.groups, count, white, root, parts)
 
     def gain(self, groups: Sequence[Group], hyper: Hyper) -> float:
         """Log evidence that effects gain over the fit, each in noise of its own."""
         new = sum(g.strengths for g in groups if g not in self.own)
-        gain = self._likely(groups) - self._likely(self.own)
+        gain = self._likely(groups) - self._before
         d = np.sqrt(2.0 * max(gain, 1.0) / max(new, 1))
         return gain + new * (float(log_slab(np.array(d), hyper)) + 0.5 * float(np.log(2.0 * np.pi)))
+
+    @cached_property
+    def _before(self) -> float:
+        return self._likely(self.own)
 
     def _likely(self, groups: Sequence[Group]) -> float:
         """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part."""
@@ -65,15 +71,13 @@ class Foresight:
         low = np.concatenate([-none, *(np.minimum(g.bounds()[0] - g.at, -1e-12) for g in groups)])
         high = np.concatenate([none, *(np.maximum(g.bounds()[1] - g.at, 1e-12) for g in groups)])
         change = lsq_linear(self.root[:, use], self.root[:, -1], (low, high)).x
-        left = []
-        for b, part in zip(self.fit.blocks, self.parts, strict=True):
-            seen = self.forward.blocks[b].seen()
-            rest = (part[:, -1] - part[:, use] @ change).reshape(seen.shape) * self.weights.deviation
-            left.append(np.where(seen, rest, np.nan))
-        noise = left_by(self.forward, left, self.weights.gap)
         assert self.fit.linear is not None
-        out = noise.log_prior
-        for r, rows in zip(left, self.fit.linear.rows, strict=True):
-            white = noise.whitened(r, rows)
-            out -= 0.5 * float(white @ white) + noise.log_volume(rows)
+        rows, blocks = self.fit.linear.rows, self.fit.blocks
+        rest = np.split(self.parts[:, -1] - self.parts[:, use] @ change, np.cumsum([r.data for r in rows])[:-1])
+        each = zip(rest, (self.forward.blocks[b].seen() for b in blocks), strict=True)
+        left = [np.where(seen, r.reshape(seen.shape) * self.weights.deviation, np.nan) for r, seen in each]
+        noise = left_by(self.forward, left, self.weights.gap)
+        out = noise.log_prior - log_volume(noise, rows)
+        for mine in patterns(rows):
+            out -= 0.5 * float(np.sum(noise.whitened(np.stack([left[n] for n in mine]), rows[mine[0]]) ** 2))
         return out

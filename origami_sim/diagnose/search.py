@@ -22,10 +22,10 @@ from origami_sim.diagnose.screen import Signature
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
-from origami_sim.fit.least_squares import Fit, carried_on, fit, promised
+from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.weights import Weights, recast
+from origami_sim.fit.weights import Weights, log_volume, recast
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -110,7 +110,8 @@ class Posterior:
         ranked: single effects by what they promise the model without any.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
-        renewed: sets that were fitted again, from a fit of a larger one.
+        renewed: sets that were fitted again, from a fit of a larger one. polished: that are judged by derivatives of
+            the place where their fit ended.
     """
 
     signatures: list[Signature]
@@ -125,6 +126,7 @@ class Posterior:
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
+    polished: set[Key] = field(default_factory=set)
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
@@ -173,8 +175,9 @@ def search(
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     extended(out, forward, progress=progress, most=most)
-    polished(out, forward)
-    return extended(out, forward, progress=progress, most=most)
+    while polished(out, forward):
+        extended(out, forward, progress=progress, most=most)
+    return out
 
 
 def extended(
@@ -241,19 +244,22 @@ def missed(forward: Predictor, f: Fit) -> float:
     return float(np.nanmax(f.rms() / forward.blocks[0].noise))
 
 
-def polished(out: Posterior, forward: Predictor) -> None:
-    """Fits the leaders on, by their own noise."""
+def polished(out: Posterior, forward: Predictor) -> bool:
+    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any."""
     prior, chance = log_priors(out.signatures), out.probabilities()
-    for key in [k for k in out.nodes if chance[k] >= UNFITTED]:
+    leaders = [k for k in out.nodes if chance[k] >= UNFITTED and k not in out.polished]
+    for key in leaders:
         if key not in out.nodes:  # a larger set that went on fits it better
             continue
+        out.polished.add(key)
         f = out.nodes[key].fit
-        f = f.reweighted(tight(f))
-        if f.cost - promised(forward, f) < OWED:
-            continue
-        f = carried_on(forward, f)
+        f = renewed(forward, f.reweighted(tight(f)))
+        if f.cost - promised(forward, f) >= OWED:
+            f = carried_on(forward, f)
+            f = f if f.failed or f.exact else renewed(forward, f)
         if not f.failed:
             _add(out, forward, key, f, prior)
+    return bool(leaders)
 
 
 def tight(f: Fit) -> Weights:
@@ -418,16 +424,14 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
     for n, o in enumerate(others):
         low, high = out.signatures[o].bounds
         groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf), low, high))
-    effects = []
-    for n, (t, rows) in enumerate(zip(line.tangent, line.rows, strict=True)):
-        added = np.zeros((len(t), len(others)))
-        for k, o in enumerate(others):
-            added[:, k] = out.signatures[o].parts[n]
-        effects.append(np.concatenate([t[:, own.columns], recast(added, rows, out.weights, f.weights)], axis=1))
+    signs = [out.signatures[o].parts for o in others]
+    added = [np.stack([s[n] for s in signs], axis=1) if signs else np.zeros((len(t), 0)) for n, t in enumerate(line.tangent)]
+    added = recast(added, line.rows, out.weights, f.weights)
+    effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
     smooth = cosines(forward, f, line)
     tied = any(t is not None for t in line.tie)
     laid = own.sets(count + len(others))
-    volume = f.weights.log_prior - sum(f.weights.log_volume(r) for r in line.rows)
+    volume = f.weights.log_prior - log_volume(f.weights, line.rows)
     grid: list[Summed | None] = []
     evidence, problems = np.full(len(hyper.cells), -np.inf), {}
     for c, (gap, size, flaws) in enumerate(hyper.cells):

@@ -38,6 +38,9 @@ moments of a rubbing swing looked known to 0.2 %, where it is known to 2.4 %. Ha
 intervals by a twentieth.
 """
 
+LARGEST = 0.01
+"""Part of what is plausible by which a start is changed at most, where no channel tells it."""
+
 DONE = 3e-3
 """A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
 
@@ -137,7 +140,7 @@ def linearise(
     size = 0 if known is not None else forward.local
     fresh = count - kept
     steps = first_steps(forward, free, theta, steps)[:count]
-    nudges = start_steps(forward)
+    nudges = start_steps(forward, weights, blocks)
     if residual is None:
         residual = residuals(forward, hypothesis, theta, local, blocks, weights)
     rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
@@ -148,7 +151,7 @@ def linearise(
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         thetas[1 + np.arange(len(numbers)), numbers] += steps[numbers]
         for i in range(starts):
-            locals_[1 + len(numbers) + i, :, i] += nudges[i]
+            locals_[1 + len(numbers) + i, blocks, i] += nudges[:, i]
         if len(thetas) == 1:
             return [np.zeros((0, r.count)) for r in rows]
         thetas = np.clip(thetas, [f.lower for f in free], [f.upper for f in free])
@@ -172,9 +175,9 @@ def linearise(
     if known is not None:
         return replace(known.at(residual).beside(tangent, kept), steps=steps)
     slopes, tie = [], []
-    for b, own, c in zip(blocks, rows, changes, strict=True):
+    for b, own, c, nudge in zip(blocks, rows, changes, nudges, strict=True):
         block = forward.blocks[b]
-        slope = c[fresh:].T / nudges[:size]
+        slope = c[fresh:].T / nudge[:size]
         if own.start:
             slope[own.data : own.data + own.start] = np.diag(1.0 / block.known)
         slopes.append(slope)
@@ -232,14 +235,26 @@ def residuals(
     return out
 
 
-def start_steps(forward: Predictor) -> np.ndarray:
-    """Steps for derivatives by the starts: shifts [m or rad], then rates.
+def start_steps(forward: Predictor, weights: Weights, blocks: Sequence[int]) -> np.ndarray:
+    """Steps [B, L] for derivatives by the starts of blocks: shifts [m or rad], then rates.
 
-    A contact begins with a step of the solver, so that smaller changes of a start than a step's way do not move it.
+    All data of a segment show one by a standard deviation, if nothing else acts. Over less, laws that stick and slip
+    have kinks that do not matter, but moved the log evidence by two. A contact begins with a step of the solver, so
+    that smaller changes of a start than a step's way do not move it.
     """
-    m = forward.local // 2
-    shift, rate = (1e-4, 1e-2) if len(forward.model.contacts) else (1e-4 * forward.nudge, 1e-3 * forward.nudge)
-    return np.concatenate([np.full(m, shift), np.full(m, rate)]) if forward.local else np.zeros(0)
+    out = np.zeros((len(blocks), forward.local))
+    for n, b in enumerate(blocks):
+        block = forward.blocks[b]
+        if block.shows is None:
+            continue
+        shift = np.sqrt(block.seen().sum(axis=0) / weights.deviation**2 @ block.shows**2)
+        precision = np.concatenate([shift, shift * block.times[-1] / np.sqrt(3.0)])
+        out[n] = small(forward, weights, [b]) / np.hypot(precision, 1.0 / block.known)
+        out[n] = np.minimum(out[n], LARGEST * block.known)
+    if len(forward.model.contacts):
+        m = forward.local // 2
+        out = np.maximum(out, np.concatenate([np.full(m, 1e-4), np.full(m, 1e-2)]))
+    return out
 
 
 def first_steps(
@@ -371,6 +386,17 @@ def carried_on(forward, f: Fit, *, most: int = 8) -> Fit:
     assert f.weights is not None
     given = {"theta": f.theta, "local": f.local, "blocks": f.blocks, "begin": f.linear, "exact": f.exact}
     return fit(forward, f.hypothesis, f.weights, **given, most=most)
+
+
+def renewed(forward, f: Fit) -> Fit:
+    """A fit with all derivatives taken anew where it ended: of stale ones the log evidence is off by up to two."""
+    assert f.weights is not None and f.linear is not None
+    also = {"residual": f.linear.residual, "steps": f.linear.steps}
+    line = linearise(forward, f.hypothesis, f.free, f.theta, f.local, f.blocks, f.weights, **also)
+    if not all(np.all(np.isfinite(t)) for t in line.tangent):
+        return f
+    out = _finished(forward, f.hypothesis, f.free, f.theta, f.local, f.blocks, f.weights, line)
+    return replace(out, exact=True)
 
 
 def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:

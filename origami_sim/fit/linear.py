@@ -142,9 +142,9 @@ class Linearisation:
             return self
         return Linearisation(
             self.rows,
-            [recast(r, rows, old, new) for r, rows in zip(self.residual, self.rows, strict=True)],
-            [recast(t, rows, old, new) for t, rows in zip(self.tangent, self.rows, strict=True)],
-            [recast(s, rows, old, new) for s, rows in zip(self.slopes, self.rows, strict=True)],
+            recast(self.residual, self.rows, old, new),
+            recast(self.tangent, self.rows, old, new),
+            recast(self.slopes, self.rows, old, new),
             [None if t is None else t * (old.gap / new.gap) for t in self.tie],
             self.steps,
         )

@@ -29,6 +29,7 @@ class Block:
         reach: (L,) gaps to the next segment are measured by these; None where that is not tied to this one.
         lasting: time until the next segment begins, if it is tied to this one [s].
         begin: (D,) what was measured at the first frame, which tells the turn of angles.
+        shows: [D, m] derivatives of the channels by the coordinates at the start; None where that is not fitted.
     """
 
     recording: int
@@ -42,6 +43,7 @@ class Block:
     reach: np.ndarray | None = None
     lasting: float = 0.0
     begin: np.ndarray | None = None
+    shows: np.ndarray | None = None
 
     def rows(self, before: bool, after: bool) -> Rows:
         """How many rows of a least-squares problem it has, tied or not to the segments before and after it."""

@@ -55,10 +55,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
 
 def autocovariance(columns: Sequence[np.ndarray], lags: int) -> np.ndarray:
     """Products (lags + 1,) of residuals that many frames apart, over all segments, per frame that was seen."""
-    sums, seen = np.zeros(lags + 1), 0
-    for c in columns:
-        filled = np.nan_to_num(c)
-        seen += int(np.isfinite(c).sum())
-        for k in range(min(lags, len(c) - 1) + 1):
-            sums[k] += filled[: len(c) - k] @ filled[k:]
-    return sums / max(seen, 1)
+    apart = np.zeros(lags)
+    filled = np.concatenate([part for c in columns for part in (np.nan_to_num(c), apart)])
+    seen = sum(int(np.isfinite(c).sum()) for c in columns)
+    return np.array([filled[: len(filled) - k] @ filled[k:] for k in range(lags + 1)]) / max(seen, 1)

@@ -113,17 +113,17 @@ class Rollouts(Worlds, ABC):
         values, noise = stacked(recording)
         part = slice(first, first + frames)
         arm, m = self.articulation, self.articulation.size
-        pose, rates, known, found = arm.reference(), np.zeros(m), np.zeros(0), None
+        pose, rates, known, found, shows = arm.reference(), np.zeros(m), np.zeros(0), None, None
         if self.start == "fit":
             found = read_start(self.model, arm, recording, values, noise, first)
-            pose, rates = found.pose, found.rates
+            pose, rates, shows = found.pose, found.rates, found.tangent
             usual = np.maximum(self.usual_rates(index), 1e-9)
             told = np.isfinite(found.error)
             wide = np.hypot(CAREFUL * np.where(told, found.error, 0.0), np.maximum(usual, np.abs(rates)))
             known = np.concatenate([spans(arm, self.model), wide])
         times = recording.times[part] - recording.times[first]
         begin = seen_first(values[part])
-        block = Block(index, first, times, values[part].copy(), noise, pose, rates, known, begin=begin)
+        block = Block(index, first, times, values[part].copy(), noise, pose, rates, known, begin=begin, shows=shows)
         if found is None or first > 0:
             return block
         return stated(self, block, self.usual_rates(index), found.error, found.shown)
@@ -312,6 +312,8 @@ class Rollouts(Worlds, ABC):
         if motion is None:
             return None
         some, of = distinct_memories(worlds)
+        if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
+            return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
         worlds, path = [worlds[k] for k in some], motion.positions[:, :, None]
         step = float(np.median(np.diff(self.recordings[r].times)))
         out: dict[int, np.ndarray] = {}

@@ -29,13 +29,15 @@ class Reading:
 
     Attributes:
         pose: coordinates. rates: (m,) of the coordinates. error: (m,) standard deviation of the rates; infinite where
-            no channel tells them. shown: (m,) the same of the coordinates, from one frame.
+            no channel tells them. shown: (m,) the same of the coordinates, from one frame. tangent: [D, m] derivatives
+            of the channels by the coordinates.
     """
 
     pose: Pose
     rates: np.ndarray
     error: np.ndarray
     shown: np.ndarray
+    tangent: np.ndarray
 
 
 def read_start(model: Model, arm: Articulation, recording: Recording, values, noise, first: int) -> Reading:
@@ -59,7 +61,7 @@ def read_start(model: Model, arm: Articulation, recording: Recording, values, no
     spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
     told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
     shown = np.where(told, np.linalg.norm(inverse, axis=1), np.inf)
-    return Reading(pose, rates, np.where(told, spread, np.inf), shown)
+    return Reading(pose, rates, np.where(told, spread, np.inf), shown, tangent)
 
 
 def channel_tangent(model: Model, arm: Articulation, recording: Recording, pose: Pose, near: np.ndarray):

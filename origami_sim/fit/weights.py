@@ -1,6 +1,8 @@
 """What residuals are measured by: level and correlation of each component, and the size of gaps between segments."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +28,12 @@ class Rows:
     @property
     def count(self) -> int:
         return self.data + self.start + self.tie
+
+    @cached_property
+    def pattern(self) -> tuple[int, bytes, bytes]:
+        """Equal for segments of which the same values were measured in the same frames."""
+        seen, frames = self.seen, self.frames
+        return self.data, b"" if seen is None else seen.tobytes(), b"" if frames is None else frames.tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +99,29 @@ class Weights:
         return self.deviation is other.deviation and self.colour is other.colour
 
 
-def recast(columns: np.ndarray, rows: Rows, old: Weights, new: Weights) -> np.ndarray:
-    """Columns (r,) or [r, k] of a segment for other weights."""
-    out = np.array(columns, float)
+def recast(columns: Sequence[np.ndarray], rows: Sequence[Rows], old: Weights, new: Weights) -> list[np.ndarray]:
+    """Columns (r,) or [r, k] of segments for other weights."""
+    out = [np.array(c, float) for c in columns]
     if not old.like(new):
-        data = np.moveaxis(out[: rows.data], 0, -1)
-        out[: rows.data] = np.moveaxis(new.whitened(old.restored(data, rows), rows), -1, 0)
-    out[rows.data + rows.start :] *= old.gap / new.gap
+        for mine in patterns(rows):
+            data = np.stack([np.moveaxis(out[n][: rows[n].data], 0, -1) for n in mine])
+            data = new.whitened(old.restored(data, rows[mine[0]]), rows[mine[0]])
+            for n, part in zip(mine, data, strict=True):
+                out[n][: rows[n].data] = np.moveaxis(part, -1, 0)
+    if old.gap != new.gap:
+        for c, r in zip(out, rows, strict=True):
+            c[r.data + r.start :] *= old.gap / new.gap
     return out
+
+
+def patterns(rows: Sequence[Rows]) -> list[list[int]]:
+    """Segments that are whitened alike, together."""
+    found: dict[tuple, list[int]] = {}
+    for n, r in enumerate(rows):
+        found.setdefault(r.pattern, []).append(n)
+    return list(found.values())
+
+
+def log_volume(weights: Weights, rows: Sequence[Rows]) -> float:
+    """Half of the log determinant of the covariance of all data."""
+    return sum(len(mine) * weights.log_volume(rows[mine[0]]) for mine in patterns(rows))

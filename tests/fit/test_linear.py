@@ -147,4 +147,4 @@ def test_coloured_residuals_are_whitened_exactly_in_the_frames_that_were_seen():
         assert white[k] @ white[k] == pytest.approx(squares)
     assert w.restored(white, rows) == pytest.approx(np.nan_to_num(values))
     other = Weights(np.array([1.0, 1.0]), gap=2.0)
-    assert recast(white[0], rows, w, other) == pytest.approx(np.nan_to_num(values[0]).ravel())
+    assert recast([white[0]], [rows], w, other)[0] == pytest.approx(np.nan_to_num(values[0]).ravel())
