@@ -6,6 +6,7 @@ import numpy as np
 
 from origami_sim.articulation import Articulation
 from origami_sim.diagnose.inertia import calmer, inertia
+from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
 from origami_sim.fit.bars import BarRollouts
@@ -40,11 +41,11 @@ FEWEST = 8
 """Segments that a single recording is cut into at least, where bars predict it."""
 
 BENDING = 0.3
-"""Change by the bending of panels, over the noise, up to which they are taken as rigid."""
+"""Change by the bending of panels, over the noise or what rigid panels leave, up to which they are taken as rigid."""
 
 BENT = (
     "Panels are taken as rigid: with those of the model, bending would change what is measured by {:.2g} times its "
-    "noise."
+    "noise{}."
 )
 
 INERT = 0.3
@@ -154,7 +155,7 @@ def _slow_panels(subject: Subject, recordings: list[Recording], o: Options) -> t
         return Slow(subject, recordings, threads=o.threads), []
     if bent > BENDING:
         return Slow(subject, recordings, threads=o.threads), []
-    return rigid, [BENT.format(bent)]
+    return rigid, [BENT.format(bent, "")]
 
 
 def slow_bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
@@ -177,18 +178,22 @@ def rigid_rollouts(
     probe = RigidRollouts(subject, recordings, segment=FRAMES * frame, tied=False, threads=o.threads)
     if len(probe.articulation.creases) > JOINTS and not forced:
         return None
-    touching = bool(len(probe.model.contacts))
-    notes = []
-    if not forced:
-        bent = bending(subject, recordings, o)
-        if bent > BENDING:
-            return None
-        notes.append(BENT.format(bent))
-    if touching:  # a contact is no smooth function of a start
+    bent = 0.0 if forced else bending(subject, recordings, o)
+    if not np.isfinite(bent):
+        return None
+    if len(probe.model.contacts):  # a contact is no smooth function of a start
         start = o.start or starting(subject, recordings)
-        return RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads), notes
-    length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
-    return RigidRollouts(subject, recordings, segment=length, threads=o.threads), notes
+        found = RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads)
+    else:
+        length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
+        found = RigidRollouts(subject, recordings, segment=length, threads=o.threads)
+    if bent <= BENDING:
+        return found, [] if forced else [BENT.format(bent, "")]
+    # the noise of a tracker that smooths is larger than neighbouring frames show
+    left = float(np.sqrt(np.nanmean((nominal_fits(found)[1].rms() / found.blocks[0].noise) ** 2)))
+    if bent > BENDING * left:
+        return None
+    return found, [BENT.format(bent, f", of which the refitted model leaves {left:.2g} times")]
 
 
 def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:

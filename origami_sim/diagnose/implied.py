@@ -19,8 +19,7 @@ ROUNDS = 4
 """Times that gaps and levels follow each other, at most."""
 
 SETTLED = 1e-3
-"""Relative change of levels and colours that ends it. Half and double of it change no probability of four swings by more
-than 1e-3."""
+"""Relative change of levels and colours that ends it: evidence then changes by less than 0.1."""
 
 
 def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:

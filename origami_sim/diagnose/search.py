@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
+from scipy.stats import t as student
 
 from origami_sim.diagnose.foresight import Foresight
 from origami_sim.diagnose.implied import OwnColumns, regapped, with_own_noise
@@ -31,17 +32,13 @@ UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
 
 FAR = 1.5
-"""Root mean square over the noise that the best set leaves, above which leading effects are fitted alone as well.
-
-So far from what was recorded linear estimates say little: dry friction was promised less than hysteresis, which left
-5.6 times the noise, and leaves none.
-"""
+"""Root mean square over the noise that a fit leaves, above which it is not worth to be made firm: it will not lead."""
 
 FITS = 16
 """Sets that are fitted at most, before leaders are polished and after."""
 
 LEADING = 12
-"""Single effects, those that promise most, that are paired with all others, and fitted where the best set is far off.
+"""Single effects, those that promise most, that are paired with all others, and fitted if they may be best.
 
 It bounds the time of a search.
 """
@@ -72,7 +69,7 @@ class Node:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
         grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
-            problems: by size of the gaps, if they are to be stored. judged: log posterior of sets that were not fitted.
+            problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
     """
 
     key: Key
@@ -83,7 +80,7 @@ class Node:
     grid: list[Summed | None]
     foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
-    judged: dict[Key, float] = field(default_factory=dict)
+    wide: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +104,9 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
             was not possible.
-        ranked: single effects by what they promise the model without any.
+        ranked: what single effects promise the model without any, best first. gains: by how much sets were better
+            than they had promised, by the fit that the promise is about. hoped: what sets that were fitted had
+            promised, by their labels.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
         renewed: sets that were fitted again, from a fit of a larger one. polished: that are judged by derivatives of
@@ -122,7 +121,9 @@ class Posterior:
     total: dict[Key, float] = field(default_factory=dict)
     estimates: dict[Key, Estimate] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
-    ranked: list[Key] = field(default_factory=list)
+    ranked: dict[Key, float] = field(default_factory=dict)
+    gains: dict[Key, list[float]] = field(default_factory=dict)
+    hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
@@ -188,54 +189,56 @@ def extended(
     for n in range(most):
         if progress:
             progress(n / most)
-        best = max(out.total, key=lambda k: out.total[k])
         key = _likely(out)
-        if best in out.nodes and (n % 2 or key is None) and missed(forward, out.nodes[best].fit) > FAR:
-            key = _alone(out, best) or key
+        if n % 2 or key is None:
+            key = _alone(out) or key
         if key is None:
             break
+        labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
+        out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
         fitted = _fitted(out, forward, key)
         if fitted.failed:
             out.failed[key] = fitted.failed
             out.drop(key)
             continue
         _add(out, forward, key, fitted, prior)
+        out.gains.setdefault(parent, []).append(out.total[key] - promise)
     return out
 
 
 def _likely(out: Posterior) -> Key | None:
     """The set to fit next: that which promises most, if it may hold much of the posterior."""
-    stands = [_worth(out, k) for k in out.nodes]
-    least = max(stands) + np.log(UNFITTED)
-    leader = list(out.nodes.values())[int(np.argmax(stands))]
-    unfitted = {k: w for k in out.log if k not in out.nodes and (w := _worth(out, k, leader)) >= least}
-    # another start of the shape of a set that was fitted has to be better than that
-    fitted = dict(
-        sorted(((out.labels(k), w) for k, w in zip(out.nodes, stands, strict=True)), key=lambda item: item[1])
-    )
-    better = [k for k, w in unfitted.items() if w > fitted.get(out.labels(k), -np.inf) + OWED]
+    least = max(out.total[k] for k in out.nodes) + np.log(UNFITTED)
+    doubts = {k: min(0.0, _most(gains)) for k, gains in out.gains.items() if len(gains) > 1}
+    unfitted = {k: _promise(out, k) + doubts.get(e.parent, 0.0) for k, e in out.estimates.items()}
+    # another start of the shape of a set that was fitted has to promise more than that did
+    better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
     return max(better, key=lambda k: unfitted[k], default=None)
 
 
-def _worth(out: Posterior, key: Key, leader: Node | None = None) -> float:
-    """Log posterior of a set, or what it promises if it was not fitted.
+def _promise(out: Posterior, key: Key) -> float:
+    """Log posterior that a set which was not fitted may have, by the nearest fit."""
+    return max(out.total[key], out.promise[key])
 
-    The nearest fit tells that; if it leaves coloured noise, also `leader`, which leaves less.
+
+def _most(gains: Sequence[float]) -> float:
+    """What the next set may gain over its promise at most, if it is like those before (but for UNFITTED)."""
+    off = np.array(gains if len(gains) > 1 else [0.0, *gains])
+    doubt = np.sqrt(1.0 + 1.0 / len(off)) * np.std(off, ddof=1)
+    return float(np.mean(off) + student.ppf(1.0 - UNFITTED, len(off) - 1) * doubt)
+
+
+def _alone(out: Posterior) -> Key | None:
+    """A single effect to fit that may be best, if it is better than it promised by as much as other sets were.
+
+    About a model that is far from what was recorded what is linear promises too little, or too much. Of an effect that
+    was fitted alone, or is in the best set, there is no need to know more.
     """
-    if key in out.nodes:
-        return out.total[key]
-    worth = max(out.total[key], out.promise[key])
-    weights = out.nodes[out.estimates[key].parent].fit.weights
-    return max(worth, leader.judged.get(key, -np.inf)) if leader and weights and weights.colour else worth
-
-
-def _alone(out: Posterior, best: Key) -> Key | None:
-    """A single effect to fit where the best set is far off, and no effect of it or that was fitted alone already.
-
-    It may do what several were expected to: what is linear promises too little.
-    """
+    gains = out.gains.get(frozenset(), [])
+    best = max(out.total, key=lambda k: out.total[k])
+    least = out.total[best] + np.log(UNFITTED) - (_most(gains) if gains else 0.0)
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
-    singles = (k for k in out.ranked[:LEADING] if k in out.estimates)
+    singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise >= least][:LEADING]
     return next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
 
 
@@ -288,19 +291,41 @@ def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
 
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
-    """Judges a fitted set, and all that add one or two effects to it."""
-    place(out, _node(out, forward, key, f), prior)
+    """Judges a fitted set, and all that add one or two effects to it if it leads, or leads those of its size."""
+    node, effects = _node(out, forward, key, f)
+    if _leads(out, node, prior):
+        own = OwnColumns(node.fit)
+        coloured = node.fit.weights is not None and node.fit.weights.colour
+        node.foresight = Foresight.of(forward, node.fit, own, effects, out.hyper) if coloured else None
+        place(out, node, prior)
+    else:
+        enter(out, node, prior)
+
+
+def _leads(out: Posterior, node: Node, prior: np.ndarray) -> bool:
+    """Whether a set holds part of the posterior, or is the best of so many effects."""
+    total = float(logsumexp(node.evidence + out.hyper.log_cells)) + _log_prior(node.key, prior, out.hyper)
+    others = {k: out.total[k] for k in out.nodes if k != node.key}
+    alike = max((t for k, t in others.items() if len(k) == len(node.key)), default=-np.inf)
+    return total >= min(alike, max(others.values(), default=-np.inf) + np.log(UNFITTED))
+
+
+def enter(out: Posterior, node: Node, prior: np.ndarray) -> None:
+    """Enters a judged set into a posterior."""
+    key = node.key
+    forget(out, key)
+    out.nodes[key] = node
+    out.log[key] = node.evidence + out.hyper.log_cells + _log_prior(key, prior, out.hyper)
+    out.total[key] = float(logsumexp(out.log[key]))
+    out.estimates.pop(key, None)
 
 
 def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     """Enters a judged set, and all that add one or two effects to it, into a posterior."""
     hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
-    forget(out, key)
-    out.nodes[key] = node
-    out.log[key] = node.evidence + cells + _log_prior(key, prior, hyper)
-    out.total[key] = float(logsumexp(out.log[key]))
-    out.estimates.pop(key, None)
+    enter(out, node, prior)
+    node.wide = True
     members = _members(f.hypothesis, out)
     own = tuple(range(len(members)))
     fewer = [s for n in range(len(own)) for s in combinations(own, n)]
@@ -317,7 +342,8 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     singles = _judge(out, node, more, prior, cells, foresee=True)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
     if not key:
-        out.ranked = [frozenset((node.others[n],)) for n in ranked]
+        alone = [frozenset((node.others[n - len(own)],)) for n in ranked]
+        out.ranked = {k: out.promise[k] for k in alone if k in out.promise}
     pairs = []
     for a, one in enumerate(ranked[:LEADING]):
         first = frozenset((node.others[one - len(own)],))
@@ -393,7 +419,6 @@ def _judge(
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
             continue
-        node.judged[key] = totals[n]
         before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
         if before is None or near <= before.near:
             out.log[key], out.total[key], out.promise[key] = found[n], totals[n], float(promise[n])
@@ -414,7 +439,8 @@ def _same_place(a: Suspect, b: Suspect) -> bool:
     return a.effect == b.effect and (a.entities is None or b.entities is None)
 
 
-def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
+def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, list[np.ndarray]]:
+    """A judged fit, and the columns of its own and of all further effects, per segment."""
     hyper, f = out.hyper, with_own_noise(forward, f, out.hyper)
     line, own = f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
@@ -424,8 +450,10 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
     for n, o in enumerate(others):
         low, high = out.signatures[o].bounds
         groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf), low, high))
-    signs = [out.signatures[o].parts for o in others]
-    added = [np.stack([s[n] for s in signs], axis=1) if signs else np.zeros((len(t), 0)) for n, t in enumerate(line.tangent)]
+    added = [np.zeros((len(t), len(others))) for t in line.tangent]
+    for k, o in enumerate(others):
+        for columns, part in zip(added, out.signatures[o].parts, strict=True):
+            columns[:, k] = part
     added = recast(added, line.rows, out.weights, f.weights)
     effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
     smooth = cosines(forward, f, line)
@@ -445,8 +473,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> Node:
         cell = summed(problems[gap], size, flaws)
         grid.append(cell)
         evidence[c] = cell.of(laid, hyper)[0][0]
-    foresight = Foresight.of(forward, f, own, effects, hyper) if f.weights.colour else None
-    return Node(key, f, evidence, groups, others, grid, foresight, problems if out.store else {})
+    return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
 
 def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:

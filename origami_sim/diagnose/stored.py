@@ -19,7 +19,7 @@ import numpy as np
 
 from origami_sim.diagnose.budget import Share, budget
 from origami_sim.diagnose.screen import Signature
-from origami_sim.diagnose.search import Key, Node, Posterior, log_priors, place
+from origami_sim.diagnose.search import Key, Node, Posterior, enter, log_priors, place
 from origami_sim.diagnose.verdict import COMPARED, best_of, decide, unnamed_verdict
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed
@@ -75,7 +75,7 @@ class Stored:
     Attributes:
         suspects: of the search, with sides and whether they can be tested. gaps: sizes that were stored.
         nodes: of each fitted set: members in order, groups, other suspects, problems by gap (where segments are not
-            tied: one for all).
+            tied: one for all). wide: those by which sets that add to them were judged.
         failed: sets that could not be fitted. shares: budget of each fitted set.
         quiet: the verdict if nothing is named. compared: share of the frames.
     """
@@ -87,6 +87,7 @@ class Stored:
     shares: dict[Key, list[Share]]
     quiet: str
     compared: float
+    wide: frozenset[Key]
 
     @classmethod
     def of(cls, forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> "Stored":
@@ -105,6 +106,7 @@ class Stored:
             {k: budget(forward, given, base, n.fit) for k, n in p.nodes.items()},
             quiet,
             compared,
+            frozenset(k for k, n in p.nodes.items() if n.wide),
         )
 
     def judged(self, hyper: Hyper = HYPER) -> Posterior:
@@ -125,7 +127,8 @@ class Stored:
         out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(self.nodes)
         prior = log_priors(signatures, hyper)
         for key, node in self.nodes.items():
-            place(out, self._node(key, *node, signatures, hyper), prior)
+            judge_by = place if key in self.wide else enter
+            judge_by(out, self._node(key, *node, signatures, hyper), prior)
         return out
 
     def _node(self, key, members, groups, others, problems, signatures, hyper: Hyper) -> Node:
@@ -176,6 +179,7 @@ class Stored:
             ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
+                | {"wide": key in self.wide}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))
@@ -231,7 +235,8 @@ class Stored:
             shares[key] = [Share(*s) for s in node["shares"]]
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
-        return cls(suspects, tuple(about["gaps"]), nodes, failed, shares, about["quiet"], about["compared"])
+        wide = frozenset(frozenset(n["members"]) for n in about["nodes"] if n["wide"])
+        return cls(suspects, tuple(about["gaps"]), nodes, failed, shares, about["quiet"], about["compared"], wide)
 
 
 def _wide(values: Sequence[float | None], none: float = np.inf) -> np.ndarray:

@@ -23,7 +23,7 @@ def factor(correlation: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return np.frombuffer(made).reshape(len(correlation), len(frames))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def _factor(colour: bytes, frames: bytes) -> bytes:
     correlation, number = np.frombuffer(colour), np.frombuffer(frames, np.int64)
     q, m = len(correlation), len(number)

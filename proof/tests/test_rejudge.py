@@ -41,7 +41,8 @@ def stored(strengths, seed: int = 0, rows: int = 200) -> Stored:
         ]
         nodes[frozenset(own)] = own, groups, others, {HYPER.gaps[0]: Reduced.of(whole)}
         shares[frozenset(own)] = [Share("not named", "rest", 0.1 if own else 1.0)]
-    return Stored([(suspect(e), 0, "") for e in EFFECTS], HYPER.gaps, nodes, [], shares, "ADEQUATE", 1.0)
+    every = [(suspect(e), 0, "") for e in EFFECTS]
+    return Stored(every, HYPER.gaps, nodes, [], shares, "ADEQUATE", 1.0, frozenset(nodes))
 
 
 def answer(kind: str, names: list[str], d: float = 0.0, **more) -> dict:

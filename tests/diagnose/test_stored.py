@@ -10,7 +10,7 @@ from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import Posterior, _add, log_priors, search
+from origami_sim.diagnose.search import Posterior, _node, enter, log_priors, place, search
 from origami_sim.diagnose.stored import Reduced, Stored
 from origami_sim.diagnose.verdict import judge
 from origami_sim.errors import InputError
@@ -68,7 +68,8 @@ def test_other_hyperparameters_give_what_the_fits_give_with_them(kept, changed):
     direct.failed, direct.renewed = dict(p.failed), set(p.nodes)
     prior = log_priors(p.signatures, hyper)
     for key, node in p.nodes.items():
-        _add(direct, forward, key, node.fit, prior)
+        again, _ = _node(direct, forward, key, node.fit)
+        (place if node.wide else enter)(direct, again, prior)
     mine, theirs = direct.probabilities(), stored.judged(hyper).probabilities()
     # without one size of the gaps, the noise that fits imply is a little different
     assert max(abs(mine[k] - theirs[k]) for k in mine) < (1e-3 if "gaps" in changed else 1e-6)
