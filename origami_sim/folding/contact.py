@@ -24,7 +24,7 @@ from .intersections import crossing_pairs
 REACH = 0.5
 """Distance within which pairs are looked at beyond that at which they touch, over the median edge; a step moves no
 node by more than half of it."""
-FINEST = 0.01
+FINEST = 1e-3
 """Share of the thickness below which a pair's h is a slip of the drawing: points that miss a line by micrometres."""
 LEAST = 1e-12
 """Share of h below which a barrier grows no more, so that numbers stay finite; steps are cut long before."""
