@@ -18,8 +18,9 @@ from patterns import SUFFIXES, folded
 NUMBERS = {
     "folding.elastic": (
         "BEND", "FREE", "SLIVER", "LONGEST_MOVE", "MERGED", "CLOSED", "ROUNDING", "GAIN", "STIFFEST", "LARGEST",
-        "FIRST", "REFUSED", "POOR", "GOOD", "FORESEEN",
+        "FIRST", "REFUSED", "POOR", "GOOD", "FORESEEN", "FORESIGHT",
     ),
+    "folding.contact": ("REACH", "FINEST", "LEAST"),
     "folding.fold": ("SOFTNESS", "STEPS", "ITERATIONS", "LAST", "LOWER", "STRETCH", "EXACT"),
     "folding.placement": ("LOOSE", "TINY"),
     "folding.consistency": ("STRAIGHT", "SHARP"),

@@ -1,9 +1,12 @@
 """Strips of two nodes per station that stand for plane beams."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.build import Sheet
+from origami_sim.effects import get
 from origami_sim.model import Model, Parameters
 
 
@@ -32,6 +35,28 @@ def as_beam(model: Model, parameters: Parameters, axial: ArrayLike):
         viscosity = parameters["bar_viscosity", "viscosity"][along, 0]
         parameters.set("bar_viscosity", "viscosity", viscosity * factor, along)
     parameters.set("bars", "stiffness", stiffness, along)
+
+
+def crossed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
+    """Gives each cell of a strip of two nodes per station its other diagonal, and each of both half the stiffness.
+
+    One diagonal alone skews a cell that is pressed, so that its corners slip and land unlike: the strip stands on its
+    left and right by turns, whatever the cells.
+    """
+    near = np.abs(np.diff(model.bars // 2, axis=1)[:, 0]) == 1
+    slanted = np.flatnonzero(near & (model.bars.sum(axis=1) % 2 == 1))  # between the sides of neighbouring stations
+    other = model.bars[slanted] ^ 1
+    both = replace(model, bars=np.concatenate([model.bars, other]).astype(np.int32))
+    out = Parameters(both)
+    for owner, name in parameters:
+        value = parameters[owner, name]
+        if owner in model.effects and get(owner).family == "bar":
+            value = np.concatenate([value, value[slanted]])
+            if name in ("stiffness", "viscosity"):
+                value[slanted] *= 0.5
+                value[len(model.bars) :] *= 0.5
+        out.set(owner, name, value)
+    return both, out
 
 
 def along_strip(sheet: Sheet, word: str) -> list[str]:

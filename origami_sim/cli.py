@@ -93,6 +93,8 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
     p.add_argument("--panels", choices=("elastic", "rigid"), help="bars and bending lines, or rigid bodies on hinges")
     p.add_argument("--quasistatic", action="store_true", help="equilibria along time, no inertia: creep, slow drives")
+    what = "pattern: panels keep each other off on the whole way, or never (default: where they would pass)"
+    p.add_argument("--touch", action=argparse.BooleanOptionalAction, default=None, help=what)
     p.add_argument("--until", type=float, metavar="SECONDS", help="of a quasi-static motion: hold it on until then")
     p.add_argument("--accuracy", type=float, metavar="X", help="halve the step until angles [rad] are that exact")
     p.add_argument("--out", metavar="FOLDER", help="run folder (default runs/SCENE)")
@@ -295,6 +297,9 @@ def _run(args) -> int:
     name = Path(args.scene).stem if pattern else module.__name__.rpartition(".")[2]
     if pattern:
         module.check(args)
+    elif args.touch is not None:
+        states = "Sheet.touch() in the device, touch in its design file, --set touch=on for scenes that have it"
+        raise InputError("only a pattern leaves this open", field="--touch", value=args.touch, allowed=states)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)

@@ -28,6 +28,10 @@ doi:10.1007/s10035-007-0065-z); 0.51 with half of it, 0.14 with double. Double c
 and halves the time step.
 """
 
+ON_EDGE = 1e-6
+"""Share of a triangle within which a point lies on its edge or corner: rounding leaves 1e-16. Half and double change
+nothing."""
+
 
 @dataclass(frozen=True)
 class Contact:
@@ -198,14 +202,27 @@ class Grounds(Masses):
     def _touch(self, panel: int, point: np.ndarray, axis: ArrayLike, *, name: str | None, **options) -> int:
         """Adds a contact point and returns its index."""
         candidates = [(int(t), self._barycentric(int(t), point)) for t in self._triangles_of(panel)]
-        best, weights = max(candidates, key=lambda c: c[1].min())
-        if not weights.min() >= -1e-6:
+        inside = max(w.min() for _, w in candidates)
+        # at a corner, or on an edge, of several the widest one there carries, and not the one that rounding prefers
+        level = [(t, w) for t, w in candidates if w.min() > inside - ON_EDGE]
+        best, weights = max(level, key=lambda c: round(self._angle_at(c[0], point), 9))
+        if not weights.min() >= -ON_EDGE:
             raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=point.tolist())
         a, b = self._edge_weights(best, np.asarray(axis, float))
         forward = np.array([-a - b, a, b])
         label = name or f"contact {len(self._contacts)}"
         self._contacts.append(Contact(best, weights, axis=forward, name=label, panel=panel, **options))
         return len(self._contacts) - 1
+
+    def _angle_at(self, triangle: int, point: np.ndarray) -> float:
+        """Angle of a triangle around a point on it [rad]: that of a corner, else none."""
+        corners = self.mesh.vertices[self.mesh.triangles[triangle]]
+        away = np.linalg.norm(corners - point, axis=1)
+        k = int(away.argmin())
+        if away[k] > ON_EDGE * away.max():
+            return 0.0
+        a, b = corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]
+        return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
     def _under(self, place: np.ndarray) -> tuple[int, int, np.ndarray]:
         """The panel and triangle on which a place lies, and its barycentric weights there."""

@@ -70,8 +70,22 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     if s.gravity:
         sheet.gravity((0, 0, -s.gravity))
     sheet.on("crease_stop")
+    if s.touch == "on" or (s.touch == "auto" and closed(s) < np.pi / 2):
+        sheet.touch(friction=s.touch_friction)
     model, parameters = sheet.build()
     return model, parameters, drive(s)
+
+
+def closed(s: Settings) -> float:
+    """Angle at which neighbouring patches meet, each with borders rounded by half of its thickness [rad]; inf: never.
+
+    By symmetry two upright edges meet in the diagonal of the base, next to the hinges: what is left of half of the base
+    beside the middle of a patch's edge, base / 2 + low cos(a) - lift sin(a) - side, is then r sqrt(2).
+    """
+    r, lift = 0.5 * s.patch_thickness, 0.5 * (s.thickness + s.patch_thickness)
+    low, side = 0.5 * s.gap + r, 0.5 * s.patch_width - r
+    share = (side + np.sqrt(2) * r - 0.5 * s.base) / np.hypot(low, lift)
+    return float(np.arccos(share) - np.arctan2(lift, low)) if abs(share) <= 1 else np.inf
 
 
 def bridge_law(s: Settings) -> dict:

@@ -7,7 +7,7 @@ Forward (+x) is towards the small patch. The strip is a chain of narrow cells; e
 
 import numpy as np
 
-from origami_sim.beams import as_beam
+from origami_sim.beams import as_beam, crossed
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, sine
 from origami_sim.gait import stride_table
@@ -113,6 +113,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
             parameters,
             s.membrane * (s.modulus * s.thickness * middle + mae.modulus * s.patch_thickness * patch_width),
         )
+        model, parameters = crossed(model, parameters)
     if not s.patch_height:  # a planar chain carries its masses on its line
         model = model.with_effects(without=("eccentric_weight",))
         parameters = parameters.for_model(model)

@@ -58,12 +58,12 @@ class Axis:
 AXES = {
     a.name: a
     for a in (
-        Axis("big_moment", "big patch's moment / printed", (0.1, 0.15, 0.2072, 0.3, 0.4, 0.55, 0.75, 1.0)),
+        Axis("big_moment", "big patch's moment / printed", (0.1, 0.15, 0.2072, 0.27, 0.35, 0.5, 0.75, 1.0)),
         Axis("friction_ratio", "friction backward / forward", (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)),
         Axis("foot_height", "foot pad below the sheet [mm]", (0.0, 0.0005, 0.000865, 0.0015, 0.002, 0.003), 1e3),
         Axis("adhesion", "pull-off force of a foot [N]", (0.0, 0.02, 0.05, 0.1, 0.2)),
-        Axis("span", "free span (gap) [mm]", (0.015, 0.017, 0.01905, 0.021, 0.023), 1e3),
-        Axis("loss_time", "loss time of the sheet [ms]", (0.001, 0.002, 0.003, 0.005, 0.008), 1e3),
+        Axis("span", "free span (gap) [mm]", (0.013, 0.01524, 0.017, 0.01905, 0.021), 1e3),
+        Axis("loss_time", "loss time of the sheet [ms]", (0.003, 0.005, 0.008, 0.01, 0.014), 1e3),
         Axis("foot_friction", "forward friction of the feet", (0.1, 0.2, 0.3, 0.4, 0.6)),
     )
 }
@@ -83,8 +83,8 @@ VARIED = (
 
 
 SAMPLED = {
-    "big_moment": (0.1, 0.35), "friction_ratio": (1.5, 4.0), "foot_height": (0.0, 0.002), "span": (0.015, 0.023),
-    "loss_time": (0.003, 0.008), "foot_friction": (0.1, 0.4),
+    "big_moment": (0.1, 0.35), "friction_ratio": (1.5, 4.0), "foot_height": (0.0, 0.002), "span": (0.013, 0.021),
+    "loss_time": (0.005, 0.014), "foot_friction": (0.1, 0.4),
 }  # fmt: skip
 """Ranges of the samples: where the maps show a steady gait."""
 

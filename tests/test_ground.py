@@ -142,3 +142,18 @@ def test_drives_that_move_nothing_are_noted():
 def test_what_is_wrong_is_said_at_once(state, said):
     with pytest.raises(InputError, match=said):
         state(plate())
+
+
+def test_a_corner_of_several_triangles_stands_on_the_widest_whatever_rounding_says():
+    """Mirrored corners of a strip stand on mirrored triangles: those that have most of the corner."""
+    for scale in (1.0, 1.0 + 1e-15, 0.3, 7.7):
+        s = Sheet(
+            strip([0.003 * scale] * 5, [w * scale for w in (0.014, 0.012, 0.011, 0.009, 0.008, 0.007)]), thickness=1e-3
+        )
+        x = s.mesh.vertices
+        for cell in range(5):
+            for node in (2 * cell, 2 * cell + 1, 2 * cell + 2, 2 * cell + 3):
+                c = s._contacts[s.contact(cell, x[node])]
+                nodes = s.mesh.triangles[c.triangle]
+                assert node in nodes
+                assert sum(n % 2 == node % 2 for n in nodes) == 2  # its own side of the strip, along which it lies

@@ -30,7 +30,7 @@ def check(args) -> None:
                 "a pattern folds through equilibria of elastic panels and has no such option",
                 field=f"--{name}",
                 value=getattr(args, name),
-                allowed="--set, --calibration, --out",
+                allowed="--set, --calibration, --touch, --no-touch, --out",
             )
     if Path(args.scene).suffix.lower() in MESHES:
         raise InputError(
@@ -53,6 +53,7 @@ def run(args, settings: Settings, progress) -> int:
             steps=round(settings.steps),
             tolerance=settings.tolerance,
             thickness=settings.thickness,
+            touch=args.touch,
             progress=progress,
         )
     except InputError as e:

@@ -13,6 +13,7 @@ Lengths are in units of the sheet's longest side, energies in those of its membr
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,6 +21,9 @@ import scipy.sparse.linalg as spla
 
 from origami_sim.materials import MEMBRANE_POISSON
 from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulate
+
+if TYPE_CHECKING:
+    from .contact import Contact, Touching
 
 BEND = 0.1
 """Stiffness of the lines that triangulate a panel over that of a driven crease of that length: panels give way, so that
@@ -59,6 +63,9 @@ FORESEEN = (0.2, 0.7)
 """Gains of a step, over what the linear residuals promise, that count as poor and as good. Half takes 1.06 times as
 long; double calls no step good, takes 1.17 times as long, and the compromises of two that cannot fold differ."""
 
+FORESIGHT = 4
+"""Solutions of one step at most, in search of the pairs that touch at its end."""
+
 
 @dataclass
 class Shape:
@@ -84,7 +91,7 @@ class Elastic:
         mesh: the triangulation. size: longest side of the pattern [m].
         reference: [N, 3] positions as given. bars, lengths: node pairs [B, 2] and their lengths [B].
         hinges: [H, 4] creases, then bends. driven: [H] whether there is a target. target, start: [H] angles [rad].
-        weights: [H] stiffness of the hinges over softness.
+        weights: [H] stiffness of the hinges over softness. contact: of panels with each other, if they touch.
     """
 
     def __init__(self, pattern: Pattern, softness: float = 1e-3):
@@ -106,6 +113,7 @@ class Elastic:
         self.weights = factor * middle * self.axes * self._stated()
         self.sections = np.maximum(bar_sections(self.reference, mesh), SLIVER * self.lengths)
         self.softness = softness
+        self.contact: Contact | None = None
         self._pattern_of_jacobian()
 
     def _stated(self) -> np.ndarray:
@@ -174,33 +182,57 @@ class Elastic:
             shape: where to start. target: [H] angles to which the hinges are drawn [rad].
             damping: stiffness that holds every node in place during an iteration, to begin with.
         """
-        x = shape.x
+        x, near = shape.x, None
         r, angles = self.residuals(x, shape.angles, target)
         energy, damping = float(r @ r), FIRST  # damping is a stiffness that holds every node where it is
+        longest = LONGEST_MOVE
+        if self.contact is not None:
+            near, longest = self.contact.at(x), min(longest, self.contact.longest)
+            energy += near.energy
         for _ in range(iterations):
             if energy < ROUNDING:
                 break
             jacobian = self.jacobian(x, angles)
             tangent, slope = (jacobian.T @ jacobian).tocsc(), jacobian.T @ r
+            way = 1.0
             while damping < LARGEST:
-                step = _solve(tangent, damping, -slope)
-                step *= min(1.0, LONGEST_MOVE / max(float(np.abs(step).max()), 1e-300))
-                tried, turned = self.residuals(x + step.reshape(-1, 3), angles, target)
-                gained = energy - float(tried @ tried)
+                step = _solve(tangent, damping, -slope) if near is None else _apart(near, tangent, damping, slope)
+                step *= min(1.0, longest / max(float(np.abs(step).max()), 1e-300))
+                if near is not None:
+                    way = near.clear(x + step.reshape(-1, 3))
+                    step *= way
+                to = x + step.reshape(-1, 3)
+                tried, turned = self.residuals(to, angles, target)
+                after = None if self.contact is None else self.contact.at(to)
+                gained = energy - float(tried @ tried) - (after.energy if after else 0.0)
                 if gained > 0.0:
                     break
                 damping *= REFUSED
             else:
                 break  # nothing goes down any more
-            foreseen = energy - float(np.sum((r + jacobian @ step) ** 2))
-            x, r, angles, energy = x + step.reshape(-1, 3), tried, turned, energy - gained
+            foreseen = energy - float(np.sum((r + jacobian @ step) ** 2)) - (near.after(step) if near else 0.0)
+            x, near, r, angles, energy = to, after, tried, turned, energy - gained
             if gained > FORESEEN[1] * foreseen:
                 damping = max(GOOD * damping, STIFFEST)
             elif gained < FORESEEN[0] * foreseen:
                 damping *= POOR
-            if gained < GAIN * energy:
+            if gained < GAIN * energy and way == 1.0:  # what was cut may go on once it touches
                 break
         return Shape(x, angles, 0.5 * max(energy, 0.0))
+
+
+def _apart(near: "Touching", tangent, damping, slope) -> np.ndarray:
+    """Return the step that keeps apart what touches, and what would touch at its end, as far as derivatives tell."""
+    touching, step = near.gap < 0.0, np.zeros_like(slope)
+    for _ in range(FORESIGHT):
+        rows = near.rows[touching]
+        weighted = sp.diags_array(near.weight[touching]) @ rows
+        step = _solve(tangent + rows.T @ weighted, damping, -slope - weighted.T @ near.gap[touching])
+        then = near.gap + near.rows @ step < 0.0
+        if np.array_equal(then, touching):
+            break
+        touching = then
+    return step
 
 
 def _targets(pattern: Pattern) -> np.ndarray:

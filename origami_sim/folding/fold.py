@@ -3,7 +3,8 @@
 The targets grow from the given shape to their full size in even steps. At each the least energy is sought from the
 last state, and from the shape that the angles themselves describe (`placement`); the lower one is kept, and where that
 is not the one followed from the last state, the sheet has snapped. Creases that cannot turn yet wait, since turning
-them would strain the sheet, and go on when others have made way.
+them would strain the sheet, and go on when others have made way. Panels are let through each other at first; a sheet
+that would end so goes on from before anything touched, with panels that keep each other off (`contact`).
 """
 
 import time as clock
@@ -17,6 +18,7 @@ from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern
 
 from .consistency import Vertex, vertices
+from .contact import Contact
 from .elastic import Elastic, Shape
 from .intersections import crossing_pairs
 from .placement import Placement
@@ -59,6 +61,8 @@ class Folding:
         angles: [F, H] continuous hinge angles, creases first [rad].
         snaps: frames before which the sheet jumped to another shape.
         softness: of the sheet, see `SOFTNESS`. tolerance: [rad]. wall: seconds that it took.
+        clear_from: frame from which on panels kept each other off; None if they never did.
+        touching: pairs of corners and triangles, or of edges, that touch at the end.
     """
 
     sheet: Elastic
@@ -70,6 +74,8 @@ class Folding:
     softness: float
     tolerance: float
     wall: float = 0.0
+    clear_from: int | None = None
+    touching: int = 0
 
     def __repr__(self) -> str:
         worst, snaps = np.degrees(self.errors.max(initial=0.0)), f", {len(self.snaps)} snaps" if self.snaps else ""
@@ -144,6 +150,7 @@ def fold(
     steps: int = STEPS,
     tolerance: float = TOLERANCE,
     thickness: float = THICKNESS,
+    touch: bool | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Folding:
     """Fold a pattern to its target angles, as far as they can be reached together.
@@ -152,14 +159,17 @@ def fold(
         pattern: with mountains and valleys, which fold flat where they have no angle.
         steps: in which the targets grow.
         tolerance: distance from the target within which a crease has arrived [rad].
-        thickness: of the sheet [m]: panels that cross by more pass through each other.
+        thickness: of the sheet [m]: at which panels touch, and by which they may cross unnoticed.
+        touch: whether panels keep each other off on the whole way. None: from the last frame on at which nothing
+            touches, if they would end through each other.
         progress: called with the fraction done.
 
     Returns:
         The path of the first sheet in `SOFTNESS` that reaches its targets; else that of the least energy.
 
     Raises:
-        InputError: no crease, no target angle, faces that cannot be triangulated.
+        InputError: no crease, no target angle, faces that cannot be triangulated; panels that are to touch, and lie in
+            each other in the given shape.
     """
     began = clock.perf_counter()
     sheet = Elastic(pattern)
@@ -172,43 +182,101 @@ def fold(
         raise InputError(
             "the pattern gives no target angle", field="edges_foldAngle", allowed="M and V edges, or degrees"
         )
-    placement, around, best, lowest = Placement(sheet), vertices(sheet), None, np.inf
-    for n, softness in enumerate(SOFTNESS):
-        part = (lambda f, n=n: progress((n + f) / len(SOFTNESS))) if progress else None
-        sheet.softness = softness
-        path = _follow(sheet, placement, steps, part)
-        used = _stiffen(sheet, path, tolerance)
-        if sheet.errors(path.shapes[-1].angles).max() <= tolerance:
-            used = _untangle(sheet, path, thickness / sheet.size)
-        found = _folding(sheet, around, path, used, tolerance)
-        if found.reached:
-            best = found
-            break
-        sheet.softness = SOFTNESS[0]
-        firm = sheet.relax(path.shapes[-1], sheet.target, LAST)
-        if best is None or firm.energy < LOWER * lowest:
-            path.shapes[-1], lowest = firm, firm.energy
-            best = _folding(sheet, around, path, SOFTNESS[0], tolerance)
-        if best.contradictions or best.curved:
-            break  # no softer sheet gets there either
-    assert best is not None
+    search = _Search(sheet, Placement(sheet), vertices(sheet), steps, tolerance, thickness)
+    if touch:
+        sheet.contact = Contact(sheet, thickness)
+    first = _Path([Shape(sheet.reference, sheet.start)])
+    best = search.best(first, SOFTNESS, progress)
+    if touch:
+        best.clear_from = 0
+    elif touch is None and len(crossing_pairs(best.x[-1], sheet.mesh.triangles, thickness)):
+        best = search.apart(best, progress)
+    if sheet.contact is not None:
+        best.touching = sheet.contact.at(best.x[-1] / sheet.size).count
     sheet.softness, best.wall = best.softness, clock.perf_counter() - began
     if progress:
         progress(1.0)
     return best
 
 
-def _follow(sheet: Elastic, placement: Placement, steps: int, progress) -> _Path:
-    """Return the states of least energy along growing targets."""
-    shape = Shape(sheet.reference, sheet.start)
-    path = _Path([shape])
-    for n in range(1, steps + 1):
+@dataclass(frozen=True)
+class _Search:
+    """What all attempts at one pattern have in common; see `fold`."""
+
+    sheet: Elastic
+    placement: Placement
+    around: list[Vertex]
+    steps: int
+    tolerance: float
+    thickness: float
+
+    def best(self, begin: _Path, softnesses: tuple[float, ...], progress) -> Folding:
+        """The first sheet that reaches its targets from the end of a path, or that of least energy."""
+        sheet, best, lowest = self.sheet, None, np.inf
+        for n, softness in enumerate(softnesses):
+            part = (lambda f, n=n: progress((n + f) / len(softnesses))) if progress else None
+            sheet.softness = softness
+            path = _follow(sheet, self.placement, begin, self.steps, part)
+            used = _stiffen(sheet, path, self.tolerance)
+            if sheet.errors(path.shapes[-1].angles).max() <= self.tolerance:
+                used = _untangle(sheet, path, self.thickness / sheet.size)
+            found = self._folding(path, used)
+            if found.reached:
+                return found
+            sheet.softness = SOFTNESS[0]
+            firm = sheet.relax(path.shapes[-1], sheet.target, LAST)
+            if best is None or firm.energy < LOWER * lowest:
+                path.shapes[-1], lowest = firm, firm.energy
+                best = self._folding(path, SOFTNESS[0])
+            if best.contradictions or best.curved:
+                break  # no softer sheet gets there either
+        assert best is not None
+        return best
+
+    def apart(self, through: Folding, progress) -> Folding:
+        """The same with panels that keep each other off, from the last frame before any touch in `through`.
+
+        A given shape whose panels lie in each other stays as it was found.
+        """
+        sheet = self.sheet
+        try:
+            sheet.contact = Contact(sheet, self.thickness)
+        except InputError:
+            return through
+        frames = [Shape(x / sheet.size, a) for x, a in zip(through.x, through.angles, strict=True)]
+        clear = next((n for n, s in enumerate(frames) if n and not sheet.contact.free(s.x)), len(frames)) - 1
+        begin = _Path(
+            frames[: clear + 1], through.shares[: clear + 1].tolist(), [n for n in through.snaps if n <= clear]
+        )
+        best = self.best(begin, SOFTNESS[SOFTNESS.index(through.softness) :], progress)
+        best.clear_from = clear
+        return best
+
+    def _folding(self, path: _Path, softness: float) -> Folding:
+        return Folding(
+            sheet=self.sheet,
+            vertices=self.around,
+            shares=np.array(path.shares),
+            x=_steady([s.x for s in path.shapes]) * self.sheet.size,
+            angles=np.array([s.angles for s in path.shapes]),
+            snaps=list(path.snaps),
+            softness=softness,
+            tolerance=self.tolerance,
+        )
+
+
+def _follow(sheet: Elastic, placement: Placement, begin: _Path, steps: int, progress) -> _Path:
+    """Return the states of least energy along growing targets, from the end of a path on."""
+    path = _Path(list(begin.shapes), list(begin.shares), list(begin.snaps))
+    shape = path.shapes[-1]
+    for n in range(len(path.shapes), steps + 1):
         share = n / steps
         target = np.where(sheet.driven, (1.0 - share) * sheet.start + share * sheet.target, sheet.start)
         iterations = LAST if n == steps else ITERATIONS
         shape = sheet.relax(shape, target, iterations)
-        if not _exact(sheet, shape, target):
-            other = sheet.relax(placement.at(target), target, iterations)
+        placed = None if _exact(sheet, shape, target) else placement.at(target)
+        if placed is not None and (sheet.contact is None or sheet.contact.free(placed.x)):
+            other = sheet.relax(placed, target, iterations)
             if other.energy < LOWER * shape.energy:
                 shape = other
                 path.snaps.append(n)
@@ -257,19 +325,6 @@ def _untangle(sheet: Elastic, path: _Path, depth: float) -> float:
             path.shapes[-1], used, count = softer, softness, fewer
     sheet.softness = used
     return used
-
-
-def _folding(sheet: Elastic, around: list[Vertex], path: _Path, softness: float, tolerance: float) -> Folding:
-    return Folding(
-        sheet=sheet,
-        vertices=around,
-        shares=np.array(path.shares),
-        x=_steady([s.x for s in path.shapes]) * sheet.size,
-        angles=np.array([s.angles for s in path.shapes]),
-        snaps=list(path.snaps),
-        softness=softness,
-        tolerance=tolerance,
-    )
 
 
 def _steady(frames: list[np.ndarray]) -> np.ndarray:

@@ -46,6 +46,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         "largest_strain_on_the_way": folding.stretch_on_the_way,
         "largest_bend_deg": float(np.degrees(bends.max(initial=0.0))),
         "crossing_pairs": float(crossing),
+        "touching_pairs": float(folding.touching),
         "snaps": float(len(folding.snaps)),
     }
     creases = _table(folding)
@@ -56,7 +57,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         _verdict(folding, missed, order, creases),
         *advice,
         _strain(folding, numbers),
-        _crossings(crossing, thickness),
+        _crossings(folding, crossing, thickness),
     ]
     if folding.snaps:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
@@ -128,6 +129,13 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
             "Try: smaller angles; facets (yellow) across the strained panels; or vertices put where they belong.",
         ]
     apart = sorted((v for v in folding.vertices if v.gap > folding.tolerance), key=lambda v: -v.gap)
+    if folding.touching and not apart:
+        return "panels are in each other's way", [
+            "Panels that touch keep the creases from their angles: these would push panels through each other, or the "
+            "layers into an order that folding does not lead to.",
+            "Try: angles that leave room for what lies between (opacity in SVG, edges_foldAngle in FOLD); a thinner "
+            "sheet (--set thickness=0.05mm); some of the angles first; --no-touch shows where panels would pass.",
+        ]
     if apart:
         x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
         return f"targets do not fit together at {_vertices(len(apart))}", [
@@ -164,8 +172,13 @@ def _strain(folding: Folding, numbers) -> str:
     return text + "."
 
 
-def _crossings(count: int, thickness: float) -> str:
-    depth = f"deeper than the sheet's thickness ({1e3 * thickness:.3g} mm)"
-    if not count:
-        return f"No panel passes through another {depth}."
-    return f"{count} pairs of triangles pass through each other {depth}: there is no contact between panels here."
+def _crossings(folding: Folding, count: int, thickness: float) -> str:
+    depth = f"the sheet's thickness ({1e3 * thickness:.3g} mm)"
+    if folding.clear_from is None:
+        if not count:
+            return f"No panel passes through another by more than {depth}."
+        return f"{count} pairs of triangles pass through each other by more than {depth}."
+    whole = "on the whole way" if not folding.clear_from else f"from {folding.shares[folding.clear_from]:.0%} on"
+    touch = f"{folding.touching} pairs of corners, edges and triangles touch" if folding.touching else "nothing touches"
+    through = "No panel passes through another" if not count else f"{count} pairs of triangles pass through each other"
+    return f"Panels keep each other off {whole}, at {depth}; at the end {touch}. {through}."

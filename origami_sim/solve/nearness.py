@@ -80,15 +80,21 @@ def nearest(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
 
 
 @wp.func
-def from_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
-    """Distance of a point from a triangle."""
+def off_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
+    """Shortest way from a triangle to a point."""
     w = nearest(p, a, b, c)
-    return wp.length(p - w[0] * a - w[1] * b - w[2] * c)
+    return p - w[0] * a - w[1] * b - w[2] * c
 
 
 @wp.func
-def between(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
-    """Distance of two edges (Ericson 2005, section 5.1.9)."""
+def from_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
+    """Distance of a point from a triangle."""
+    return wp.length(off_triangle(p, a, b, c))
+
+
+@wp.func
+def off_edge(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
+    """Shortest way from the second of two edges to the first (Ericson 2005, section 5.1.9)."""
     d1 = p2 - p1
     d2 = q2 - q1
     r = p1 - q1
@@ -110,7 +116,13 @@ def between(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
     elif t > one:
         t = one
         s = wp.clamp((b - c) / wp.max(a, TINY), zero, one)
-    return wp.length(r + s * d1 - t * d2)
+    return r + s * d1 - t * d2
+
+
+@wp.func
+def between(p1: wp.vec3d, p2: wp.vec3d, q1: wp.vec3d, q2: wp.vec3d):
+    """Distance of two edges."""
+    return wp.length(off_edge(p1, p2, q1, q2))
 
 
 @wp.func

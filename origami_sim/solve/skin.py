@@ -131,6 +131,8 @@ class Pairs:
             a patch's corner. edges: [P] whether edges.
         sides: [P, 2] triangles. offset: [P] distance at which they touch [m]. distance: [P] [m].
         inside: [P] whether a corner lies over the inside of the triangle, or an edge crosses that of the other.
+        points: [P, 4] nodes, and after them the corners of patches. share: [P, 4]: the distance's gradient by a point
+            is share * normal. normal: [P, 3] towards the first part. window: [P] weight of the pair.
     """
 
     nodes: np.ndarray
@@ -139,19 +141,53 @@ class Pairs:
     offset: np.ndarray
     distance: np.ndarray
     inside: np.ndarray
+    points: np.ndarray
+    share: np.ndarray
+    normal: np.ndarray
+    window: np.ndarray
+    skin: Any
+
+    def clear(self, x: np.ndarray, finest: float = 0.0) -> float:
+        """Largest share of the straight way to positions x [N, 3] on which none of the pairs comes too near.
+
+        Pairs that touch at less than `finest` [m] do not count.
+        What touches at its end is pressed by no more than a tenth of its thickness, or a fifth more than before.
+        """
+        if not len(self.offset):
+            return 1.0
+        share = wp.ones(1, dtype=wp.float64, device="cpu")
+        inputs = [self.skin, _one(x[:, None], wp.vec3d), wp.float64(finest), share]
+        wp.launch(touching.clear, dim=len(self.offset), inputs=inputs, device="cpu")
+        return float(share.numpy()[0])
 
 
 def near_pairs(model: Model, parameters: Parameters, x: np.ndarray, *, world: int = 0, margin: float = 0.0) -> Pairs:
     """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] above."""
-    s, count, distance, inside = _surveyed(model, parameters, x, world, margin)
+    thick = parameters["touch", "thickness"]
+    thick = thick[:, world if thick.shape[1] > 1 else 0]
+    room = LEAST_ROOM + ROOM * len(model.triangles)
+    while True:
+        s = upload(model, _room, "cpu", room)
+        s.margin = margin
+        distance, window = (_room(room, dtype=wp.float64) for _ in range(2))
+        inside, share, normal = (_room(room, dtype=t) for t in (wp.int32, wp.vec4d, wp.vec3d))
+        given = _one(x[:, None], wp.vec3d), _one(thick, wp.float64)
+        wp.launch(touching.survey, dim=1, inputs=[s, *given, distance, inside, share, normal, window], device="cpu")
+        count, whole = s.count.numpy()[:, 0]
+        if whole == 1 and s.span.numpy()[1, 0] == 0.5 * margin:
+            break
+        room *= 4
 
     def rows(a: wp.array) -> np.ndarray:
         return a.numpy()[:count, 0].copy()
 
-    kind = rows(s.kind)
+    kind, points = rows(s.kind), rows(s.points)
     own = np.repeat(np.arange(len(model.position))[:, None], 3, axis=1)
-    nodes = np.concatenate([own, surface(model).carrier])[rows(s.points)].reshape(-1, 12)
-    return Pairs(nodes, kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0)
+    nodes = np.concatenate([own, surface(model).carrier])[points].reshape(-1, 12)
+    return Pairs(
+        nodes, kind[:, 0] == 1, kind[:, 1:], rows(s.offset), rows(distance), rows(inside) > 0,
+        points, rows(share), rows(normal), rows(window), s,
+    )  # fmt: skip
 
 
 def _room(*shape: int, dtype) -> wp.array:
@@ -162,37 +198,13 @@ def _one(a: np.ndarray, dtype) -> wp.array:
     return wp.array(np.ascontiguousarray(a), dtype=dtype, device="cpu")
 
 
-def _surveyed(model: Model, parameters: Parameters, x: np.ndarray, world: int, margin: float):
-    """The surface of one world with its list, which has found room; number of pairs, distances, inside or not."""
-    thick = parameters["touch", "thickness"]
-    thick = thick[:, world if thick.shape[1] > 1 else 0]
-    pairs = LEAST_ROOM + ROOM * len(model.triangles)
-    while True:
-        s = upload(model, _room, "cpu", pairs)
-        s.margin = margin
-        distance, inside = _room(pairs, dtype=wp.float64), _room(pairs, dtype=wp.int32)
-        given = _one(x[:, None], wp.vec3d), _one(thick, wp.float64)
-        wp.launch(touching.survey, dim=1, inputs=[s, *given, distance, inside], device="cpu")
-        count, whole = s.count.numpy()[:, 0]
-        if whole == 1 and s.span.numpy()[1, 0] == 0.5 * margin:
-            return s, int(count), distance, inside
-        pairs *= 4
-
-
 def clear_share(model: Model, parameters: Parameters, x: np.ndarray, d: np.ndarray, *, world: int = 0) -> float:
-    """Largest share of a move d [N, 3] from positions x [N, 3] on which nothing passes through anything else.
-
-    What touches at its end is pressed by no more than a tenth of its thickness, or a fifth more than before.
-    """
+    """Largest share of a move d [N, 3] from positions x [N, 3] on which nothing passes through anything else."""
     far = float(np.linalg.norm(d, axis=-1).max(initial=0.0))
     if not (far > 0 and np.isfinite(far)) or "touch" not in model.laws:
         return 1.0
-    s, count, *_ = _surveyed(model, parameters, x, world, (4 if len(model.pad_triangles) else 2) * far)
-    if not count:
-        return 1.0
-    share = wp.zeros(count, dtype=wp.float64, device="cpu")
-    wp.launch(touching.clear, dim=count, inputs=[s, _one((x + d)[:, None], wp.vec3d), share], device="cpu")
-    return float(share.numpy().min())
+    margin = (4 if len(model.pad_triangles) else 2) * far
+    return near_pairs(model, parameters, x, world=world, margin=margin).clear(x + d)
 
 
 def too_deep(model: Model, parameters: Parameters, x: np.ndarray, world: int) -> str:

@@ -12,7 +12,7 @@ import warp as wp
 
 from origami_sim import _warp, kinematics  # noqa: F401  settings
 from origami_sim.solve import nearness
-from origami_sim.solve.nearness import between, crossing, edge_near, from_triangle, nearest
+from origami_sim.solve.nearness import between, crossing, edge_near, from_triangle, off_edge, off_triangle
 
 scalar = wp.float64
 
@@ -416,8 +416,11 @@ def survey(
     thick: wp.array(dtype=wp.float64),
     distance: wp.array2d(dtype=wp.float64),
     inside: wp.array2d(dtype=wp.int32),
+    share: wp.array2d(dtype=wp.vec4d),
+    normal: wp.array2d(dtype=wp.vec3d),
+    window: wp.array2d(dtype=wp.float64),
 ):
-    """Lists the pairs of one world anew; their distances, and whether one lies over the inside of the other."""
+    """Lists the pairs of one world anew: their distances, whether one lies over the inside of the other, see `Near`."""
     w = wp.tid()
     renew(s, X, thick, 0, 1, w)
     for row in range(s.count[0, w]):
@@ -426,22 +429,30 @@ def survey(
         b = s.built[p[1], w]
         c = s.built[p[2], w]
         d = s.built[p[3], w]
+        near = nearness.Near()
         if s.kind[row, w][0] == 0:
-            share = nearest(a, b, c, d)
-            distance[row, w] = wp.length(a - share[0] * b - share[1] * c - share[2] * d)
-            inside[row, w] = int(wp.min(share) > scalar(1e-9))
+            near = nearness.corner_near(a, b, c, d)
+            distance[row, w] = near.distance
+            least = wp.min(-near.share[1], wp.min(-near.share[2], -near.share[3]))
+            inside[row, w] = int(least > scalar(1e-9))
         else:
+            near = edge_near(a, b, c, d, s.fade[row, w])
             distance[row, w] = between(a, b, c, d)
             ends = wp.vec2d(scalar(1e9), scalar(1e9))
             inside[row, w] = int(edge_near(a, b, c, d, ends).window > scalar(0.0))
+        share[row, w] = near.share
+        normal[row, w] = near.normal
+        window[row, w] = near.window
 
 
 @wp.kernel(enable_backward=False)
-def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float64)):
-    """Largest share of the straight way to positions X on which no pair of the list comes nearer than it may.
+def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), finest: scalar, share: wp.array(dtype=wp.float64)):
+    """Lowers share[0] to that of the straight way to positions X on which no pair comes nearer than it may.
 
-    Pairs may close to 0.9 of the distance at which they touch, or by a fifth from where they are (conservative
-    advancement: Li, Kaufman & Jiang 2021, section 5).
+    Pairs that touch at less than `finest` [m] are passed over. Others may close to 0.9 of the distance at which they
+    touch, or by a fifth from where they are. The plane across their shortest connection keeps them apart for as long
+    as their points' speeds along it allow, from where the next connection is taken (conservative advancement: Mirtich
+    1996, section 2.3; Li, Kaufman & Jiang 2021).
     """
     row = wp.tid()
     p = s.points[row, 0]
@@ -453,32 +464,32 @@ def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), share: wp.array(dtype=wp.float
     db = place(s, X, p[1], 0) - b
     dc = place(s, X, p[2], 0) - c
     dd = place(s, X, p[3], 0) - d
-    mean = scalar(0.25) * (da + db + dc + dd)
-    da = da - mean
-    db = db - mean
-    dc = dc - mean
-    dd = dd - mean
-    speed = wp.length(da) + wp.max(wp.length(db), wp.max(wp.length(dc), wp.length(dd)))
-    if s.kind[row, 0][0] == 1:
-        speed = wp.max(wp.length(da), wp.length(db)) + wp.max(wp.length(dc), wp.length(dd))
     gone = scalar(0.0)
     floor = scalar(0.0)
     first = int(1)
     going = int(1)
+    if s.offset[row, 0] < finest:
+        going = 0
+        gone = scalar(1.0)
     while going == 1:
-        apart_now = scalar(0.0)
+        way = wp.vec3d()
         if s.kind[row, 0][0] == 0:
-            apart_now = from_triangle(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+            way = off_triangle(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
         else:
-            apart_now = between(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+            way = off_edge(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+        apart_now = wp.length(way)
+        n = nearness.unit(way)
         if first == 1:
             floor = wp.min(scalar(0.9) * s.offset[row, 0], scalar(0.8) * apart_now)
             first = 0
+        closing = wp.max(wp.dot(n, dc), wp.dot(n, dd)) - wp.min(wp.dot(n, da), wp.dot(n, db))
+        if s.kind[row, 0][0] == 0:
+            closing = wp.max(wp.dot(n, db), wp.max(wp.dot(n, dc), wp.dot(n, dd))) - wp.dot(n, da)
         free = apart_now - floor
-        if gone >= scalar(1.0) or free <= scalar(0.01) * floor or speed <= scalar(0.0):
+        if closing <= scalar(0.0) and apart_now > scalar(0.0):
+            gone = scalar(1.0)
+        if gone >= share[0] or free <= scalar(0.01) * floor:  # others allow less, or it may come no nearer
             going = 0
         else:
-            gone = gone + free / speed
-    if speed <= scalar(0.0):
-        gone = scalar(1.0)
-    share[row] = wp.min(gone, scalar(1.0))
+            gone = gone + free / closing
+    wp.atomic_min(share, 0, gone)

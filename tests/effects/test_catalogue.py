@@ -147,6 +147,25 @@ def test_has_prose_units_and_a_default_inside_its_bounds(name):
         assert effect.confused_with, "a suspect says what it is mistaken for"
 
 
+def test_the_gpu_finds_the_forces_of_every_effect(cuda):
+    """One program with the whole catalogue; skipped without a device. Only the compilers' rounding differs."""
+    off = {}
+    for name in ALL:
+        on, largest = responsible(name), 0.0
+        for seed in range(4):  # some act on one side only
+            model, parameters, state, rng = setting(name, seed=seed)
+            drive = the_drive(gradient=rng.normal(size=(3, 3)) if CATALOGUE[name].drives else None)
+            state = moved(state, rng, 1e-6 if CATALOGUE[name].family in CONTACTS else 1.0)  # or feet rise too fast
+            one, two = (Batch(model, parameters, drive, state, device=d).evaluate(NOW) for d in ("cpu", cuda))
+            size = np.abs(one.forces[on]).max()
+            difference = np.abs(two.forces[on] - one.forces[on]).max()
+            if not difference <= 1e-10 * size:
+                off[name] = difference / size
+            largest = max(largest, size)
+        assert largest > 0, name
+    assert not off
+
+
 @pytest.mark.parametrize("name", [n for n in ALL if CATALOGUE[n].energy is not None])
 @pytest.mark.parametrize("kind", CONFIGURATIONS)
 def test_force_is_minus_the_gradient_of_the_energy(name, kind):

@@ -10,7 +10,8 @@ from origami_sim.errors import InputError
 from origami_sim.folding import fold, read, summarise
 from origami_sim.folding.consistency import vertices
 from origami_sim.folding.elastic import Elastic
-from origami_sim.pattern import grid, miura, waterbomb
+from origami_sim.folding.intersections import crossing_pairs
+from origami_sim.pattern import grid, miura, strip, waterbomb
 
 TWIST = np.radians(30)
 
@@ -140,3 +141,48 @@ def test_halves_of_a_split_vertex_are_merged(tmp_path):
     assert np.sum(np.linalg.norm(pattern.vertices - middle, axis=1) < 0.05) == 1
     assert any("were merged" in note for note in pattern.notes)
     assert fold(pattern).reached
+
+
+def rolled(target):
+    """A strip of five panels whose four creases turn the same way."""
+    return strip([0.03, 0.02, 0.02, 0.02, 0.02], 0.02, fold_angles=np.full(4, np.radians(target)))
+
+
+def test_a_strip_that_would_pass_itself_stops_where_it_touches():
+    """Three squares and a longer panel close to a tube, whose flap would have to go through the first panel."""
+    free, folding = fold(rolled(100.0), touch=False), fold(rolled(100.0))
+    assert free.reached and len(crossing_pairs(free.x[-1], free.sheet.mesh.triangles, 0.0))
+    assert not folding.reached and folding.touching
+    assert 0 < folding.clear_from < 20
+    for x in folding.x:
+        assert not len(crossing_pairs(x, folding.sheet.mesh.triangles, 0.0))
+    assert summarise(folding, 2e-4).reason == "panels are in each other's way"
+    assert folding.stretch < 0.01
+    whole = fold(rolled(100.0), touch=True)
+    assert whole.clear_from == 0
+    np.testing.assert_allclose(whole.angles[-1], folding.angles[-1], atol=np.radians(1.0))
+
+
+def test_panels_that_touch_are_as_far_apart_as_they_are_thick():
+    """A flap of 20 mm between two of 30 and 25 mm that are turned shut over it: the angles of a triangle."""
+    thickness = 1e-3
+    folding = fold(strip([0.03, 0.02, 0.03], 0.02, fold_angles=np.radians([150.0, 150.0])), thickness=thickness)
+    assert not folding.reached
+    sheet, x = folding.sheet, folding.x[-1]
+    near = sheet.contact.at(x / sheet.size).pairs
+    assert 0.8 < (near.distance / near.offset).min() < 1.0
+    assert not len(crossing_pairs(x, sheet.mesh.triangles, 0.0))
+
+
+def test_what_fits_is_not_changed_by_contact():
+    pattern = miura(3, 3, 0.02, 0.02, np.radians(60), target_angle=np.radians(150.0))
+    one, other = fold(pattern, thickness=1e-4), fold(pattern, thickness=1e-4, touch=True)
+    assert one.reached and other.reached and one.clear_from is None
+    np.testing.assert_allclose(one.angles[-1], other.angles[-1], atol=1e-3)
+
+
+def test_a_shape_that_lies_in_itself_cannot_be_kept_apart():
+    pattern = strip([0.02, 0.02], 0.02, fold_angles=[np.pi])
+    pattern.vertices[4:, 0] = 0.001  # the second panel lies on the first
+    with pytest.raises(InputError, match="overlap at the start"):
+        fold(pattern, touch=True)

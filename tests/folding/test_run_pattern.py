@@ -8,7 +8,7 @@ import pytest
 from drawings import drawn, frame
 
 from origami_sim import cli
-from origami_sim.pattern import grid, miura, triangulate, waterbomb, write_fold, write_mesh
+from origami_sim.pattern import grid, miura, strip, triangulate, waterbomb, write_fold, write_mesh
 from origami_sim.results import load_run
 
 DEGREES = np.pi / 180
@@ -92,6 +92,7 @@ def test_size_and_scale_from_the_command_line(call, tmp_path):
         (["bomb.fold", "--set", "size=1cm", "--set", "scale=1cm"], r"exclude each other"),
         (["bomb.fold", "--set", "stiffness=1"], r"cannot apply this setting.*crease_stiffness"),
         (["bomb.fold", "--set", "merge=0.001"], r"only drawings have points to merge"),
+        (["box", "--touch"], r"only a pattern leaves this open.*--touch"),
         (["bomb.fold", "--panels", "rigid"], r"no such option.*--panels"),
         (["bomb.fold", "--set", "steps=0"], r"out of its range.*steps"),
         (["flat.fold"], r"flat\.fold: .*no target angle"),
@@ -107,3 +108,19 @@ def test_what_is_refused(call, bomb, tmp_path, arguments, words):
     assert re.match(rf"origami-sim: .*{words}", err)
     assert len(err.splitlines()) == 1
     assert not (tmp_path / "runs").exists()
+
+
+def test_panels_that_would_pass_each_other_are_kept_apart_unless_told_otherwise(call, tmp_path):
+    write_fold(
+        strip([0.03, 0.02, 0.02, 0.02, 0.02], 0.02, fold_angles=np.full(4, 100 * DEGREES)), tmp_path / "tube.fold"
+    )
+    code, out, _ = call("run", "tube.fold")
+    assert code == 1
+    assert re.search(r"Panels keep each other off from \d+% on, .*No panel passes through another\.", out)
+    code, out, _ = call("run", "tube.fold", "--no-touch")
+    assert code == 0
+    assert re.search(r"\d+ pairs of triangles pass through each other", out)
+    code, out, _ = call("run", "tube.fold", "--touch", "--json")
+    found = json.loads(out)
+    assert code == 1 and found["reason"] == "panels are in each other's way"
+    assert found["numbers"]["crossing_pairs"] == 0 < found["numbers"]["touching_pairs"]

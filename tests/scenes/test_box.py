@@ -5,7 +5,7 @@ import pytest
 
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
+from origami_sim.scene import follow, read_calibration
 from origami_sim.scenes import box
 from origami_sim.solve.dynamics import simulate
 
@@ -138,3 +138,26 @@ def test_default_crease_is_that_of_finite_elements_at_rest(settings):
 def test_a_bridge_without_finite_elements_is_refused(settings):
     with pytest.raises(InputError, match=r"another bridge.*'gap'.*0\.00254 m"):
         box.build(settings.replace(crease_law="finite_elements", gap=3.81e-3))
+
+
+def test_a_small_box_closes_until_its_patches_meet(settings):
+    """Below the angle at which they meet nothing changes; above, it stands there but for what contact gives way."""
+    small = settings.replace(base=0.022)
+    stop = np.degrees(box.closed(small))
+    assert 60 < stop < 70
+    assert np.degrees(box.closed(settings)) > 90 and "touch" not in box.build(settings)[0].laws
+    model, parameters, _ = box.build(small)
+    parameters.set("touch", "stiffness", 25 * parameters["touch", "stiffness"])
+    faces = box.pattern(small).faces
+    drives = [Drive(field=(0, 0, b)) for b in FIELDS]
+    angles, notes = follow(model, parameters, drives, lambda x: box.inclination(x, faces))
+    assert not notes
+    angles = np.degrees(angles)
+    np.testing.assert_allclose(angles[:3], LUMPED[:3, None] + np.zeros(4), atol=0.5)
+    assert np.all((angles[3:] > stop) & (angles[3:] < stop + 0.6))  # pressed in by the moment over the stiffness
+    assert np.ptp(angles, axis=1).max() < 0.05
+
+
+def test_without_touch_it_closes_through_its_patches(settings):
+    small = settings.replace(base=0.022)
+    np.testing.assert_allclose(statics(small.replace(touch="off"))[-1], LUMPED[-1], atol=0.5)
