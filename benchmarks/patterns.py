@@ -18,7 +18,7 @@ from origami_sim.errors import InputError
 from origami_sim.folding import fold, read, summarise
 from origami_sim.folding.fold import THICKNESS
 
-SUFFIXES = (".svg", ".fold", ".cp")
+SUFFIXES = (".svg", ".fold", ".dxf", ".cp", ".opx")
 BEGIN, END = "<!-- scoreboard -->", "<!-- end of the scoreboard -->"
 HEAD = "| pattern | creases | furthest | rms | strain | panels bend | cross | s | end |"
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
-PATTERNS = (".svg", ".fold", ".cp", ".obj", ".stl")
+PATTERNS = (".svg", ".fold", ".dxf", ".cp", ".opx", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     p = command("run", _run, summary, "origami-sim run box --set gap=2.54mm; origami-sim run crane.svg --set size=15cm")
     names = ", ".join(import_module("origami_sim.scenes").NAMES)
     yours = "or a device of yours: my_flap.py, package.module:build, my_flap.toml"
-    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold, .cp); {yours}")
+    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold, .dxf, .cp, .opx); {yours}")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (with unit)")
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")

@@ -36,8 +36,8 @@ def check(args) -> None:
         raise InputError(
             "a mesh has a shape, but no fold to go to",
             file=args.scene,
-            allowed="FOLD with edges_assignment or edges_foldAngle, .cp, or SVG as for Origami Simulator; in Python, "
-            "Sheet(read_mesh(file)) keeps the shape",
+            allowed="FOLD with edges_assignment or edges_foldAngle, .cp, .opx, DXF, or SVG as for Origami Simulator; "
+            "in Python, Sheet(read_mesh(file)) keeps the shape",
         )
 
 

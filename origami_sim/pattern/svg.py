@@ -5,10 +5,10 @@ times 180 degrees is the target fold angle of mountains and valleys.
 """
 
 from ..errors import InputError
+from ..files import read_bytes
 from .checks import check_number
 from .crease_pattern import Pattern
 from .drawn import drawn_pattern
-from .files import read_bytes
 from .svg_drawing import read_drawing
 
 FLATNESS = 1e-3
