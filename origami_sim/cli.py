@@ -32,7 +32,7 @@ class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one sentence, as everything else here does."""
 
     def error(self, message: str):
-        print(f"origami-sim: {message.rstrip('.')}; see {self.prog} --help.", file=sys.stderr)
+        print(f"origami-sim: {InputError(f'{message}; see {self.prog} --help')}", file=sys.stderr)
         sys.exit(BAD_INPUT)
 
 
@@ -265,6 +265,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with its code."""
     args = _parser().parse_args(arguments)
     try:
+        for given in sys.argv[1:] if arguments is None else arguments:
+            if "\0" in given:  # no file can be called so
+                raise InputError("an argument holds a null byte", value=given)
         code = args.action(args)
     except InputError as e:
         print(f"origami-sim: {e}", file=sys.stderr)
@@ -276,7 +279,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = OK
     except OSError as e:  # a disk that is full, a folder that must not be written
-        print(f"origami-sim: {e.strerror or e}{f': {e.filename}' if e.filename else ''}.", file=sys.stderr)
+        print(f"origami-sim: {InputError(e.strerror or str(e), file=e.filename)}", file=sys.stderr)
         code = BAD_INPUT
     sys.exit(code)
 

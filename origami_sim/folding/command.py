@@ -32,6 +32,8 @@ def check(args) -> None:
                 value=getattr(args, name),
                 allowed="--set, --calibration, --out",
             )
+    if not Path(args.scene).is_file():
+        raise InputError("no such file", file=args.scene)
     if Path(args.scene).suffix.lower() in MESHES:
         raise InputError(
             "a mesh has a shape, but no fold to go to",
