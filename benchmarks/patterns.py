@@ -42,13 +42,13 @@ def folded(path: Path, picture: Path | None) -> dict:
     meant = not folding.contradictions and not folding.curved
     seconds = time.process_time() - began
     return {
+        **found.numbers,
         "read": True,
         "target": True,
-        "meant": meant or found.reached,
-        "reached": found.reached,
+        "meant": meant or folding.reached,
+        "reached": folding.reached,
         "reason": found.reason,
         "seconds": seconds,
-        **found.numbers,
     }
 
 
