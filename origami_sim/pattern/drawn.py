@@ -83,7 +83,7 @@ def drawn_pattern(
     used = sorted({v for face in faces for v in face})
     renumbered = {v: n for n, v in enumerate(used)}
     signs = {"M": -math.pi, "V": math.pi, "F": 0.0}
-    return assemble(
+    pattern = assemble(
         np.column_stack([points[used], np.zeros(len(used))]),
         [tuple(renumbered[v] for v in face) for face in faces],
         edges=[(renumbered[a], renumbered[b]) for a, b in edges],
@@ -92,6 +92,8 @@ def drawn_pattern(
         notes=notes,
         file=file,
     )
+    pattern.accuracy = tolerance
+    return pattern
 
 
 def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:

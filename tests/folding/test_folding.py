@@ -140,3 +140,31 @@ def test_halves_of_a_split_vertex_are_merged(tmp_path):
     assert np.sum(np.linalg.norm(pattern.vertices - middle, axis=1) < 0.05) == 1
     assert any("were merged" in note for note in pattern.notes)
     assert fold(pattern).reached
+
+
+def test_a_ring_is_not_folded_about_a_circle_by_stretching_it(tmp_path):
+    """A circle that keeps one fold angle stays plane, so that one side would have to be a cone of another length.
+
+    The drawing is exact, so that no strain is the drawing's fault.
+    """
+    circle = '<circle cx="10" cy="10" r="{}" fill="none" stroke="{}"{}/>'
+    rings = ((9, "black", ""), (6, "red", ' opacity="0.3"'), (3, "black", ""))
+    file = tmp_path / "ring.svg"
+    file.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{"".join(circle.format(*r) for r in rings)}</svg>')
+    pattern = read(file)
+    assert pattern.accuracy < 3e-4 * np.ptp(pattern.vertices[:, 0])
+    folding = fold(pattern)
+    assert not folding.reached
+    rough = read(file, merge=3e-3)
+    assert rough.accuracy == pytest.approx(3e-3 * np.hypot(*np.ptp(rough.vertices, axis=0)[:2]), rel=1e-6)
+
+
+def test_what_a_drawing_misses_by_is_no_tear():
+    pattern = miura(2, 2, 0.02, 0.02, np.radians(60), target_angle=1.0)
+    sheet = Elastic(pattern)
+    wide = sheet.reference * [1.02, 1.0, 1.0]
+    pattern.accuracy = 0.01 * sheet.size
+    rough = Elastic(pattern)
+    change = np.abs(rough.strains(wide)) * rough.lengths
+    np.testing.assert_allclose(rough.misfits(wide), np.maximum(change - 0.01, 0) / rough.lengths, atol=1e-12)
+    assert rough.misfits(wide).max() < sheet.misfits(wide).max()
