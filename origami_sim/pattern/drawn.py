@@ -75,7 +75,7 @@ def drawn_pattern(
     beside = Counter(edge_key(*side) for face in faces for side in face_sides(face))
     edges = [key for key in chosen if beside[key]]
     if len(edges) < len(chosen):
-        notes.append(f"{len(chosen) - len(edges)} line pieces that enclose nothing were left out.")
+        notes.append(_loose([chosen[key][0] for key in chosen if not beside[key]], chosen.values()))
     outer = [key for key in edges if beside[key] == 1 and chosen[key][0] not in "BC"]
     if outer:
         notes.append(f"{len(outer)} coloured edges on the outside of the sheet were taken as border.")
@@ -94,6 +94,17 @@ def drawn_pattern(
     )
     pattern.accuracy = tolerance
     return pattern
+
+
+def _loose(letters, chosen) -> str:
+    """Return the sentence about line pieces of these letters, which enclose nothing."""
+    folds = sum(letter in "MV" for letter in letters)
+    said = f"{len(letters)} line pieces that enclose nothing were left out"
+    if folds:
+        said += f", {folds} of them mountains or valleys"
+    if folds and not any(letter == "B" for letter, _ in chosen):
+        said += ": no border is drawn, within which they would fold"
+    return f"{said}."
 
 
 def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:

@@ -288,3 +288,12 @@ def test_a_border_in_another_colour(tmp_path):
         file.write_text(f"<svg>{grey}{other}</svg>")
         with pytest.raises(InputError, match="enclose no face"):
             read_svg(file)
+
+
+def test_folds_without_a_border_around_them_are_told(tmp_path):
+    file = tmp_path / "a.svg"
+    file.write_text('<svg><path d="M0 0H2V2H0Z M2 0H4 M2 2H4" stroke="red"/></svg>')
+    notes = read_svg(file).notes
+    assert any(
+        "2 line pieces that enclose nothing were left out, 2 of them mountains or valleys: no b" in n for n in notes
+    )
