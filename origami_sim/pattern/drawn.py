@@ -61,7 +61,7 @@ def drawn_pattern(
         raise InputError("all lines are shorter than the merge tolerance", file=file, value=tolerance)
     points, pieces = split_segments(starts[long_enough], ends[long_enough], tolerance, file=file)
 
-    chosen = _edges(pieces, strokes, notes)
+    points, chosen = _slit(points, _edges(pieces, strokes, notes))
     facets, holed = facets_of_holes(points, np.array(list(chosen)))
     if holed:
         chosen |= {key: ("F", 1.0) for key in facets}
@@ -94,6 +94,28 @@ def drawn_pattern(
     )
     pattern.accuracy = tolerance
     return pattern
+
+
+def _slit(points, chosen):
+    """Return points and edges in which each cut of one edge, with both ends inside the sheet, has a middle.
+
+    Only so can its two sides part.
+    """
+    cuts = [key for key, (letter, _) in chosen.items() if letter == "C"]
+    ends = Counter(v for key in cuts for v in key)
+    ends.update(v for key, (letter, _) in chosen.items() if letter == "B" for v in key)
+    halves: dict[tuple[int, int], int] = {}
+    for key in cuts:
+        if ends[key[0]] == ends[key[1]] == 1:
+            halves[key] = len(points) + len(halves)
+    if not halves:
+        return points, chosen
+    parted = {}
+    for key, stroke in chosen.items():
+        middle = halves.get(key)
+        for part in [key] if middle is None else [(key[0], middle), (key[1], middle)]:
+            parted[part] = stroke
+    return np.vstack([points, *(points[list(key)].mean(axis=0) for key in halves)]), parted
 
 
 def _loose(letters, chosen) -> str:
