@@ -358,8 +358,8 @@ def _compare(args) -> int:
 
     for name in ("duration", "threshold"):
         value = getattr(args, name)
-        if value is not None and not value > 0:
-            raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
+        if value is not None and not 0 < value < float("inf"):
+            raise InputError("must be positive", field=f"--{name}", value=value, allowed="a finite number above 0")
     sidecar = args.sidecar or _sidecar(Path(args.recording))
     given, recording = args.scene, None
     if given is None:
@@ -516,6 +516,8 @@ def _shipped_sidecar(name: str) -> Path:
 
 def _sidecar(recording: Path) -> Path | None:
     """The shipped sidecar of a known recording, unless one lies beside the file."""
+    if not recording.name:  # a folder, as reading it will say
+        return None
     shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
     return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
 
