@@ -4,10 +4,10 @@
 
 50,000 inputs (seed 20) took 365 s of two processes and crashed nothing on 2026-11-25.
 
-Kinds: tables with sidecars, listings, calibrations, exports of trackers, FOLD, SVG, .cp, OBJ, STL, designs, files of
-devices, tables of fields, run folders, earlier diagnoses and sweeps. Each input
-is one of a few good files with one to four damages: bytes turned, cut out, doubled, swapped with those of another
-kind; numbers replaced by what is no number here; lines moved; brackets nested. What crashed is kept in --out.
+Kinds: tables with sidecars, listings, calibrations, exports of trackers, FOLD, SVG, DXF, .cp, .opx, OBJ, STL, designs,
+files of devices, tables of fields, run folders, earlier diagnoses and sweeps. Each input is one of
+a few good files with one to four damages: bytes turned, cut out, doubled, swapped with those of another kind; numbers
+replaced by what is no number here; lines moved; brackets nested. What crashed is kept in --out.
 """
 
 import argparse
@@ -26,6 +26,9 @@ from pathlib import Path
 
 SLOW = 10.0
 """Seconds of computing above which an input counts as one that hangs; the slowest honest one takes 4 s."""
+
+ENDS = ("x0", "y0", "x1", "y1")
+"""What ORIPA calls the ends of a line."""
 
 ODD = [
     *(b"true", b"false", b"null", b"nan", b"-nan", b"inf", b"1e400", b"-1e308", b"1e-320", b"0", b"-1", b"99999999999"),
@@ -86,6 +89,15 @@ def table_files(folder: Path) -> dict[str, dict[str, bytes]]:
     rows_of = "t,a,z\n" + "".join(f"{k / 60:.5f},{0.3 * np.sin(k):.6f},{k}\n" for k in range(20))
     cp = b"1 -200 -200 200 -200\n1 200 -200 200 200\n1 200 200 -200 200\n1 -200 200 -200 -200\n3 -200 -200 200 200\n"
     cp += b"3 -200 200 200 -200\n2 -200 0 200 0\n4 0 -200 10 200\n"
+    beans, dxf = "", "0 SECTION 2 HEADER 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES "
+    for kind, *ends in (line.split() for line in cp.decode().splitlines()):
+        numbers = "".join(f'<void property="{k}"><double>{v}</double></void>' for k, v in zip(ENDS, ends, strict=True))
+        kind = f'<void property="type"><int>{kind.replace("4", "0")}</int></void>'
+        beans += f'<void index="0"><object class="oripa.OriLineProxy">{kind}{numbers}</object></void>'
+        dxf += "0 LINE 8 valley " + "".join(f"{c} {v} " for c, v in zip((10, 20, 11, 21), ends, strict=True))
+    opx = f'<?xml version="1.0"?><java><object><void property="lines"><array>{beans}</array></void></object></java>'
+    dxf += "0 LWPOLYLINE 8 0 90 4 70 1 10 0 20 0 10 4 20 0 42 0.2 10 4 20 4 10 0 20 4 "
+    dxf += "0 ARC 8 0 62 1 10 2 20 2 40 1 50 10 51 300 0 ENDSEC 0 EOF"
     calibration = (Path(__file__).parents[1] / "calibrations" / "box.toml").read_bytes()
     return {
         "table": {"a.csv": csv.read_bytes(), "a.toml": side},
@@ -98,6 +110,8 @@ def table_files(folder: Path) -> dict[str, dict[str, bytes]]:
         "field": {"a.csv": field.encode()},
         "placed": {"a.csv": rows_of.encode(), "a.toml": placed, "map.csv": field.encode()},
         "cp": {"a.cp": cp},
+        "opx": {"a.opx": opx.encode()},
+        "dxf": {"a.dxf": dxf.replace(" ", "\n").encode()},
         "design": {"a.toml": documented_design()},
         "model": {"a.toml": model_design(folder)},
         "device": {"a.py": DEVICE},
@@ -188,7 +202,7 @@ def readers() -> dict[str, Callable[[Path], object]]:
         "motive": recording,
         "placed": recording,
         "field": lambda folder: FieldTable.read(folder / "a.csv"),
-        "cp": lambda folder: read(folder / "a.cp"),
+        **{kind: (lambda folder, kind=kind: read(folder / f"a.{kind}")) for kind in ("cp", "opx", "dxf")},
         "design": lambda folder: built(folder / "a.toml"),
         "model": lambda folder: built(folder / "a.toml"),
         "device": lambda folder: built(folder / "a.py"),
@@ -250,11 +264,11 @@ def hangs(*_) -> None:
     raise TimeoutError("it hangs")
 
 
-def work(job: tuple[int, int, str]) -> tuple[collections.Counter, list[str]]:
+def work(job: tuple[int, int, str, list[str]]) -> tuple[collections.Counter, list[str]]:
     """Tries `count` inputs from a seed: how they ended by kind, and what crashed."""
     from origami_sim.errors import InputError
 
-    seed, count, out = job
+    seed, count, out, kinds = job
     draw, ended, crashes = random.Random(seed), collections.Counter(), []
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGPROF, hangs)
@@ -269,7 +283,7 @@ def work(job: tuple[int, int, str]) -> tuple[collections.Counter, list[str]]:
             read[kind](here)
         every = [d for files in good.values() for d in files.values()]
         for n in range(count):
-            kind = draw.choice(list(good))
+            kind = draw.choice(kinds or list(good))
             files = dict(good[kind])
             for name in draw.sample(list(files), draw.randint(1, len(files))):
                 files[name] = damaged(files[name], every, draw)
@@ -307,11 +321,13 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=50_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--kinds", type=lambda text: text.split(","), default=[], help="only these: svg,fold")
     parser.add_argument("--out", default="runs/fuzz", help="where the inputs that crashed are kept")
     args = parser.parse_args()
     began, size = time.perf_counter(), 500
     jobs = [
-        (args.seed * 1_000_000 + k, min(size, args.count - k * size), args.out) for k in range(-(-args.count // size))
+        (args.seed * 1_000_000 + k, min(size, args.count - k * size), args.out, args.kinds)
+        for k in range(-(-args.count // size))
     ]
     ended, crashes = collections.Counter(), []
     Path(args.out).mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@ from origami_sim.errors import InputError
 from origami_sim.folding import fold, read, summarise
 from origami_sim.folding.fold import THICKNESS
 
-SUFFIXES = (".svg", ".fold", ".cp")
+SUFFIXES = (".svg", ".fold", ".dxf", ".cp", ".opx")
 BEGIN, END = "<!-- scoreboard -->", "<!-- end of the scoreboard -->"
 HEAD = "| pattern | creases | furthest | rms | strain | panels bend | cross | s | end |"
 
@@ -42,13 +42,13 @@ def folded(path: Path, picture: Path | None) -> dict:
     meant = not folding.contradictions and not folding.curved
     seconds = time.process_time() - began
     return {
+        **found.numbers,
         "read": True,
         "target": True,
-        "meant": meant or found.reached,
-        "reached": found.reached,
+        "meant": meant or folding.reached,
+        "reached": folding.reached,
         "reason": found.reason,
         "seconds": seconds,
-        **found.numbers,
     }
 
 

@@ -4,7 +4,7 @@
     python examples/flap.py
 
 A wider gap makes a softer bridge. The field leans back by 15 degrees, as a vertical one pulls no patch upright against
-its weight.
+its weight. The flap lies on a table, from which the field lifts it.
 """
 
 from math import cos, radians, sin
@@ -27,7 +27,7 @@ def build(gap="2 mm", field="50 mT", lean="15 deg", patch="3 mm"):
     centre = (0.01 + gap / 2 + LENGTH / 2, 0, 0)
     sheet.patch(1, thickness=patch, size=(LENGTH, WIDTH), centre=centre, poling=(1, 0, 0))
     sheet.crease(stiffness=bridge_stiffness(1.5e6, WIDTH, 1e-3, gap), loss_time="3 ms").name("crease", ["hinge"])
-    sheet.gravity().fix(panels=[0])
+    sheet.ground().fix(panels=[0])
     return sheet, Drive(field=(-field * sin(lean), 0, ramp(field * cos(lean), 0.5)))
 
 

@@ -25,14 +25,14 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
-PATTERNS = (".svg", ".fold", ".cp", ".obj", ".stl")
+PATTERNS = (".svg", ".fold", ".dxf", ".cp", ".opx", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one sentence, as everything else here does."""
 
     def error(self, message: str):
-        print(f"origami-sim: {message.rstrip('.')}; see {self.prog} --help.", file=sys.stderr)
+        print(f"origami-sim: {InputError(f'{message}; see {self.prog} --help')}", file=sys.stderr)
         sys.exit(BAD_INPUT)
 
 
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     p = command("run", _run, summary, "origami-sim run box --set gap=2.54mm; origami-sim run crane.svg --set size=15cm")
     names = ", ".join(import_module("origami_sim.scenes").NAMES)
     yours = "or a device of yours: my_flap.py, package.module:build, my_flap.toml"
-    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold, .cp); {yours}")
+    p.add_argument("scene", help=f"{names}; a pattern (.svg, .fold, .dxf, .cp, .opx); {yours}")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting (with unit)")
     p.add_argument("--calibration", metavar="TOML", help="a calibration file instead of the scene's own")
     p.add_argument("--settings", action="store_true", help="list the settings and their sources, and stop")
@@ -267,6 +267,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with its code."""
     args = _parser().parse_args(arguments)
     try:
+        for given in sys.argv[1:] if arguments is None else arguments:
+            if "\0" in given:  # no file can be called so
+                raise InputError("an argument holds a null byte", value=given)
         code = args.action(args)
     except InputError as e:
         print(f"origami-sim: {e}", file=sys.stderr)
@@ -278,7 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = OK
     except OSError as e:  # a disk that is full, a folder that must not be written
-        print(f"origami-sim: {e.strerror or e}{f': {e.filename}' if e.filename else ''}.", file=sys.stderr)
+        print(f"origami-sim: {InputError(e.strerror or str(e), file=e.filename)}", file=sys.stderr)
         code = BAD_INPUT
     sys.exit(code)
 
@@ -360,8 +363,8 @@ def _compare(args) -> int:
 
     for name in ("duration", "threshold"):
         value = getattr(args, name)
-        if value is not None and not value > 0:
-            raise InputError("must be positive", field=f"--{name}", value=value, allowed="> 0")
+        if value is not None and not 0 < value < float("inf"):
+            raise InputError("must be positive", field=f"--{name}", value=value, allowed="a finite number above 0")
     sidecar = args.sidecar or _sidecar(Path(args.recording))
     given, recording = args.scene, None
     if given is None:
@@ -518,6 +521,8 @@ def _shipped_sidecar(name: str) -> Path:
 
 def _sidecar(recording: Path) -> Path | None:
     """The shipped sidecar of a known recording, unless one lies beside the file."""
+    if not recording.name:  # a folder, as reading it will say
+        return None
     shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
     return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
 

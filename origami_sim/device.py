@@ -54,6 +54,12 @@ Creases of centimetre devices swing out in some tenths of a second. Half may sho
 PERIODS = 5
 """Periods of its slowest wave that a device is simulated for, unless it says how long."""
 
+PAST = 1.0
+"""Degrees past half a turn by which panels on soft creases may swing without a note: some tenths are elastic.
+
+Half notes what is pressed flat by strong magnets, double lets a panel of 3 cm pass by half a millimetre more.
+"""
+
 _LAST = 1e8
 """Instants beyond it [s] stand for ever, as the end of a `ramp` does."""
 
@@ -350,6 +356,12 @@ def outcome_of(motion: Trajectory) -> Outcome:
         most = int(np.abs(angles[-1] - angles[0]).argmax())
         numbers["largest_turn_deg"] = float(angles[-1, most] - angles[0, most])
         summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:.2f} deg at the end")
+        past = int(np.abs(far).argmax())
+        if abs(far[past]) > 180.0 + PAST:
+            summary.append(
+                f"{names[past]} turns past half a turn, to {far[past]:.1f} deg: panels that do not lie beside each "
+                "other have passed through; Sheet.touch() holds panels apart, Sheet.ground() holds them from below."
+            )
     if len(model.contacts) and "ground" in model.laws:
         went = (motion.centre_of_mass()[-1, 0] - motion.centre_of_mass()[0, 0]) * 1e3
         numbers |= {f"moved_{a}_mm": float(v) for a, v in zip("xyz", went, strict=True)}

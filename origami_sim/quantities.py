@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.units import UNITS
+from origami_sim.units import UNITS, spelled
 
 _TEXT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d.\s].*|1/.*)?")
 _FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
@@ -54,7 +54,7 @@ def parsed(text: str, unit: str = ANY, *, file: object = None, field: str | None
     if not match:
         wanted = "a number, with a unit if need be" if unit == ANY else f"a number in {unit}"
         raise InputError("not a number", file=file, field=field, value=text, allowed=wanted)
-    number, given = float(match[1]), (match[2] or "").strip()
+    number, given = float(match[1]), spelled(match[2] or "")
     if not given or given == unit:
         return Quantity(number, unit)
     if unit == ANY:

@@ -144,7 +144,7 @@ def save_run(
                 np.savez(f, allow_pickle=False, **_arrays(trajectory))
             for name, sheet in sheets.items():
                 (work / TABLES).mkdir(exist_ok=True)
-                pq.write_table(sheet, work / TABLES / f"{name}.parquet")
+                pq.write_table(sheet, (work / TABLES / f"{name}.parquet").absolute())  # 'a:b' alone would be an address
             if replay is not False:
                 options = replay if isinstance(replay, Mapping) else {}
                 write_replay(work / REPLAY, trajectory, **{"title": scene, **options})
@@ -188,7 +188,7 @@ def load_run(path: str | Path) -> Run:
     tables, units = {}, {}
     for file in _table_files(folder, manifest):
         try:
-            sheet = pq.read_table(file)
+            sheet = pq.read_table(file.absolute())
         except (OSError, pa.ArrowException) as e:
             raise InputError(f"is damaged ({_first_line(e)})", file=file, field=file.stem) from None
         tables[file.stem] = {n: sheet[n].to_numpy() for n in sheet.column_names}

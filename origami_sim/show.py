@@ -20,6 +20,9 @@ FLAT = 0.02
 Half would draw the stacked feet and patches of a flat sheet aslant, double hide a shallow dome.
 """
 
+PICTURES = (".png", ".svg", ".pdf", ".jpg", ".webp")
+"""Suffixes of what is drawn."""
+
 VIEW = (0.5, -1.0, 0.8)
 """Direction from the device to whoever looks at it aslant."""
 
@@ -29,6 +32,9 @@ MAGNET, ELECTRODE, FOOT, HELD, NODE = "#7a3b9e", "#e08a00", "#1b7f4b", "#000000"
 
 def run(args: Namespace) -> dict[str, Any]:
     """The command: draws, saves the design if asked to, and returns tables and files."""
+    picture = None if args.out is None else Path(args.out)
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        raise InputError("is no picture", field="--out", value=args.out, allowed=", ".join(PICTURES))
     module = device_module(args.device)
     name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module).override(args.set, "--set")
@@ -40,8 +46,8 @@ def run(args: Namespace) -> dict[str, Any]:
         numbers = {n: float(settings[n].value) for n in ("duration", "rate") if n in settings}
         about = " ".join((module.__doc__ or "").split("\n\n")[0].split())
         found["design"] = str(write_design(args.save, source_of(module, settings), drive, **numbers, about=about))
-    picture = draw(model, parameters, Path(args.out or f"runs/show/{name}.png"), drive=drive, title=name)
-    return {**found, "picture": str(picture)}
+    drawn = draw(model, parameters, picture or Path(f"runs/show/{name}.png"), drive=drive, title=name)
+    return {**found, "picture": str(drawn)}
 
 
 def text(found: dict[str, Any]) -> str:

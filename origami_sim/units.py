@@ -6,8 +6,8 @@ from origami_sim.errors import InputError
 
 UNITS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "rev": 2.0 * np.pi},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3},
     "moment": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
     "flux density": {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "G": 1e-4},
@@ -38,6 +38,16 @@ UNITS: dict[str, dict[str, float]] = {
 """Units by dimension with their factor to SI; the first of each dimension is the SI unit."""
 
 
+_SIGNS = str.maketrans({"µ": "u", "μ": "u", "·": " ", "⋅": " ", "*": " ", "°": "deg", "²": "^2", "³": "^3"})
+_TOGETHER = {unit.replace(" ", ""): unit for units in UNITS.values() for unit in units if " " in unit}
+
+
+def spelled(unit: str) -> str:
+    """A unit as `UNITS` spells it: "µm" is "um", "mNm/rad" and "mN·m/rad" are "mN m/rad"."""
+    unit = " ".join(unit.translate(_SIGNS).split())
+    return _TOGETHER.get(unit, unit)
+
+
 def unit_factor(unit: str, *, dimension: str | None = None, file: object = None, field: str = "unit") -> float:
     """Factor that turns a number stated in `unit` into SI.
 
@@ -48,6 +58,7 @@ def unit_factor(unit: str, *, dimension: str | None = None, file: object = None,
         field: the field to name in the error.
     """
     candidates = _candidates(dimension)
+    unit = spelled(unit)
     if unit not in candidates:
         kind = f" of {dimension}" if dimension else ""
         raise InputError(f"unknown unit{kind}", file=file, field=field, value=unit, allowed=", ".join(candidates))
@@ -56,7 +67,7 @@ def unit_factor(unit: str, *, dimension: str | None = None, file: object = None,
 
 def si_unit(unit: str) -> str:
     """The SI unit of the same dimension as `unit`, which must be known."""
-    return next(next(iter(group)) for group in UNITS.values() if unit in group)
+    return next(next(iter(group)) for group in UNITS.values() if spelled(unit) in group)
 
 
 def with_prefix(value: float, unit: str) -> tuple[float, str]:

@@ -1,4 +1,4 @@
-"""A chain of rigid arms on hinges, with its published parameters, beside a real recording.
+"""A chain of rigid arms on hinges, with its published parameters, beside a recording.
 
     python -m origami_sim.scenes.pendulum_chain
 

@@ -292,7 +292,7 @@ def test_a_disk_that_is_full_is_one_sentence(call, monkeypatch, tmp_path):
 
     monkeypatch.setattr("origami_sim.cli._save", full)
     code, _, err = call("run", "fold_file", *QUICK)
-    assert (code, err) == (2, f"origami-sim: No space left on device: {tmp_path}/runs/positions.npy.\n")
+    assert (code, err) == (2, f"origami-sim: {tmp_path}/runs/positions.npy: No space left on device.\n")
 
 
 def test_a_reader_that_leaves_is_no_error(tmp_path):
@@ -353,6 +353,13 @@ def refused(call, tmp_path, arguments, words):
         (["compare", "none.csv", "--scene", "pendulum_chain"], r"none\.csv.*cannot be read"),
         (["compare", "none.csv", "--scene", "box"], r"cannot replicate.*box.*pendulum_chain"),
         (["compare", "none.csv", "--scene", "pendulum_chain", "--duration", "0"], r"must be positive.*--duration"),
+        (["compare", "", "--scene", "pendulum_chain"], r"cannot be read: it is a folder"),
+        (["compare", "none.csv", "--scene", "pendulum_chain", "--threshold", "inf"], r"must be positive.*--threshold"),
+        (["show", "box", "--out", "box.xyz"], r"is no picture.*--out.*box\.xyz.*\.png"),
+        (["sweep", "box", "--vary", "gap=1mm:2mm:99999999"], r"too many values.*--vary gap.*up to 100000"),
+        (["sweep", "box", "--vary", "gap=1mm,2mm", "--pareto", "mass_g,weight"], r"no such measure.*--pareto.*weight"),
+        (["run", "nothing.svg", "--settings"], r"nothing\.svg: no such file"),
+        (["effects", "a\0b"], r"null byte"),
         (["compare", "none.csv", "--scene", "pendulum_chain", "--threshold", "nan"], r"must be positive.*--threshold"),
     ],
     ids=lambda v: " ".join(v) if isinstance(v, list) else "",
@@ -413,7 +420,11 @@ def test_output_folders_that_cannot_be_written(call, tmp_path, monkeypatch):
     refused(call, tmp_path, ["demo", "--out", "file"], r"cannot be written")
 
 
-def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, tmp_path):
+def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, monkeypatch, tmp_path):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("origami_sim.diagnose.command.diagnose", interrupted)
     recording = stand_in_double_pendulum(tmp_path / "stand_in.csv", duration=0.5)
     (tmp_path / "stand_in.toml").write_text(SIDECAR.read_text())
     (tmp_path / "mine").mkdir()
@@ -422,7 +433,8 @@ def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, tmp_path):
     refused(call, tmp_path, arguments, r"mine: is a folder with other things.*--out.*earlier diagnosis")
     (tmp_path / "mine" / "diagnosis.json").write_text('{"verdict": "TIE", "recordings": ["monday", "tuesday"]}')
     _, out, err = call(*arguments)
-    assert "no such effect" in err  # so that nothing is computed here
+    assert "no such effect" in err and out == ""  # so nothing is replaced
+    _, out, _ = call(*["air_drag" if a == "magic" else a for a in arguments])
     assert "note: replaces the report of monday, tuesday in mine." in out
     (tmp_path / "mine" / "diagnosis.json").unlink()
     (tmp_path / "mine" / ".resume").mkdir()

@@ -416,3 +416,20 @@ def test_the_age_of_a_device_is_a_channel_of_a_design(tmp_path):
     file.write_text(text + "source_0_x = 1\n")
     with pytest.raises(InputError, match="source_0_x"):
         read_design(file)
+
+
+def test_a_panel_that_turns_past_half_a_turn_is_noted():
+    """A heavy flap without a ground falls below its base and is pulled on from there."""
+    from origami_sim import Drive, Sheet, ramp, simulate, strip
+    from origami_sim.device import outcome_of
+
+    sheet = Sheet(strip([0.01, 0.02], 0.02), thickness=1e-3, triangulation="center").patch(
+        1, thickness=3e-3, poling=(1, 0, 0)
+    )
+    sheet.crease(stiffness=1e-4, loss_time=0.003).gravity().fix(panels=[0])
+    notes = []
+    for field in (0.0, 0.1):
+        motion = simulate(*sheet.build(), Drive(field=(ramp(-field, 0.1), 0, 0)), duration=1.0)
+        notes.append(" ".join(outcome_of(motion).summary))
+    assert "past half a turn" in notes[1] and "Sheet.touch()" in notes[1]
+    assert "past half a turn" not in notes[0]

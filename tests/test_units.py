@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from origami_sim.quantities import converted
-from origami_sim.units import UNITS, unit_factor
+from origami_sim.quantities import converted, parsed
+from origami_sim.units import UNITS, si_unit, unit_factor
 
 PREFIXES = {"": 1.0, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 SYMBOLS = {
@@ -17,6 +17,8 @@ SYMBOLS = {
     "rev": 2 * math.pi,
     "g0": 9.80665,  # third general conference on weights and measures, 1901
     "%": 0.01,
+    "in": 0.0254,  # international yard and pound, 1959
+    "h": 3600.0,
 }
 
 
@@ -37,6 +39,16 @@ def defined(unit: str) -> float:
 @pytest.mark.parametrize(("dimension", "unit"), [(d, u) for d, group in UNITS.items() for u in group])
 def test_every_unit_is_what_its_name_says(dimension, unit):
     assert unit_factor(unit, dimension=dimension) == pytest.approx(defined(unit), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("written", "unit"),
+    [("µm", "um"), ("μm", "um"), ("mN·m/rad", "mN m/rad"), ("mNm/rad", "mN m/rad"), ("°", "deg"), ("m/s²", "m/s^2"),
+     ("N*m", "N m"), ("Nmm", "N mm"), ("kgm^2", "kg m^2")],
+)  # fmt: skip
+def test_other_spellings(written, unit):
+    assert unit_factor(written) == unit_factor(unit) and si_unit(written) == si_unit(unit)
+    assert parsed(f"3{written}") == pytest.approx(3 * unit_factor(unit))
 
 
 def test_units_of_magnetic_fields_against_each_other():

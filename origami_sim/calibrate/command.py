@@ -363,8 +363,8 @@ def _names(text: str, count: int) -> list[str]:
 def _number(text: str, dimension: str, option: str) -> float:
     from origami_sim.recording.units import UNITS, unit_factor
 
-    match = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*(.*)", str(text).strip())
-    if not match or not match[2]:
+    match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", str(text).strip())
+    if not match or not match[2] or not math.isfinite(float(match[1])):
         allowed = ", ".join(f"NUMBER{u}" for u in UNITS[dimension])
         raise InputError("needs a number with its unit", field=option, value=text, allowed=allowed)
     return float(match[1]) * unit_factor(match[2], dimension=dimension, field=option)

@@ -50,7 +50,8 @@ THOROUGH = Options(rate=400.0, fits=48)
 
 def run(args: Namespace) -> int:
     """The command; returns the verdict's exit code."""
-    say = (lambda *_, **__: None) if args.json else print
+    said: list[str] = []
+    say = said.append  # printed once nothing can be refused any more
     folder = Path(args.out or "runs/diagnose")
     if args.model:
         _check_model(folder, args.model)
@@ -93,6 +94,8 @@ def run(args: Namespace) -> int:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
     options = replace(_options(args, settings), possible=getattr(module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
+    if not args.json:
+        print("\n".join(said), flush=True)
     keep, progress = Keep(folder / RESUME), Progress()
     files = keep.write = Files(folder, settings, given if is_device(given) else name, keep)
     try:
@@ -125,6 +128,9 @@ def read_recordings(paths: Sequence[str], sidecar: str | None = None) -> DataSet
         InputError: what `read_dataset` refuses.
     """
     files = [Path(p) for p in paths]
+    for file in files:
+        if not file.name and len(files) > 1:
+            raise InputError("is a folder", field="RECORDING", value=str(file), allowed="tables, or one folder")
     if len(files) == 1 and (files[0].is_dir() or files[0].suffix.lower() == ".toml"):
         return read_dataset(files[0], sidecar=sidecar)
     shipped = None

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from origami_sim.device import device_module, lasting
 from origami_sim.errors import InputError, nearest
 from origami_sim.explore.found import Device, Found, Measure, Way, at
-from origami_sim.explore.sweep import ROWS, Sweep, sweep
+from origami_sim.explore.sweep import MOST, ROWS, Sweep, sweep
 from origami_sim.printing import print_json
 from origami_sim.quantities import parsed
 from origami_sim.results import check_writable, format_table
@@ -36,21 +36,19 @@ def run(args: Namespace) -> int:
     if not (folder / ROWS).is_file():  # an earlier sweep goes on
         check_writable(folder)
     first = at(build, {n: v[0] for n, v in grid.items()})
+    columns, pair = measures(first), [part.strip() for part in (args.pareto or "").split(",")]
+    if args.pareto:  # told before anything is computed
+        _check_front(pair, [*grid, *columns])
     duration = None
     if not args.equilibrium:
         stated = float(settings["duration"].value) if "duration" in settings else 0.0
         duration = stated or lasting(first.drive)
     way = Way(duration=duration, rate=float(settings["rate"].value) if "rate" in settings else 60.0)
-    found = sweep(build, grid, measures(first), way=way, folder=folder, progress=_progress)
+    found = sweep(build, grid, columns, way=way, folder=folder, progress=_progress)
     table = folder / "sweep.parquet"
-    pq.write_table(pa.table(found.columns), table)
+    pq.write_table(pa.table(found.columns), table.absolute())  # 'a:b' alone would be an address
     picture = None
     if args.pareto:
-        pair = [part.strip() for part in args.pareto.split(",")]
-        if len(pair) != 2:
-            raise InputError(
-                "a front has two measures", field="--pareto", value=args.pareto, allowed="mass_g,-moved_x_mm"
-            )
         picture = found.draw(folder / "pareto.png", *pair)
     _tell(args, found, {"table": str(table), **({"pareto": str(picture)} if picture else {})})
     return 0
@@ -101,12 +99,25 @@ def _grid(settings: Settings, vary: Sequence[str]) -> dict[str, list]:
     return out
 
 
+def _check_front(pair: Sequence[str], known: Sequence[str]) -> None:
+    """Raises InputError unless a front is drawn of two columns, the larger one of which may be the better."""
+    if len(pair) != 2:
+        raise InputError(
+            "a front has two measures", field="--pareto", value=",".join(pair), allowed="mass_g,-moved_x_mm"
+        )
+    for name in pair:
+        if name.removeprefix("-") not in known:
+            raise InputError("there is no such measure", field="--pareto", value=name, allowed=", ".join(known))
+
+
 def _values(setting: Setting, given: str) -> list:
     if isinstance(setting.value, (str, bool)):
         words = [w.strip() for w in given.split(",")]
         return [w.lower() == "true" for w in words] if isinstance(setting.value, bool) else words
     parts = given.split(":")
     if len(parts) == 3 and parts[2].strip().isdecimal() and int(parts[2]) > 1:
+        if int(parts[2]) > MOST:
+            raise InputError("too many values", field=f"--vary {setting.name}", value=given, allowed=f"up to {MOST}")
         low, high = (float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in parts[:2])
         return np.linspace(low, high, int(parts[2])).tolist()
     return [float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in given.split(",")]

@@ -32,12 +32,14 @@ def check(args) -> None:
                 value=getattr(args, name),
                 allowed="--set, --calibration, --touch, --no-touch, --out",
             )
+    if not Path(args.scene).is_file():
+        raise InputError("no such file", file=args.scene)
     if Path(args.scene).suffix.lower() in MESHES:
         raise InputError(
             "a mesh has a shape, but no fold to go to",
             file=args.scene,
-            allowed="FOLD with edges_assignment or edges_foldAngle, .cp, or SVG as for Origami Simulator; in Python, "
-            "Sheet(read_mesh(file)) keeps the shape",
+            allowed="FOLD with edges_assignment or edges_foldAngle, .cp, .opx, DXF, or SVG as for Origami Simulator; "
+            "in Python, Sheet(read_mesh(file)) keeps the shape",
         )
 
 

@@ -61,6 +61,8 @@ def vertices(sheet: Elastic) -> list[Vertex]:
         ring = _ring(following)
         if ring is None:
             continue
+        if any((v, w) not in hinge for w in ring):
+            continue  # a cut without width runs to it, about which the panels turn freely
         at = [hinge[v, w] for w in ring]
         product = np.eye(3)
         for h in at:

@@ -39,8 +39,9 @@ LONGEST_MOVE = 0.1
 """Longest move of a node in one iteration: a triangle of a coarse pattern is not turned over in one go. Half changes
 nothing in 30 patterns, in the same time; double, and doing without in 32, the compromises of two that cannot fold."""
 MERGED = 2.5e-3
-"""Change of a bar's length that counts as inaccuracy of the drawing, as `planar.COARSEST` does: hand-drawn lines miss
-each other by as much. It only decides what counts as torn; half and double change no verdict of 20."""
+"""Change of a bar's length that counts as inaccuracy of a file that does not show its own, as `planar.COARSEST` does:
+hand-drawn lines miss each other by as much. It only decides what counts as torn; half and double change no verdict of
+20."""
 CLOSED = 0.1
 """Distance from half a turn [rad] within which a given shape is folded flat, to the side of its target. Half and
 double change nothing in 20."""
@@ -112,6 +113,7 @@ class Elastic:
         factor[: len(mesh.creases)][~self.driven[: len(mesh.creases)]] = FREE
         self.weights = factor * middle * self.axes * self._stated()
         self.sections = np.maximum(bar_sections(self.reference, mesh), SLIVER * self.lengths)
+        self.inaccuracy = MERGED if np.isnan(pattern.accuracy) else pattern.accuracy / self.size
         self.softness = softness
         self.contact: Contact | None = None
         self._pattern_of_jacobian()
@@ -146,9 +148,9 @@ class Elastic:
         return _lengths(x, self.bars) / self.lengths - 1.0
 
     def misfits(self, x) -> np.ndarray:
-        """Return what of the strain [B] is more than the inaccuracy of a drawing, `MERGED`."""
+        """Return what of the strain [B] is more than the inaccuracy of the drawing."""
         change = np.abs(_lengths(x, self.bars) - self.lengths)
-        return np.maximum(change - MERGED, 0.0) / self.lengths
+        return np.maximum(change - self.inaccuracy, 0.0) / self.lengths
 
     def errors(self, angles) -> np.ndarray:
         """Return the distance of each driven crease from its target [rad]."""

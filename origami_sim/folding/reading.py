@@ -10,13 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.pattern import Pattern, read_cp, read_pattern, read_svg
+from origami_sim.pattern import DRAWN, Pattern, read_pattern
 
 from .consistency import vertices
 from .elastic import Elastic
 
-DRAWN = {".svg": read_svg, ".cp": read_cp}
-"""Readers of drawings."""
 DISTANCES = (2.5e-4, 5e-4, 1e-3, 1.4e-3, 2e-3, 2.8e-3, 4e-3, 5.6e-3)
 """Distances tried, as shares of the drawing's diagonal: 0.1 to 2 mm on a sheet of 20 cm. Half and double of
 all fold the same of 20 public patterns."""
@@ -39,7 +37,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     """Read a pattern from a file and mend what keeps its panels from closing; see `pattern.read_pattern`.
 
     Args:
-        path: FOLD, SVG or .cp file.
+        path: FOLD file or drawing.
         size: longest side [m]. scale: length of one unit [m], instead of it.
         merge: of drawings: points closer than this share of the diagonal are one; None finds it.
 
@@ -52,7 +50,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     drawing = DRAWN.get(Path(path).suffix.lower())
     if merge is not None:
         if drawing is None:
-            allowed = "SVG, .cp"
+            allowed = ", ".join(DRAWN)
             raise InputError(
                 "only drawings have points to merge", file=path, field="merge", value=merge, allowed=allowed
             )

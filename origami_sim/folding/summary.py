@@ -16,8 +16,8 @@ class Summary:
     """The end of a folding.
 
     Attributes:
-        reached: whether all driven creases are within the tolerance and the sheet is whole.
-        sentences: to print. reason: why targets were missed, in a few words; empty if they were not.
+        reached: whether all driven creases are within the tolerance, the sheet is whole and no panel is in another.
+        sentences: to print. reason: why that is not so, in a few words; empty if it is.
         numbers: by name, for machines. worst: table of the creases furthest from their targets.
         creases: the same of all creases.
     """
@@ -34,10 +34,12 @@ def summarise(folding: Folding, thickness: float) -> Summary:
     """Return what became of a pattern; triangles that cross by more than `thickness` [m] pass through each other."""
     sheet, errors = folding.sheet, folding.errors
     missed = int(np.sum(errors > folding.tolerance))
-    crossing = len(crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness))
+    pairs = crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness)
+    crossing = len(pairs)
+    reached = folding.reached and not crossing
     bends = np.abs(folding.angles[-1] - sheet.start)[len(sheet.mesh.creases) :]
     numbers = {
-        "reached": float(folding.reached),
+        "reached": float(reached),
         "creases": float(len(errors)),
         "missed": float(missed),
         "largest_error_deg": float(np.degrees(errors.max())),
@@ -57,14 +59,20 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         _verdict(folding, missed, order, creases),
         *advice,
         _strain(folding, numbers),
-        _crossings(folding, crossing, thickness),
+        _crossings(folding, pairs, thickness),
     ]
+    if folding.reached and crossing:
+        reason = "panels pass through each other"
+        said.append(
+            "A real sheet stops before these angles: its panels touch. Try: smaller angles for the creases around "
+            "these panels (opacity in SVG, edges_foldAngle in FOLD)."
+        )
     if folding.snaps:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
         more = f" and {len(folding.snaps) - 6} more" if len(folding.snaps) > 6 else ""
         said.append(f"The sheet snaps to another shape on its way, at {at}{more} of the angles.")
     worst = {name: column[order] for name, column in creases.items()}
-    return Summary(folding.reached, said, reason, numbers, worst, creases)
+    return Summary(reached, said, reason, numbers, worst, creases)
 
 
 def _table(folding: Folding) -> dict[str, np.ndarray]:
@@ -172,13 +180,18 @@ def _strain(folding: Folding, numbers) -> str:
     return text + "."
 
 
-def _crossings(folding: Folding, count: int, thickness: float) -> str:
-    depth = f"the sheet's thickness ({1e3 * thickness:.3g} mm)"
+def _crossings(folding: Folding, pairs: np.ndarray, thickness: float) -> str:
+    depth, sheet, where = f"the sheet's thickness ({1e3 * thickness:.3g} mm)", folding.sheet, ""
+    if len(pairs):
+        one, other = (1e3 * sheet.mesh.vertices[sheet.mesh.triangles[t]].mean(axis=0) for t in pairs[0])
+        where = (
+            f", first those at ({one[0]:.1f}, {one[1]:.1f}) and ({other[0]:.1f}, {other[1]:.1f}) mm of the flat pattern"
+        )
+    through = (
+        f"{len(pairs)} pairs of triangles pass through each other" if len(pairs) else "No panel passes through another"
+    )
     if folding.clear_from is None:
-        if not count:
-            return f"No panel passes through another by more than {depth}."
-        return f"{count} pairs of triangles pass through each other by more than {depth}."
+        return f"{through} by more than {depth}{where}."
     whole = "on the whole way" if not folding.clear_from else f"from {folding.shares[folding.clear_from]:.0%} on"
     touch = f"{folding.touching} pairs of corners, edges and triangles touch" if folding.touching else "nothing touches"
-    through = "No panel passes through another" if not count else f"{count} pairs of triangles pass through each other"
-    return f"Panels keep each other off {whole}, at {depth}; at the end {touch}. {through}."
+    return f"Panels keep each other off {whole}, at {depth}; at the end {touch}. {through}{where}."

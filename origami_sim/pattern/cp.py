@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from ..errors import InputError
+from ..files import read_bytes
 from .crease_pattern import Pattern
 from .drawn import drawn_pattern
-from .files import read_bytes
 
 LETTERS = {"1": "B", "2": "M", "3": "V"}
 AUXILIARY = ("0", "4")

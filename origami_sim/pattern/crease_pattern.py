@@ -1,5 +1,6 @@
 """The crease pattern: vertices, polygon faces and assigned edges, before any mechanics."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +25,7 @@ class Pattern:
         materials: F material names or None.
         notes: sentences telling what a reader defaulted, merged or skipped.
         extra: keys of the source file that mean nothing to us, kept for the round trip.
+        accuracy: of a drawing, distance within which points were one [m], so that each may be as far off; else nan.
     """
 
     vertices: np.ndarray
@@ -37,6 +39,7 @@ class Pattern:
     materials: list[str | None]
     notes: list[str] = field(default_factory=list)
     extra: dict = field(default_factory=dict)
+    accuracy: float = math.nan
 
     @property
     def vertex_count(self) -> int:

@@ -61,7 +61,7 @@ def drawn_pattern(
         raise InputError("all lines are shorter than the merge tolerance", file=file, value=tolerance)
     points, pieces = split_segments(starts[long_enough], ends[long_enough], tolerance, file=file)
 
-    chosen = _edges(pieces, strokes, notes)
+    points, chosen = _slit(points, _edges(pieces, strokes, notes))
     facets, holed = facets_of_holes(points, np.array(list(chosen)))
     if holed:
         chosen |= {key: ("F", 1.0) for key in facets}
@@ -75,7 +75,7 @@ def drawn_pattern(
     beside = Counter(edge_key(*side) for face in faces for side in face_sides(face))
     edges = [key for key in chosen if beside[key]]
     if len(edges) < len(chosen):
-        notes.append(f"{len(chosen) - len(edges)} line pieces that enclose nothing were left out.")
+        notes.append(_loose([chosen[key][0] for key in chosen if not beside[key]], chosen.values()))
     outer = [key for key in edges if beside[key] == 1 and chosen[key][0] not in "BC"]
     if outer:
         notes.append(f"{len(outer)} coloured edges on the outside of the sheet were taken as border.")
@@ -83,7 +83,7 @@ def drawn_pattern(
     used = sorted({v for face in faces for v in face})
     renumbered = {v: n for n, v in enumerate(used)}
     signs = {"M": -math.pi, "V": math.pi, "F": 0.0}
-    return assemble(
+    pattern = assemble(
         np.column_stack([points[used], np.zeros(len(used))]),
         [tuple(renumbered[v] for v in face) for face in faces],
         edges=[(renumbered[a], renumbered[b]) for a, b in edges],
@@ -92,6 +92,41 @@ def drawn_pattern(
         notes=notes,
         file=file,
     )
+    pattern.accuracy = tolerance
+    return pattern
+
+
+def _slit(points, chosen):
+    """Return points and edges in which each cut of one edge, with both ends inside the sheet, has a middle.
+
+    Only so can its two sides part.
+    """
+    cuts = [key for key, (letter, _) in chosen.items() if letter == "C"]
+    ends = Counter(v for key in cuts for v in key)
+    ends.update(v for key, (letter, _) in chosen.items() if letter == "B" for v in key)
+    halves: dict[tuple[int, int], int] = {}
+    for key in cuts:
+        if ends[key[0]] == ends[key[1]] == 1:
+            halves[key] = len(points) + len(halves)
+    if not halves:
+        return points, chosen
+    parted = {}
+    for key, stroke in chosen.items():
+        middle = halves.get(key)
+        for part in [key] if middle is None else [(key[0], middle), (key[1], middle)]:
+            parted[part] = stroke
+    return np.vstack([points, *(points[list(key)].mean(axis=0) for key in halves)]), parted
+
+
+def _loose(letters, chosen) -> str:
+    """Return the sentence about line pieces of these letters, which enclose nothing."""
+    folds = sum(letter in "MV" for letter in letters)
+    said = f"{len(letters)} line pieces that enclose nothing were left out"
+    if folds:
+        said += f", {folds} of them mountains or valleys"
+    if folds and not any(letter == "B" for letter, _ in chosen):
+        said += ": no border is drawn, within which they would fold"
+    return f"{said}."
 
 
 def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:

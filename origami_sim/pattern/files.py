@@ -1,19 +1,10 @@
-"""Reading and atomic writing of small files."""
+"""Atomic writing of small files."""
 
 import os
 import tempfile
 from pathlib import Path
 
 from ..errors import InputError
-
-
-def read_bytes(path) -> bytes:
-    """Return the content of `path`; raise `InputError` if it is missing or cannot be read."""
-    try:
-        return Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot read the file ({reason})", file=path) from None
 
 
 def write_atomic(path, data: bytes) -> None:

@@ -6,17 +6,22 @@ Our own keys: `edges_osim:stiffness` [N m/rad], `edges_osim:restAngle` [deg], `f
 """
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
+from ..files import read_bytes
 from .assemble import assemble
-from .checks import check_edges, check_vertices
+from .checks import check_vertices
 from .crease_pattern import ASSIGNMENTS, Pattern
 from .drawn import PRIORITY, foremost
-from .files import read_bytes, write_atomic
-from .fold_json import Frame, parse_json, resolve_frame
-from .planar import check_planar_graph, drop_holes, planar_faces
+from .files import write_atomic
+from .fold_json import Frame, main_frame, parse_json, resolve_frame
+from .holes import facets_of_holes
+from .noding import is_planar, node_edges
+from .planar import drop_holes, planar_faces
 from .sizing import metres_of
 from .topology import edge_key, sides_of_edges
 from .triangulate import hinge_angles, triangulate
@@ -38,17 +43,23 @@ ORIENTATION_KEYS = ("faces_edges", "faces_faces", "edges_faces", "vertices_faces
 """Derived keys that a reversed face makes wrong."""
 EDGE_NUMBERS = ("faces_edges", "vertices_edges", "edgeOrders")
 """Keys that hold numbers of edges."""
+VERTEX_NUMBERS = ("vertices_vertices",)
+"""Keys without a meaning here that hold numbers of vertices."""
 PLANARITY_TOLERANCE = 1e-4
 """Distance from the common plane, relative to the pattern's size, up to which faces are derived."""
+ROUNDING = 1e-4
+"""Degrees beyond half a turn that are rounding, of angles computed in single precision or written with few digits; no
+fold is meant to go there, so half and double change nothing else."""
 RADIANS_PER_DEGREE = np.pi / 180.0
 
 
-def read_fold(path, *, frame=0, size=None, scale=None) -> Pattern:
+def read_fold(path, *, frame=None, size=None, scale=None) -> Pattern:
     """Read a FOLD file; what had to be defaulted or derived is told in `notes`.
 
     Args:
         path: the file.
-        frame: 0 for the key frame, k for the k-th of `file_frames`, with inheritance.
+        frame: 0 for the key frame, k for the k-th of `file_frames`, with inheritance; None for the key frame, or the
+            first crease pattern where the key frame has no vertices or is a folded form.
         size: longest side of the pattern [m]. scale: length of one unit of the file [m], instead of `size`. Without
             either, `frame_unit` holds, and 0.2 m is the longest side if the file does not give it.
 
@@ -64,8 +75,10 @@ def read_fold(path, *, frame=0, size=None, scale=None) -> Pattern:
     return fold_pattern(document, frame=frame, size=size, scale=scale, file=path)
 
 
-def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -> Pattern:
+def fold_pattern(document: dict, *, frame=None, size=None, scale=None, file=None) -> Pattern:
     """Turn parsed FOLD into a `Pattern`; see `read_fold`. `file` is named in errors."""
+    if frame is None:
+        frame = main_frame(document, file=file)
     keys = resolve_frame(document, frame, file=file)
     data, notes = Frame(keys, file), []
     if keys.get("frame_unit") is None:
@@ -94,30 +107,30 @@ def fold_pattern(document: dict, *, frame=0, size=None, scale=None, file=None) -
     fold_angles = _angles(data, "edges_foldAngle", count)
     rest_angles = _angles(data, "edges_osim:restAngle", count)
     stiffness = data.numbers("edges_osim:stiffness", count, 0.0, np.inf, "0 or more [N m/rad]")
+    listed = _Edges(edges or [], letters, fold_angles, rest_angles, stiffness)
     if edges:
-        kept = _distinct(edges, letters, fold_angles, notes)
+        kept = _distinct(listed, notes)
         if len(kept) < count:
-            letters = letters and [letters[e] for e in kept]
-            angles = (fold_angles, rest_angles, stiffness)
-            fold_angles, rest_angles, stiffness = (None if a is None else a[kept] for a in angles)
+            listed = listed.taken(kept)
             _keep_edges(keys, kept, count)
-            edges, count = [edges[e] for e in kept], len(kept)
-    _note_angles(letters, fold_angles, notes)
+    _note_angles(listed.letters, listed.fold_angles, notes)
     if not edges:
         notes.append("edges_vertices is not given: edges are the sides of the faces.")
     if not faces:
-        faces = _derived_faces(vertices, edges, letters, notes, file)
+        vertices, listed, faces = _derived_faces(vertices, listed, keys, notes, file)
+    vertices, listed, faces = _without_strays(vertices, listed, faces, keys, notes)
+    count = len(listed.pairs)
     thickness = data.numbers(
         "faces_osim:thickness", len(faces), 0.0, np.inf, "a thickness above 0, in frame_unit", open_low=True
     )
     pattern = assemble(
         vertices,
         faces,
-        edges=edges,
-        assignments=letters,
-        fold_angles=fold_angles,
-        stiffness=stiffness,
-        rest_angles=rest_angles,
+        edges=listed.pairs,
+        assignments=listed.letters,
+        fold_angles=listed.fold_angles,
+        stiffness=listed.stiffness,
+        rest_angles=listed.rest_angles,
         thickness=None if thickness is None else thickness * scale,
         materials=data.names("faces_osim:material", len(faces)),
         notes=notes,
@@ -165,23 +178,53 @@ def _default_angles(pattern) -> None:
 
 
 def _angles(data, field, count):
-    degrees = data.numbers(field, count, -180.0, 180.0, "-180 to 180 degrees")
-    return None if degrees is None else degrees * RADIANS_PER_DEGREE
+    most = 180.0 + ROUNDING
+    degrees = data.numbers(field, count, -most, most, "-180 to 180 degrees")
+    return None if degrees is None else np.clip(degrees, -180.0, 180.0) * RADIANS_PER_DEGREE
 
 
-def _distinct(edges, letters, fold_angles, notes) -> list[int]:
-    """Return which edges stay, in order, if of those between the same two vertices one does: as where drawn lines lie
-    on each other the one that comes first in `PRIORITY`, and of these one with a fold angle."""
-    letters = letters or "U" * len(edges)
+@dataclass
+class _Edges:
+    """The edges of a file: vertex pairs, and what is known of each, or None where nothing is."""
 
-    def rank(e):
-        letter = PRIORITY.find(letters[e])
-        return letter if letter >= 0 else len(PRIORITY), fold_angles is None or np.isnan(fold_angles[e])
+    pairs: list
+    letters: Sequence[str | None] | None
+    fold_angles: np.ndarray | None
+    rest_angles: np.ndarray | None
+    stiffness: np.ndarray | None
 
-    stays, differ = foremost(edges, letters, rank)
-    if len(stays) < len(edges):
+    def taken(self, which: list[int], pairs: list | None = None) -> "_Edges":
+        """Return some of the edges, or, with other pairs, pieces of them."""
+        angles = (self.fold_angles, self.rest_angles, self.stiffness)
+        known = (None if a is None else a[which] for a in angles)
+        return _Edges(
+            [self.pairs[e] for e in which] if pairs is None else pairs,
+            self.letters and [self.letters[e] for e in which],
+            *known,
+        )
+
+    def with_facets(self, pairs: list) -> "_Edges":
+        """Return the edges and flat ones that follow them."""
+        more = len(pairs)
+        known = (self.fold_angles, self.rest_angles, self.stiffness)
+        longer = (None if a is None else np.append(a, np.full(more, np.nan)) for a in known)
+        letters = self.letters or [None] * len(self.pairs)
+        return _Edges([*self.pairs, *pairs], [*letters, *"F" * more], *longer)
+
+    def rank(self, e: int) -> tuple[int, bool]:
+        """Return which of edges that lie on each other stays: the first in `PRIORITY`, and of these one with an
+        angle."""
+        letter = PRIORITY.find((self.letters[e] if self.letters else None) or "U")
+        missing = self.fold_angles is None or bool(np.isnan(self.fold_angles[e]))
+        return letter if letter >= 0 else len(PRIORITY), missing
+
+
+def _distinct(listed: _Edges, notes) -> list[int]:
+    """Return which edges stay, in order, if of those between the same two vertices one does."""
+    stays, differ = foremost(listed.pairs, listed.letters or "U" * len(listed.pairs), listed.rank)
+    if len(stays) < len(listed.pairs):
         contrary = f", {differ} of them with different letters: {PRIORITY} in order" if differ else ""
-        notes.append(f"{len(edges) - len(stays)} edges were listed more than once and are one{contrary}.")
+        notes.append(f"{len(listed.pairs) - len(stays)} edges were listed more than once and are one{contrary}.")
     return sorted(stays.values())
 
 
@@ -203,24 +246,46 @@ def _note_angles(letters, fold_angles, notes) -> None:
             notes.append(f"edge {e} is '{letter}' but its fold angle is {np.degrees(angle):+g} deg: both kept.")
 
 
-def _derived_faces(vertices, edges, letters, notes, file):
-    """Return the bounded faces of the planar graph of a flat pattern."""
-    pairs = np.array(edges, dtype=np.int64)
-    check_edges(vertices, pairs, file=file)
+def _derived_faces(vertices, listed: _Edges, keys, notes, file):
+    """Return vertices, edges and the bounded faces of the planar graph of a flat pattern.
+
+    Edges that cross, overlap or end at each other without a common vertex are cut there, as the lines of a drawing are.
+    """
     size = np.ptp(vertices, axis=0).max()
-    centred = vertices - vertices.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=False)[2] if len(vertices) > 2 else np.eye(3)
-    if np.abs(centred @ axes[2]).max() > PLANARITY_TOLERANCE * size:
+    middle = vertices.mean(axis=0)
+    axes = np.linalg.svd(vertices - middle, full_matrices=False)[2] if len(vertices) > 2 else np.eye(3)
+    if np.abs((vertices - middle) @ axes[2]).max() > PLANARITY_TOLERANCE * size:
         raise InputError(
             "the pattern is not flat, so its faces cannot be derived",
             file=file,
             field="faces_vertices",
             allowed="faces_vertices given, or all vertices in one plane",
         )
-    points = centred @ _plane_axes(axes[2]).T
-    check_planar_graph(points, pairs, file=file)
+    plane = _plane_axes(axes[2])
+    points, pairs = (vertices - middle) @ plane.T, np.array(listed.pairs, dtype=np.int64)
+    if not is_planar(points, pairs):
+        marks = listed.letters or "U" * len(pairs)
+        points, pieces, owner = node_edges(points, pairs, marks, listed.rank, file=file)
+        notes.append(
+            f"edges cross or overlap: {len(pairs)} edges between {len(vertices)} vertices were cut where they meet "
+            f"into {len(pieces)} between {len(points)}."
+        )
+        listed, vertices = listed.taken(owner, pieces), points @ plane + middle
+        _keep_edges(keys, owner, len(pairs))
+        for key in [k for k in keys if k.startswith("vertices_")]:
+            del keys[key]
+        pairs = np.array(pieces, dtype=np.int64)
+    facets, holed = facets_of_holes(points, pairs)
+    if holed:
+        notes.append(f"{holed} panels with a hole or a loose part in them were cut into facets.")
+        for key, value in keys.items():
+            if key.startswith("edges_") and isinstance(value, list) and len(value) == len(pairs):
+                keys[key] = [*value, *[None] * len(facets)]
+        listed = listed.with_facets(facets)
+        pairs = np.array(listed.pairs, dtype=np.int64)
     found = planar_faces(points, pairs, file=file)
-    borders = {edge_key(*pair) for pair, letter in zip(edges, letters or [], strict=False) if letter == "B"}
+    letters = listed.letters or []
+    borders = {edge_key(*pair) for pair, letter in zip(listed.pairs, letters, strict=False) if letter == "B"}
     faces, holes = drop_holes(found, borders)
     if not faces:
         raise InputError(
@@ -229,7 +294,27 @@ def _derived_faces(vertices, edges, letters, notes, file):
     notes.append(f"faces_vertices is not given: {len(faces)} faces derived from the edges.")
     if holes:
         notes.append(f"{holes} regions enclosed by border edges alone were taken as holes.")
-    return faces
+    return vertices, listed, faces
+
+
+def _without_strays(vertices, listed: _Edges, faces, keys, notes):
+    """Return vertices, edges and faces without the vertices that belong to no face, and the edges to them."""
+    used = sorted({v for face in faces for v in face if 0 <= v < len(vertices)})
+    if len(used) == len(vertices):
+        return vertices, listed, faces
+    number = {v: n for n, v in enumerate(used)}
+    kept = [e for e, pair in enumerate(listed.pairs) if all(v in number for v in pair)]
+    strays, count = len(vertices) - len(used), len(listed.pairs)
+    loose = f", and {count - len(kept)} edges to them," if len(kept) < count else ""
+    notes.append(f"{strays} vertices that belong to no face{loose} were left out.")
+    _keep_edges(keys, kept, count)
+    for key, value in list(keys.items()):
+        if key in VERTEX_NUMBERS:
+            del keys[key]
+        elif key.startswith("vertices_") and isinstance(value, list) and len(value) == len(vertices):
+            keys[key] = [value[v] for v in used]
+    pairs = [tuple(number[v] for v in listed.pairs[e]) for e in kept]
+    return vertices[used], listed.taken(kept, pairs), [tuple(number[v] for v in face) for face in faces]
 
 
 def _plane_axes(normal) -> np.ndarray:

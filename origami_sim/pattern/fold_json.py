@@ -82,6 +82,28 @@ def resolve_frame(document, number, *, file=None) -> dict:
         number = frame.get("frame_parent", 0)
 
 
+def main_frame(document, *, file=None) -> int:
+    """Return which frame to fold: the key frame, unless it has no vertices, or shows the folded form while another one
+    is the crease pattern."""
+    key = resolve_frame(document, 0, file=file)
+    if key.get("vertices_coords") and "foldedForm" not in _classes(key):
+        return 0
+    frames = document.get("file_frames")
+    for number in range(1, len(frames) + 1 if isinstance(frames, list) else 1):
+        try:
+            keys = resolve_frame(document, number, file=file)
+        except InputError:  # a broken frame that nobody asked for
+            continue
+        if keys.get("vertices_coords") and (not key.get("vertices_coords") or "creasePattern" in _classes(keys)):
+            return number
+    return 0
+
+
+def _classes(keys) -> list:
+    classes = keys.get("frame_classes")
+    return classes if isinstance(classes, list) else []
+
+
 def _modern(frame) -> dict:
     renamed = dict(frame)
     for old, new in OLD_SPELLINGS.items():

@@ -7,9 +7,10 @@ import numpy as np
 import trimesh
 
 from ..errors import InputError
+from ..files import read_bytes
 from .assemble import assemble
 from .crease_pattern import Pattern
-from .files import read_bytes, write_atomic
+from .files import write_atomic
 from .polygon import clip_ears, project
 from .sizing import metres_of
 from .topology import edge_key, sides_of_edges

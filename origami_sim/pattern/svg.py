@@ -4,11 +4,14 @@ Stroke colours: black border, red mountain, blue valley, green cut, yellow facet
 times 180 degrees is the target fold angle of mountains and valleys.
 """
 
+import numpy as np
+
 from ..errors import InputError
+from ..files import read_bytes
 from .checks import check_number
 from .crease_pattern import Pattern
 from .drawn import drawn_pattern
-from .files import read_bytes
+from .planar import APART, crossing_points
 from .svg_drawing import read_drawing
 
 FLATNESS = 1e-3
@@ -45,10 +48,14 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
             allowed="black, red, blue, green, yellow, magenta",
         )
     notes: list[str] = []
+    border = np.zeros((0, 2, 2)) if any(letter in "BC" for letter, _ in drawing.strokes) else _outline(drawing)
+    if len(border):
+        notes.append(f"no border in black: the outline in {', '.join(drawing.unknown)} was taken as border.")
+        drawing.unknown.clear()
     _note_leftovers(drawing, notes)
     return drawn_pattern(
-        drawing.segments,
-        drawing.strokes,
+        np.concatenate([drawing.segments, border]),
+        [*drawing.strokes, *[("B", 1.0)] * len(border)],
         size=size,
         scale=scale,
         stated=drawing.metres,
@@ -56,6 +63,27 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         notes=notes,
         file=path,
     )
+
+
+def _outline(drawing) -> np.ndarray:
+    """Return the outline [S, 2, 2] of what lines in unknown colours enclose, if all others lie in it, else nothing."""
+    from shapely import get_coordinates, linestrings, multipoints, polygonize, union_all  # only here: slow to import
+
+    nothing = np.zeros((0, 2, 2))
+    if not len(drawing.others) or not np.isfinite(drawing.others).all() or not np.isfinite(drawing.segments).all():
+        return nothing
+    try:
+        crossing_points(drawing.others[:, 0], drawing.others[:, 1])
+    except InputError:  # scribble
+        return nothing
+    lines = union_all(linestrings(drawing.others))
+    sheet = union_all(polygonize([lines]))
+    across = float(np.ptp(drawing.segments.reshape(-1, 2), axis=0).max())
+    ends = multipoints(drawing.segments.reshape(-1, 2))
+    if sheet.geom_type != "Polygon" or not sheet.buffer(APART * across).covers(ends):
+        return nothing
+    rings = [get_coordinates(ring) for ring in (sheet.exterior, *sheet.interiors)]  # pyright: ignore
+    return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
 
 
 def _note_leftovers(drawing, notes) -> None:

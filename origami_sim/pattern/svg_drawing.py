@@ -23,6 +23,7 @@ UNSEEN = ("marker", "mask", "metadata", "foreignObject", "linearGradient", "radi
 PHYSICAL = re.compile(r"[-+.\deE\s]+(mm|cm|in|pt|pc|q)\s*$", re.IGNORECASE)
 METRES_PER_PIXEL = 0.0254 / 96.0
 """CSS: 96 pixels are an inch."""
+UNKNOWN = "?"
 MAX_DEPTH = 100
 MAX_ELEMENTS = 200_000
 """Elements after <use> has been expanded; ten times the lines of the largest tessellations seen."""
@@ -43,11 +44,13 @@ class Drawing:
         segments: [S, 2, 2] start and end of each straight piece.
         strokes: S pairs (assignment letter, opacity).
         metres: length of a user unit if the file states a physical size, else None.
-        unknown: colours that are no crease colour. skipped: elements left out. curves: how many were cut into chords.
+        others: [O, 2, 2] the same of strokes in colours that are no crease colour.
+        unknown: those colours. skipped: elements left out. curves: how many were cut into chords.
     """
 
     segments: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
     strokes: list[tuple[str, float]] = field(default_factory=list)
+    others: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
     metres: float | None = None
     unknown: Counter = field(default_factory=Counter)
     skipped: Counter = field(default_factory=Counter)
@@ -141,10 +144,13 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
             if stroke is not None:
                 paths.append((stroke[0], stroke[1] * opacity, shape.segments(transformed=True)))
         size = _extent(paths)
-        segments = []
+        segments, others = [], []
         for letter, opacity, path in paths:
             for segment in path:
                 points = _chords(segment, flatness * size)
+                if letter == UNKNOWN:
+                    others += pairwise(points)
+                    continue
                 drawing.curves += len(points) > 2
                 segments += pairwise(points)
                 drawing.strokes += [(letter, opacity)] * max(len(points) - 1, 0)
@@ -154,6 +160,7 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
         detail = f"{type(error).__name__}: {str(error)[:120]}".rstrip(": ")
         raise InputError(f"cannot read the drawing ({detail})", file=file, allowed="well-formed SVG shapes") from None
     drawing.segments = np.array(segments, dtype=np.float64).reshape(-1, 2, 2) / pixels
+    drawing.others = np.array(others, dtype=np.float64).reshape(-1, 2, 2) / pixels
     if any(PHYSICAL.fullmatch(root.attrib.get(name, "")) for name in ("width", "height")):
         drawing.metres = METRES_PER_PIXEL * pixels
     for tag in ("text", "image"):
@@ -213,7 +220,8 @@ def _fraction(text, default=1.0) -> float:
 
 
 def _stroke(shape, drawing) -> tuple[str, float] | None:
-    """Return (letter, opacity) of a shape's own stroke, or None and a count of why there is none."""
+    """Return (letter, opacity) of a shape's own stroke, `UNKNOWN` for a colour that means nothing, or None if there is
+    none."""
     values = shape.values
     tag = values.get("tag", "shape")
     if values.get("visibility") in ("hidden", "collapse"):
@@ -226,7 +234,7 @@ def _stroke(shape, drawing) -> tuple[str, float] | None:
     letter = letter_of(colour[:3]) if colour else None
     if letter is None or colour is None:
         drawing.unknown[text[:40]] += 1
-        return None
+        return UNKNOWN, 1.0
     return letter, colour[3] * _fraction(values.get("stroke-opacity"))
 
 

@@ -36,8 +36,8 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
         InputError: the first fault found, in one sentence.
     """
     path = Path(csv_path)
-    description = Path(sidecar) if sidecar is not None else path.with_suffix(".toml")
     data = read_bytes(path)
+    description = Path(sidecar) if sidecar is not None else path.with_suffix(".toml")
     if sidecar is None and not description.is_file():
         raise InputError(f"no sidecar '{description.name}' next to the recording", file=path, field="sidecar")
     side = Sidecar.read(description)

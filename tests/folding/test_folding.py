@@ -186,3 +186,58 @@ def test_a_shape_that_lies_in_itself_cannot_be_kept_apart():
     pattern.vertices[4:, 0] = 0.001  # the second panel lies on the first
     with pytest.raises(InputError, match="overlap at the start"):
         fold(pattern, touch=True)
+
+
+def test_a_ring_is_not_folded_about_a_circle_by_stretching_it(tmp_path):
+    """A circle that keeps one fold angle stays plane, so that one side would have to be a cone of another length.
+
+    The drawing is exact, so that no strain is the drawing's fault.
+    """
+    circle = '<circle cx="10" cy="10" r="{}" fill="none" stroke="{}"{}/>'
+    rings = ((9, "black", ""), (6, "red", ' opacity="0.3"'), (3, "black", ""))
+    file = tmp_path / "ring.svg"
+    file.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{"".join(circle.format(*r) for r in rings)}</svg>')
+    pattern = read(file)
+    assert pattern.accuracy < 3e-4 * np.ptp(pattern.vertices[:, 0])
+    folding = fold(pattern)
+    assert not folding.reached
+    rough = read(file, merge=3e-3)
+    assert rough.accuracy == pytest.approx(3e-3 * np.hypot(*np.ptp(rough.vertices, axis=0)[:2]), rel=1e-6)
+
+
+def test_what_a_drawing_misses_by_is_no_tear():
+    pattern = miura(2, 2, 0.02, 0.02, np.radians(60), target_angle=1.0)
+    sheet = Elastic(pattern)
+    wide = sheet.reference * [1.02, 1.0, 1.0]
+    pattern.accuracy = 0.01 * sheet.size
+    rough = Elastic(pattern)
+    change = np.abs(rough.strains(wide)) * rough.lengths
+    np.testing.assert_allclose(rough.misfits(wide), np.maximum(change - 0.01, 0) / rough.lengths, atol=1e-12)
+    assert rough.misfits(wide).max() < sheet.misfits(wide).max()
+
+
+@pytest.mark.parametrize("letters", ["C", "CC"])
+def test_the_sides_of_a_slit_part(tmp_path, letters):
+    """Between two lines that turn the same way a slit lets the upper and lower half turn the other way about."""
+    lines = [*frame(4, 4), ("V", 2, 0, 2, 2, 0.3), ("M", 2, 2, 2, 4, 0.3)]
+    cut = [("C", 1, 2, 3, 2)] if letters == "C" else [("C", 1, 2, 2, 2), ("C", 2, 2, 3, 2)]
+    sides = [(k, x, y0, x, y1, 0.15) for x in (1, 3) for k, y0, y1 in (("M", 0, 2), ("V", 2, 4))]
+    folding = fold(read(drawn(tmp_path / "slit.svg", [*lines, *sides, *cut])))
+    assert folding.reached
+    lone = read(drawn(tmp_path / "lone.svg", [*frame(4, 4), ("C", 1, 2, 3, 2), ("V", 1, 0, 1, 4), ("M", 3, 0, 3, 4)]))
+    assert np.sum(np.abs(lone.vertices[:, 0] - lone.vertices[:, 0].mean()) < 1e-9) >= 1  # the middle of the slit
+    assert fold(lone).x.shape[0] == 21
+
+
+def test_a_cut_edge_of_fold_without_a_middle_is_a_free_hinge():
+    """Of FOLD the vertices are the user's: a cut of one edge stays one."""
+    from origami_sim.pattern.fold import fold_pattern
+
+    document = {
+        "vertices_coords": [[0, 0], [3, 0], [3, 2], [0, 2], [1, 1], [2, 1], [1, 0], [2, 0], [1, 2], [2, 2]],
+        "edges_vertices": [[0, 6], [6, 7], [7, 1], [1, 2], [2, 9], [9, 8], [8, 3], [3, 0],
+                           [6, 4], [4, 8], [7, 5], [5, 9], [4, 5]],
+        "edges_assignment": list("BBBBBBBBVVMMC"),
+        "edges_foldAngle": [None] * 8 + [60, 60, -60, -60, None],
+    }  # fmt: skip
+    assert fold(fold_pattern(document)).reached

@@ -130,7 +130,7 @@ def test_derived_faces_in_a_vertical_plane_and_with_loose_ends():
     )
     pattern = fold_pattern(document)
     assert pattern.face_count == 2
-    assert any("beside no face" in note for note in pattern.notes)
+    assert any("1 vertices that belong to no face, and 1 edges to them" in note for note in pattern.notes)
 
 
 def test_hole_bounded_by_border_edges():
@@ -141,11 +141,15 @@ def test_hole_bounded_by_border_edges():
     assert any("hole" in note for note in pattern.notes)
 
 
-def test_island_is_refused():
+def test_an_island_is_joined_to_the_rest_by_facets():
     ring = [[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2]]
     edges = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 4]]
-    with pytest.raises(InputError, match="loose inside"):
-        fold_pattern({"vertices_coords": ring, "edges_vertices": edges})
+    angles = [None] * 4 + [90] * 3
+    document = {"vertices_coords": ring, "edges_vertices": edges, "edges_foldAngle": angles, "edges_own": [*range(7)]}
+    pattern = fold_pattern(document, scale=1.0)
+    assert len(pattern.edges_assigned("F")) == 7 and pattern.extra["edges_own"] == [*range(7), *[None] * 7]
+    areas = [0.5 * np.cross(*(pattern.vertices[[b, c]] - pattern.vertices[a]))[2] for a, b, c in pattern.faces]
+    assert sum(areas) == pytest.approx(9.0) and min(areas) > 0
 
 
 def test_faces_are_turned_counter_clockwise():
@@ -294,12 +298,6 @@ BAD = {
     "not a name": square(faces_osim__material=[3, None]),
     "unknown length unit .*cubit": square(frame_unit="cubit"),
     "unknown length unit .*list": square(frame_unit=[1]),
-    "cross or overlap": square(
-        faces_vertices=None,
-        edges_vertices=[[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]],
-        edges_assignment=None,
-        edges_foldAngle=None,
-    ),
     "not flat": square(faces_vertices=None, vertices_coords=[[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]]),
     "enclose no face": {"vertices_coords": [[0, 0], [1, 0]], "edges_vertices": [[0, 1]]},
     "neither edges nor faces": {"vertices_coords": [[0, 0], [1, 0]]},
@@ -325,6 +323,81 @@ def test_edges_listed_twice_are_one():
     assert pattern.fold_angles[4] == pytest.approx(math.pi / 2) and pattern.stiffness[4] == 2
     assert pattern.extra["edges_own"] == [0, 1, 2, 3, 5] and "faces_edges" not in pattern.extra
     assert any("2 edges were listed more than once and are one, 1 of them with different" in n for n in pattern.notes)
+
+
+def crossed(**changes):
+    """A square with both diagonals, which cross without a vertex."""
+    return {
+        "vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1]],
+        "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]],
+        "edges_assignment": list("BBBBMV"),
+        "edges_foldAngle": [None, None, None, None, -90, 45],
+        "edges_own": [0, 1, 2, 3, 4, 5],
+        "vertices_own": [0, 1, 2, 3],
+    } | changes
+
+
+def test_edges_that_cross_are_cut():
+    pattern = fold_pattern(crossed(), scale=1.0)
+    assert len(pattern.faces) == 4 and len(pattern.vertices) == 5
+    assert pattern.assignments.count("M") == pattern.assignments.count("V") == 2
+    assert np.degrees(pattern.fold_angles[pattern.edges_assigned("MV")]).round(9).tolist().count(45) == 2
+    assert sorted(pattern.extra["edges_own"]) == [0, 1, 2, 3, 4, 4, 5, 5] and "vertices_own" not in pattern.extra
+    middle = [v for v in range(5) if np.abs(pattern.vertices[v] - [0.5, 0.5, 0]).max() < 1e-12]
+    assert len(middle) == 1
+    assert any("6 edges between 4 vertices were cut where they meet into 8 between 5" in n for n in pattern.notes)
+
+
+def test_crossed_edges_in_a_tilted_plane_stay_there():
+    tilted = crossed(vertices_coords=[[0, 0, 0], [1, 0, 1], [1, 1, 1], [0, 1, 0]])
+    pattern = fold_pattern(tilted, scale=1.0)
+    assert len(pattern.faces) == 4 and pattern.vertices[:, 2] == pytest.approx(pattern.vertices[:, 0])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        # an edge that ends on another one, one that lies on another one, and vertices at one place
+        {"vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [0.5, 1]],
+         "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5]], "edges_assignment": list("BBBBV"),
+         "edges_foldAngle": None, "edges_own": None},
+        {"vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0]],
+         "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [0, 2]], "edges_assignment": list("BBBBBV"),
+         "edges_foldAngle": None},
+        {"vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0], [1, 1]],
+         "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5]], "edges_assignment": list("BBBBV"),
+         "edges_foldAngle": None, "edges_own": None},
+    ],
+)  # fmt: skip
+def test_edges_that_meet_without_a_vertex(changes):
+    pattern = fold_pattern(crossed(vertices_own=None, **changes))
+    assert len(pattern.faces) == 2 and len(pattern.edges_assigned("V")) == 1
+
+
+def test_vertices_of_no_face_are_left_out():
+    pattern = fold_pattern(
+        square(vertices_coords=[[9, 9], [0, 0], [1, 0], [1, 1], [0, 1], [2, 2]], vertices_own=list("abcdef"),
+               edges_vertices=[[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [3, 5]], edges_assignment=list("BBBBVM"),
+               edges_foldAngle=None, faces_vertices=[[1, 2, 3], [1, 3, 4]])
+    )  # fmt: skip
+    assert pattern.vertex_count == 4 and pattern.assignments == list("BBBBV")
+    assert pattern.extra["vertices_own"] == list("bcde")
+    assert any("2 vertices that belong to no face, and 1 edges to them, were left out" in n for n in pattern.notes)
+
+
+def test_angles_half_a_turn_but_for_rounding():
+    pattern = fold_pattern(square(edges_foldAngle=[0, 0, 0, 0, 180.00000001]))
+    assert pattern.fold_angles[4] == math.pi
+
+
+def test_the_crease_pattern_is_the_frame_that_is_folded():
+    flat = {"frame_classes": ["creasePattern"], **crossed()}
+    folded = {"frame_classes": ["foldedForm"], **crossed(vertices_coords=[[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]])}
+    for document in ({"file_frames": [flat]}, {**folded, "file_frames": [{"frame_parent": 7}, flat]}):
+        assert fold_pattern(document).vertices[:, 2].max() == 0
+    assert fold_pattern({**crossed(), "file_frames": [folded]}).vertex_count == 5
+    with pytest.raises(InputError, match="vertices missing"):
+        fold_pattern({"file_frames": [flat]}, frame=0)
 
 
 def test_of_equal_edges_the_one_with_an_angle_stays():
@@ -373,7 +446,7 @@ def test_read_pattern_dispatches(tmp_path):
         read_pattern(tmp_path / "a.docx")
     with pytest.raises(InputError, match="no such file"):
         read_pattern(tmp_path / "none.fold")
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_fold(tmp_path)
 
 

@@ -57,7 +57,7 @@ def test_bad_meshes(tmp_path, name, text, words):
 
 
 def test_missing_mesh_and_bad_unit(tmp_path):
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_mesh(tmp_path / "none.obj")
     with pytest.raises(InputError, match="unknown length unit"):
         read_mesh(tmp_path / "none.obj", unit="furlong")

@@ -273,3 +273,27 @@ def test_a_heap_of_points_is_refused():
     heap = np.random.default_rng(0).normal(0, 1e-5, (6000, 2))
     with pytest.raises(InputError, match="too many points"):
         merge_points(heap, 1e-3)
+
+
+def test_a_border_in_another_colour(tmp_path):
+    """Without any black, the outline of what other lines enclose is the border, if the creases lie in it."""
+    grey = '<rect x="0" y="0" width="4" height="2" stroke="#888" fill="none"/><path d="M2 0V2" stroke="#888"/>'
+    fold = '<path d="M{} 0V2" stroke="red"/>'
+    file = tmp_path / "a.svg"
+    file.write_text(f"<svg>{grey}{fold.format(1)}</svg>")
+    pattern = read_svg(file, scale=1.0)
+    assert len(pattern.faces) == 2 and len(pattern.edges_assigned("M")) == 1
+    assert any("the outline in #888 was taken as border" in n for n in pattern.notes)
+    for other in ('<path d="M0 0V1" stroke="black"/>' + fold.format(1), fold.format(5)):
+        file.write_text(f"<svg>{grey}{other}</svg>")
+        with pytest.raises(InputError, match="enclose no face"):
+            read_svg(file)
+
+
+def test_folds_without_a_border_around_them_are_told(tmp_path):
+    file = tmp_path / "a.svg"
+    file.write_text('<svg><path d="M0 0H2V2H0Z M2 0H4 M2 2H4" stroke="red"/></svg>')
+    notes = read_svg(file).notes
+    assert any(
+        "2 line pieces that enclose nothing were left out, 2 of them mountains or valleys: no b" in n for n in notes
+    )

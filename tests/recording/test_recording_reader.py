@@ -265,7 +265,7 @@ SIDECAR_FAULTS = {
     ),
     "wrong dimension": (lambda s: s.replace('"rad"', '"mm"'), "unknown unit of angle"),
     "no unit": (lambda s: s.replace('unit = "rad"\n', ""), "unknown unit of angle"),
-    "unknown time unit": (lambda s: s.replace('"s"', '"h"'), "unknown unit of time .*allowed: s, ms, us, min"),
+    "unknown time unit": (lambda s: s.replace('"s"', '"fortnight"'), "unknown unit of time .*allowed: s, ms, us, min"),
     "unknown drive unit": (lambda s: s + '[drive.b]\nvalue = 1\nunit = "Oe"\n', "unknown unit .*'Oe'.*mT"),
     "unknown kind": (lambda s: s.replace("panel_angle", "angle"), "unknown kind .*allowed: panel_angle, crease_angle"),
     "no kind": (lambda s: s.replace('kind = "panel_angle"\n', ""), "'kind' is missing"),

@@ -61,7 +61,7 @@ def test_finer_cells_walk_alike(default):
 
 
 def test_half_the_step_walks_alike():
-    """With one diagonal to a cell, left and right land unlike, and strides at these steps are 25.7, 26.2 and 25.6 mm."""
+    """With one diagonal to a cell, left and right land unlike: strides at these steps are 25.7, 26.2 and 25.6 mm."""
     s = read_calibration("crawler").replace(cell=0.0038)
     full = crawler.walk(s, cycles=2, rate=20.0)
     half = crawler.walk(s, cycles=2, rate=20.0, dt=full.dt / 2)
