@@ -40,14 +40,15 @@ def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calibration", default="crawler")
     parser.add_argument("--cell", type=float, default=2.5, help="[mm]")
-    parser.add_argument("--samples", type=int, default=100)
+    parser.add_argument("--samples", type=int, default=100, help="points of the hypercube")
+    parser.add_argument("--only-maps", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("runs/crawler_unknowns"))
     args = parser.parse_args(argv)
     base, lib = read_calibration(args.calibration), library()
     args.out.mkdir(parents=True, exist_ok=True)
     stride = strides(lib, base, args.cell).mean()
     print(f"as it is: {stride:.2f} mm")
-    for name in VARIED:
+    for name in () if args.only_maps else VARIED:
         if base[name].value and name != "adhesion":
             low, high = (
                 strides(lib, base.replace(**{name: f * base[name].value}), args.cell).mean() / stride - 1
@@ -62,6 +63,8 @@ def main(argv=None):
         maps.append(StrideMap(x, y, trials, mean, found.std(axis=-1) / np.maximum(np.abs(mean), 1e-9)))
         draw_maps(maps, args.out / "maps.png", mark=base, note=f"chain in a plane, cells of {args.cell:g} mm")
         print(f"{x.name}, {y.name}: {mean.size} points", flush=True)
+    if args.only_maps:
+        return
     both = []
     for _, trial in sampled(base, args.samples, CYCLES, 0):
         coarse, fine = (strides(lib, trial.settings, c) for c in (args.cell, args.cell / 2))

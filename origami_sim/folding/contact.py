@@ -23,11 +23,15 @@ from .intersections import crossing_pairs
 
 REACH = 0.5
 """Distance within which pairs are looked at beyond that at which they touch, over the median edge; a step moves no
-node by more than half of it."""
+node by more than half of it. Of four public patterns that would end through themselves half takes 0.97 times the
+time, double 1.18 times; they end alike, but for a compromise that shifts by 2 degrees with half."""
 FINEST = 1e-3
-"""Share of the thickness below which a pair's h is a slip of the drawing: points that miss a line by micrometres."""
+"""Share of the thickness below which a pair's h is a slip of the drawing: points that miss a line by tenths of
+micrometres. Half and double change nothing in those four; ten times as much lets ten pairs through in another
+(Improvisation), in 0.6 times the time."""
 LEAST = 1e-12
-"""Share of h below which a barrier grows no more, so that numbers stay finite; steps are cut long before."""
+"""Share of h below which a barrier grows no more, so that numbers stay finite; steps are cut long before. Half and
+double change nothing."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ FORESEEN = (0.2, 0.7)
 long; double calls no step good, takes 1.17 times as long, and the compromises of two that cannot fold differ."""
 
 FORESIGHT = 4
-"""Solutions of one step at most, in search of the pairs that touch at its end."""
+"""Solutions of one step at most, in search of the pairs that touch at its end. Of four public patterns that would end
+through themselves half takes 1.25 times the time, double 1.1 times; the compromise of one shifts with half."""
 
 
 @dataclass

@@ -1,0 +1,66 @@
+"""Noise of a recorder that averages over frames, whose slow part neighbouring frames do not show."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.residual_process import autocovariance
+
+FILTER = 10
+"""Frames over which recorders average, at most: trackers take medians of 3 and means of up to 7.
+
+What is slower than twice as many has the spectral density of what is between once and twice as many, if it is noise. A
+motion has to be slower than that. On six recordings with nothing missing, of trackers that average over 5, what is left
+is 0.9 to 1.1 times the noise with 10, 0.9 to 1.2 with 5 and 0.8 to 1.1 with 20; a crease that is not symmetric leaves
+1.5 (10), 1.9 (5) and 1.2 (20) times the noise.
+"""
+
+LAGS = 80
+"""Lags of the autocovariance by which a spectrum is told (Parzen window): its lines are half a band wide."""
+
+
+def recorder_noise(forward: Predictor, f: Fit) -> np.ndarray:
+    """(D,) standard deviations of the noise of a recorder that may average over frames, as a fit's residuals show it.
+
+    What is slower than a recorder's filter counts as noise up to the density of what is just faster; it is no less than
+    the noise that was stated or read. Of curves it is that.
+    """
+    noise = forward.blocks[0].noise
+    if forward.curve:
+        return noise
+    whole = joined(forward, f)
+    return np.array([flat_level([r[:, d] for r in whole], float(n)) for d, n in enumerate(noise)])
+
+
+def joined(forward: Predictor, f: Fit) -> list[np.ndarray]:
+    """Residuals (n, D) of segments that follow each other, as one."""
+    out: list[list[np.ndarray]] = []
+    ends = None
+    for b, r in zip(f.blocks, f.residuals, strict=True):
+        block = forward.blocks[b]
+        if ends == (block.recording, block.first):
+            out[-1].append(r)
+        else:
+            out.append([r])
+        ends = block.recording, block.first + len(r)
+    return [np.concatenate(parts) for parts in out]
+
+
+def flat_level(columns: Sequence[np.ndarray], noise: float) -> float:
+    """Standard deviation of a process whose density is flat below the fastest that a recorder's filter passes.
+
+    Args:
+        columns: (n,) residuals, nan where missing. noise: the least that it is.
+    """
+    if max(len(c) for c in columns) < 4 * FILTER:
+        return noise
+    covariance, u = autocovariance(columns, LAGS), np.arange(LAGS + 1) / LAGS
+    window = np.where(u <= 0.5, 1.0 - 6.0 * u**2 + 6.0 * u**3, 2.0 * (1.0 - u) ** 3)
+    frequency = np.linspace(0.0, 0.5, 4 * LAGS + 1)
+    waves = np.cos(2.0 * np.pi * np.outer(np.arange(1, LAGS + 1), frequency))
+    density = np.maximum(covariance[0] + 2.0 * (window * covariance)[1:] @ waves, 0.0)
+    slow, next_ = frequency <= 0.5 / FILTER, (frequency > 0.5 / FILTER) & (frequency <= 1.0 / FILTER)
+    density[slow] = np.minimum(density[slow], density[next_].mean())
+    return max(float(np.sqrt(2.0 * np.trapezoid(density, frequency))), noise)
