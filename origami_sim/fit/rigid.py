@@ -12,9 +12,9 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.fit.rollouts import Motion, Rollouts, Shots, film, joined_poses
 from origami_sim.fit.worlds import World
-from origami_sim.model import Parameters, State
+from origami_sim.model import Parameters, State, node_mass
 from origami_sim.recording import Recording
-from origami_sim.solve.rigid import RigidBatch, Topology
+from origami_sim.solve.rigid import RigidBatch, Topology, check_inertia
 
 FEWEST = 8
 """Frames of a segment, at least: as many as tell its start's rate."""
@@ -56,7 +56,8 @@ class RigidRollouts(Rollouts):
         threads: int | None = None,
     ):
         super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
-        check_tree(Topology(self.model), self.articulation.floating)
+        self._tree = Topology(self.model)
+        check_tree(self._tree, self.articulation.floating)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
 
@@ -76,6 +77,16 @@ class RigidRollouts(Rollouts):
             reach = np.concatenate([usual * lasting / np.sqrt(3.0), usual])
             out[n] = replace(block, reach=reach, lasting=lasting)
         return out
+
+    def world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> World:
+        """See `Worlds.world`.
+
+        Raises:
+            InputError: masses that leave a panel without inertia; what a model refuses.
+        """
+        model, parameters = super().world(hypothesis, values, effects)
+        check_inertia(model, self._tree, model.position, node_mass(model, parameters)[:, 0])
+        return model, parameters
 
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """A frame [s], since steps adapt themselves; 0 if no model can be built."""

@@ -72,7 +72,7 @@ class RigidBatch(Batch):
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
         tree.tableau = constant(TABLEAU, wp.float64)
         centre, mass, inertia = self._bodies(x, np.broadcast_to(self._mass, (len(x), w)))
-        self._check_inertia(x[:, 0], np.broadcast_to(self._mass, (len(x), w))[:, 0])
+        check_inertia(model, t, x[:, 0], np.broadcast_to(self._mass, (len(x), w))[:, 0])
         origin = x[t.root_nodes].mean(axis=0)
         axis, pivot = np.zeros((joints, w, 3)), np.zeros((joints, w, 3))
         for j, (c, sign) in enumerate(t.joints):
@@ -132,17 +132,6 @@ class RigidBatch(Batch):
             spread = np.einsum("nw,nwa,nwb->wab", mass[mine], r, r)
             inertia[b] = np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3) - spread
         return centre, weight, inertia
-
-    def _check_inertia(self, x: np.ndarray, mass: np.ndarray):
-        """Refuses a panel that turns without inertia."""
-        _, by = self.tree_of.positions(x, np.zeros((len(self.tree_of.turns) + len(self.tree_of.joints), 1)))
-        by = by[:, :, 0]
-        heavy = np.einsum("mna,n,mna->m", by, mass, by)
-        light = np.flatnonzero(heavy <= 1e-15 * heavy.max(initial=0.0))
-        if len(light):
-            k = int(light[0]) - len(self.tree_of.turns)
-            where = f"beyond {self.model.name('crease', self.tree_of.joints[k][0])}" if k >= 0 else "of the first panel"
-            raise InputError("a rigid panel needs mass and inertia", field="body", value=f"none {where}", allowed="> 0")
 
     def _rates(self, state: State, origin: np.ndarray, axis: np.ndarray, pivot: np.ndarray) -> np.ndarray:
         """Rates of the coordinates [m, W] that fit the velocities of a state best."""
@@ -545,3 +534,22 @@ def batch_of(
         unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
         return Batch(model, unit, drive, state, among=among, **options)
     return RigidBatch(model, parameters, drive, state, among=among, tolerance=tolerance, **options)
+
+
+def check_inertia(model: Model, tree: Topology, x: np.ndarray, mass: np.ndarray) -> None:
+    """Refuses a panel that turns without inertia.
+
+    Args:
+        x: [N, 3] positions [m]. mass: (N,) of the nodes [kg].
+
+    Raises:
+        InputError: names the panel.
+    """
+    _, by = tree.positions(x, np.zeros((len(tree.turns) + len(tree.joints), 1)))
+    by = by[:, :, 0]
+    heavy = np.einsum("mna,n,mna->m", by, mass, by)
+    light = np.flatnonzero(heavy <= 1e-15 * heavy.max(initial=0.0))
+    if len(light):
+        k = int(light[0]) - len(tree.turns)
+        where = f"beyond {model.name('crease', tree.joints[k][0])}" if k >= 0 else "of the first panel"
+        raise InputError("a rigid panel needs mass and inertia", field="body", value=f"none {where}", allowed="> 0")
