@@ -15,6 +15,7 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.least_squares import linearise
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.prescribed import curves
+from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.rollouts import Rollouts
 from origami_sim.fit.slow import Slow, restless
@@ -41,11 +42,11 @@ FEWEST = 8
 """Segments that a single recording is cut into at least, where bars predict it."""
 
 BENDING = 0.3
-"""Change by the bending of panels, over the noise or what rigid panels leave, up to which they are taken as rigid."""
+"""Change by the bending of panels, over the recorder's noise, up to which they are taken as rigid."""
 
 BENT = (
     "Panels are taken as rigid: with those of the model, bending would change what is measured by {:.2g} times its "
-    "noise{}."
+    "noise."
 )
 
 INERT = 0.3
@@ -155,7 +156,7 @@ def _slow_panels(subject: Subject, recordings: list[Recording], o: Options) -> t
         return Slow(subject, recordings, threads=o.threads), []
     if bent > BENDING:
         return Slow(subject, recordings, threads=o.threads), []
-    return rigid, [BENT.format(bent, "")]
+    return rigid, [BENT.format(bent)]
 
 
 def slow_bending(subject: Subject, recordings: list[Recording], o: Options) -> float:
@@ -188,12 +189,10 @@ def rigid_rollouts(
         length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
         found = RigidRollouts(subject, recordings, segment=length, threads=o.threads)
     if bent <= BENDING:
-        return found, [] if forced else [BENT.format(bent, "")]
-    # the noise of a tracker that smooths is larger than neighbouring frames show
-    left = float(np.sqrt(np.nanmean((nominal_fits(found)[1].rms() / found.blocks[0].noise) ** 2)))
-    if bent > BENDING * left:
-        return None
-    return found, [BENT.format(bent, f", of which the refitted model leaves {left:.2g} times")]
+        return found, [] if forced else [BENT.format(bent)]
+    # a recorder that averages over frames has more noise than neighbouring frames show
+    noise = float(np.sqrt(np.mean((recorder_noise(found, nominal_fits(found)[1]) / found.blocks[0].noise) ** 2)))
+    return (found, [BENT.format(bent / noise)]) if bent <= BENDING * noise else None
 
 
 def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:

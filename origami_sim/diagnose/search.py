@@ -4,8 +4,8 @@ About every fit the evidence of all sets that add one or two effects to it is kn
 largest posterior that has not been fitted is fitted next, until what has not been fitted holds little. Each set is
 judged by the linearisation that is nearest to it: its own, if it was fitted.
 
-Half and double of FAR, UNFITTED, LEADING and OWED change no word on four swings (two rub, one stiffens, one lacks
-nothing), and no probability by more than 0.03. Half of FAR fits up to six sets more, the others change none.
+Half and double of UNFITTED, LEADING and OWED change no word on four swings (two rub, one stiffens, one lacks nothing),
+and no probability by more than 0.03.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,9 +30,6 @@ from origami_sim.fit.weights import Weights, log_volume, recast
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
-
-FAR = 1.5
-"""Root mean square over the noise that a fit leaves, above which it is not worth to be made firm: it will not lead."""
 
 FITS = 16
 """Sets that are fitted at most, before leaders are polished and after."""
@@ -59,6 +56,9 @@ TIGHT = 1e-3
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
 
 Key = frozenset[int]
+
+POLISHED = frozenset((-1,))
+"""Where `Posterior.gains` has what sets gained that were fitted on."""
 
 
 @dataclass(eq=False)
@@ -104,9 +104,9 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
             was not possible.
-        ranked: what single effects promise the model without any, best first. gains: by how much sets were better
-            than they had promised, by the fit that the promise is about. hoped: what sets that were fitted had
-            promised, by their labels.
+        ranked: what single effects promise the model without any, best first. hoped: what sets that were fitted had
+            promised, by their labels. gains: by how much they were better, by the fit that the promise is about, and
+            what leaders gained that were fitted on, by POLISHED.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
         renewed: sets that were fitted again, from a fit of a larger one. polished: that are judged by derivatives of
@@ -242,27 +242,29 @@ def _alone(out: Posterior) -> Key | None:
     return next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
 
 
-def missed(forward: Predictor, f: Fit) -> float:
-    """Root mean square of what a fit leaves, over the noise; of the channel of which it leaves most."""
-    return float(np.nanmax(f.rms() / forward.blocks[0].noise))
-
-
 def polished(out: Posterior, forward: Predictor) -> bool:
-    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any."""
-    prior, chance = log_priors(out.signatures), out.probabilities()
-    leaders = [k for k in out.nodes if chance[k] >= UNFITTED and k not in out.polished]
-    for key in leaders:
-        if key not in out.nodes:  # a larger set that went on fits it better
-            continue
+    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
+
+    Leaders are those that hold part of the posterior, or would if they gained as much as others did.
+    """
+    prior, some = log_priors(out.signatures), False
+    while True:
+        best = max(out.total[k] for k in out.nodes)
+        gains = out.gains.get(POLISHED, [])
+        least = best + np.log(UNFITTED) - (max(0.0, _most(gains)) if gains else 0.0)
+        leaders = [k for k in out.nodes if out.total[k] >= least and k not in out.polished]
+        if not leaders:
+            return some
+        key, some = max(leaders, key=lambda k: out.total[k]), True
         out.polished.add(key)
-        f = out.nodes[key].fit
+        before, f = out.total[key], out.nodes[key].fit
         f = renewed(forward, f.reweighted(tight(f)))
         if f.cost - promised(forward, f) >= OWED:
             f = carried_on(forward, f)
             f = f if f.failed or f.exact else renewed(forward, f)
         if not f.failed:
             _add(out, forward, key, f, prior)
-    return bool(leaders)
+            out.gains.setdefault(POLISHED, []).append(out.total[key] - before)
 
 
 def tight(f: Fit) -> Weights:
@@ -531,15 +533,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
-    loose = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
-    tied = any(t is not None for t in parent.linear.tie)
-    if loose.failed or not tied or missed(forward, loose) > FAR:
-        return loose
-    firm = loose.reweighted(replace(level(forward, loose), gap=TIGHT))
-    if firm.cost - promised(forward, firm) < OWED:
-        return loose
-    firm = carried_on(forward, firm, most=4)
-    return loose if firm.failed else firm
+    return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
 
 
 def marginals(p: Posterior) -> dict[str, float]:

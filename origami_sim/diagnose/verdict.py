@@ -12,6 +12,7 @@ from origami_sim.diagnose.words import distinct, joined, pooled, said, say, titl
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.recorder import recorder_noise
 
 CREDIBLE = 0.95
 """Probability that the stated set of explanations holds."""
@@ -26,9 +27,9 @@ MOSTLY = 0.5
 """Share of the mismatch that has to be named, or else what is left is the news."""
 
 FAR = 2.0
-"""Error over the noise from which a model that is refitted is not adequate, whatever is more probable.
+"""Error over the noise of the recorder from which a model that is refitted is not adequate, whatever is more probable.
 
-A tracker that smooths over several frames hides up to half of its noise from neighbouring frames, where it is read.
+With nothing missing it is 0.9 to 1.2, also with trackers that average over frames.
 """
 
 COMPARED = 0.9
@@ -170,7 +171,7 @@ def unnamed_verdict(
     Args:
         unknown: whether a discrepancy is real that the refitted model leaves.
     """
-    over = pooled(base.rms() / forward.blocks[0].noise)
+    over = pooled(base.rms() / recorder_noise(forward, base))
     if over > FAR or unknown:
         text = f"The refitted model misses the recordings by {over:.2f} times the noise, and nothing in the catalogue "
         return "UNKNOWN", f"{text}explains it.", []

@@ -12,9 +12,8 @@ FILTER = 10
 """Frames over which recorders average, at most: trackers take medians of 3 and means of up to 7.
 
 What is slower than twice as many has the spectral density of what is between once and twice as many, if it is noise. A
-motion has to be slower than that. On six recordings with nothing missing, of trackers that average over 5, what is left
-is 0.9 to 1.1 times the noise with 10, 0.9 to 1.2 with 5 and 0.8 to 1.1 with 20; a crease that is not symmetric leaves
-1.5 (10), 1.9 (5) and 1.2 (20) times the noise.
+motion has to be slower than that. Seven objects with nothing missing are left at 0.96 to 1.12 times the noise (0.96 to
+1.12 with 5, 0.96 to 1.12 with 20), two of them by trackers that average over 5, whose neighbouring frames show a third.
 """
 
 LAGS = 80
