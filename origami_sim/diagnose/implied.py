@@ -9,6 +9,7 @@ import numpy as np
 
 from origami_sim.fit.evidence import Group, Sets, problem, summed
 from origami_sim.fit.hyper import Hyper
+from origami_sim.fit.hypothesis import usual
 from origami_sim.fit.least_squares import Fit, smoothed
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
@@ -97,7 +98,8 @@ class OwnColumns:
                 np.array([(getattr(inner[k], name) - inner[k].start) / inner[k].scale for k in arranged])
                 for name in ("lower", "upper")
             )
-            self.groups.append(Group(tuple(range(begin, begin + len(inner))), len(strong), at, side, spread, low, high))
+            columns = tuple(range(begin, begin + len(inner)))
+            self.groups.append(Group(columns, len(strong), at, side, spread, low, high, usual(s)))
             place += len(inner)
 
     def sets(self, count: int) -> Sets:

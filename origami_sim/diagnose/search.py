@@ -19,10 +19,11 @@ from scipy.stats import t as student
 from origami_sim.diagnose.foresight import Foresight
 from origami_sim.diagnose.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.diagnose.nominal import level
+from origami_sim.diagnose.scan import scanned, strained
 from origami_sim.diagnose.screen import Signature
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, usual
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
@@ -450,8 +451,10 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
     count, groups = len(own.columns), list(own.groups)
     for n, o in enumerate(others):
-        low, high = out.signatures[o].bounds
-        groups.append(Group((count + n,), 1, np.zeros(1), out.signatures[o].side, np.full(1, np.inf), low, high))
+        one = out.signatures[o]
+        groups.append(
+            Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, usual(one.suspect))
+        )
     added = [np.zeros((len(t), len(others))) for t in line.tangent]
     for k, o in enumerate(others):
         for columns, part in zip(added, out.signatures[o].parts, strict=True):
@@ -527,11 +530,13 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
             suspects.append(signature.suspect)
             begin.append(np.array([strength, *(f.start for f in rest)]))
         column += len(node.groups[g].columns)
-    hypothesis = Hypothesis(tuple(suspects))
-    # derivatives by the numbers of the model and by starts hardly change with an effect
-    parent = node.fit
+    hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
+    if len(suspects) == 1 and strained(parent):
+        given = scanned(forward, hypothesis, by, parent.local)
+        return fit(forward, hypothesis, by, theta=given, local=parent.local)
+    # derivatives by the numbers of the model and by starts hardly change with an effect
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
     return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
 

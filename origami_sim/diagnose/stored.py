@@ -174,7 +174,7 @@ class Stored:
             shares = [[s.name, s.kind, s.share] for s in self.shares[key]]
             told = [
                 [list(g.columns), g.strengths, g.at.tolist(), g.side]
-                + [[_json(v) for v in values] for values in (g.spread, *g.bounds())]
+                + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), [g.usual])]
                 for g in groups
             ]
             nodes.append(
@@ -220,8 +220,17 @@ class Stored:
         for n, node in enumerate(about["nodes"]):
             key = frozenset(node["members"])
             groups = [
-                Group(tuple(c), s, np.array(at, float), side, _wide(spread), _wide(low, -np.inf), _wide(high))
-                for c, s, at, side, spread, low, high in node["groups"]
+                Group(
+                    tuple(c),
+                    s,
+                    np.array(at, float),
+                    side,
+                    _wide(spread),
+                    _wide(low, -np.inf),
+                    _wide(high),
+                    *_wide(typical),
+                )
+                for c, s, at, side, spread, low, high, typical in node["groups"]
             ]
             problems = {}
             for k, gap in enumerate(node["gaps"]):

@@ -37,6 +37,7 @@ class Group:
         side: 1 or -1 where physics allows one sign of the first strength, else 0.
         spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
         low, high: (k,) bounds from where they begin, over the scale; None: there are none.
+        usual: the first strength as it usually is, over the scale; infinite if that depends on the device.
     """
 
     columns: tuple[int, ...]
@@ -46,6 +47,7 @@ class Group:
     spread: np.ndarray
     low: np.ndarray | None = None
     high: np.ndarray | None = None
+    usual: float = np.inf
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest values (k,) of the columns."""
@@ -124,7 +126,8 @@ class Sets:
     """Sets of groups that have as many columns each, laid out for `Summed.of`.
 
     Attributes:
-        columns: [n, k]. at, spread, side, low, high: [n, k] of the columns, see `Group`. strength: [n, k] if it is one.
+        columns: [n, k]. at, spread, side, low, high, usual: [n, k] of the columns, see `Group`. strength: [n, k] if it
+            is one.
         back: [n, C] values of the strengths that the problem is linearised with and that a set lacks.
     """
 
@@ -135,6 +138,7 @@ class Sets:
     strength: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    usual: np.ndarray
     back: np.ndarray
 
     @classmethod
@@ -157,6 +161,7 @@ class Sets:
             each(lambda g: [n < g.strengths for n in range(len(g.columns))], bool),
             each(lambda g: g.bounds()[0]),
             each(lambda g: g.bounds()[1]),
+            each(lambda g: [g.usual] + [np.inf] * (len(g.columns) - 1)),
             back,
         )
 
@@ -208,7 +213,8 @@ class Summed:
         slab = log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
         out += np.sum(np.where(sets.strength, slab, shape), axis=1)
-        out += np.sum(sided, axis=1)
+        # what is far beyond the usual is less probable: a Cauchy prior beside the one on the scale of detectability
+        out += np.sum(sided, axis=1) - np.sum(np.log1p((value / sets.usual) ** 2), axis=1)
         return out, value
 
 

@@ -80,6 +80,18 @@ class Suspect:
         return first, *(f for f in rest if f.unit == first.unit and not f.start)
 
 
+def usual(suspect: Suspect) -> float:
+    """The strength that an effect of recorder or supply usually has, over its scale; infinite for the device's own.
+
+    What devices do depends on how large and stiff they are; clocks, scales, cameras and amplifiers are alike.
+    """
+    effect, first = get(suspect.effect), suspect.free[0]
+    typical = effect.parameter(first.name).typical
+    if effect.family not in ("measurement", "drive") or not typical:
+        return np.inf
+    return abs(typical) / first.scale
+
+
 def distinct_sites(a: Suspect, b: Suspect) -> bool:
     """Whether both can act at once, each with numbers of its own: one value per crease, panel or channel."""
     if a.effect != b.effect:

@@ -14,7 +14,7 @@ from origami_sim.diagnose.held_out import folds, held_out
 from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import marginals, missed, search
+from origami_sim.diagnose.search import marginals, search
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
@@ -26,6 +26,11 @@ from tests.diagnose.strips import record, subject
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
 FEW = ("crease_friction", "air_drag", "crease_stiffening", "crease_offset")
 SMALL = {"duration": 4.0, "panels": 3, "rate": 100}
+
+
+def missed(forward, f) -> float:
+    """Root mean square of what a fit leaves, over the noise, in the channel of which it leaves most."""
+    return float(np.nanmax(f.rms() / forward.blocks[0].noise))
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +80,7 @@ def test_a_set_that_is_likely_never_fits_worse_than_one_that_it_contains(found, 
     chance = found.probabilities()
     for key, node in found.nodes.items():
         for other, smaller in found.nodes.items():
-            if other < key and chance[key] > 1e-3:
+            if other < key and chance[key] > 0.05:
                 larger, fewer = missed(forward, node.fit), missed(forward, smaller.fit)
                 assert larger <= 1.02 * fewer, (found.label(key), found.label(other))
 

@@ -72,7 +72,7 @@ def test_other_hyperparameters_give_what_the_fits_give_with_them(kept, changed):
         (place if node.wide else enter)(direct, again, prior)
     mine, theirs = direct.probabilities(), stored.judged(hyper).probabilities()
     # without one size of the gaps, the noise that fits imply is a little different
-    assert max(abs(mine[k] - theirs[k]) for k in mine) < (1e-3 if "gaps" in changed else 1e-6)
+    assert max(abs(mine[k] - theirs[k]) for k in mine) < (1e-3 if "gaps" in changed else 1e-5)
     if "smooth" not in changed:  # there is none in these recordings
         assert max(abs(mine[k] - p.probabilities()[k]) for k in mine) > 1e-4
 

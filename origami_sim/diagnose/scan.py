@@ -1,0 +1,42 @@
+"""Coarse scans of the strength of an effect, from the numbers that a model was given.
+
+A model that lacks a strong effect follows it with numbers that are no fault of theirs, and from there no fit finds the
+effect: dry friction that holds a crease back is as a weaker magnet.
+"""
+
+import numpy as np
+from scipy.stats import chi2
+
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
+
+DOUBTED = 0.01
+"""Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed."""
+
+GRID = np.geomspace(1.0, 1e3, 7)
+"""Strengths of an effect that are tried, in the unit in which it is screened: what first shows, up to what blocks."""
+
+
+def strained(f: Fit) -> bool:
+    """Whether numbers are further from what was known than chance would take them."""
+    known = sum(np.isfinite(n.spread) for n in f.free)
+    return bool(known and chi2.sf(f.penalty, known) < DOUBTED)
+
+
+def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray:
+    """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least."""
+    first, *_ = hypothesis.free
+    given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
+    tried = first.start + first.scale * np.concatenate([GRID, -GRID])
+    strengths = np.unique(np.clip(tried, first.lower, first.upper))
+    strengths = strengths[strengths != first.start]
+    thetas = np.repeat(given[None], len(strengths), axis=0)
+    thetas[:, len(forward.subject.nominals)] = strengths
+    shot = forward.predict(hypothesis, thetas, np.repeat(local[None], len(thetas), axis=0))
+    missed = np.zeros(len(thetas))
+    for block, values in zip(forward.blocks, shot, strict=True):
+        gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
+        missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
+    return thetas[int(np.argmin(missed))]
