@@ -13,7 +13,10 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 
 DOUBTED = 0.01
-"""Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed."""
+"""Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed.
+
+It only decides where fits begin. Of a crawler whose crease friction holds, numbers were 10 and 21 deviations off.
+"""
 
 GRID = np.geomspace(1.0, 1e3, 7)
 """Strengths of an effect that are tried, in the unit in which it is screened: what first shows, up to what blocks."""
@@ -25,8 +28,11 @@ def strained(f: Fit) -> bool:
     return bool(known and chi2.sf(f.penalty, known) < DOUBTED)
 
 
-def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray:
-    """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least."""
+def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray | None:
+    """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least.
+
+    None if the model goes unstable with all of them.
+    """
     first, *_ = hypothesis.free
     given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
     tried = first.start + first.scale * np.concatenate([GRID, -GRID])
@@ -39,4 +45,4 @@ def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local:
     for block, values in zip(forward.blocks, shot, strict=True):
         gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
         missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
-    return thetas[int(np.argmin(missed))]
+    return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None

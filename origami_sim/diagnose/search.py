@@ -533,8 +533,8 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
-    if len(suspects) == 1 and strained(parent):
-        given = scanned(forward, hypothesis, by, parent.local)
+    given = scanned(forward, hypothesis, by, parent.local) if len(suspects) == 1 and strained(parent) else None
+    if given is not None:
         return fit(forward, hypothesis, by, theta=given, local=parent.local)
     # derivatives by the numbers of the model and by starts hardly change with an effect
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}

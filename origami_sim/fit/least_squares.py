@@ -389,7 +389,7 @@ def carried_on(forward, f: Fit, *, most: int = 8) -> Fit:
 
 
 def renewed(forward, f: Fit) -> Fit:
-    """A fit with all derivatives taken anew where it ended: of stale ones the log evidence is off by up to two."""
+    """A fit with all derivatives taken anew where it ended; a fit itself uses them as long as its steps come true."""
     assert f.weights is not None and f.linear is not None
     also = {"residual": f.linear.residual, "steps": f.linear.steps}
     line = linearise(forward, f.hypothesis, f.free, f.theta, f.local, f.blocks, f.weights, **also)
