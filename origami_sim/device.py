@@ -355,7 +355,7 @@ def outcome_of(motion: Trajectory) -> Outcome:
         tables["creases"] = {"crease": names, "start_deg": angles[0], "furthest_deg": far, "end_deg": angles[-1]}
         most = int(np.abs(angles[-1] - angles[0]).argmax())
         numbers["largest_turn_deg"] = float(angles[-1, most] - angles[0, most])
-        summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:.2f} deg at the end")
+        summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:z.2f} deg at the end")
         past = int(np.abs(far).argmax())
         if abs(far[past]) > 180.0 + PAST:
             summary.append(
