@@ -203,11 +203,11 @@ class Grounds(Masses):
         """Adds a contact point and returns its index."""
         candidates = [(int(t), self._barycentric(int(t), point)) for t in self._triangles_of(panel)]
         inside = max(w.min() for _, w in candidates)
+        if not inside >= -ON_EDGE:
+            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=point.tolist())
         # at a corner, or on an edge, of several the widest one there carries, and not the one that rounding prefers
         level = [(t, w) for t, w in candidates if w.min() > inside - ON_EDGE]
         best, weights = max(level, key=lambda c: round(self._angle_at(c[0], point), 9))
-        if not weights.min() >= -ON_EDGE:
-            raise InputError("a contact point lies outside its panel", field=f"panel {panel}", value=point.tolist())
         a, b = self._edge_weights(best, np.asarray(axis, float))
         forward = np.array([-a - b, a, b])
         label = name or f"contact {len(self._contacts)}"
