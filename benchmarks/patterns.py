@@ -39,7 +39,7 @@ def folded(path: Path, picture: Path | None) -> dict:
         from origami_sim.folding.picture import draw
 
         draw(folding, picture)
-    meant = not folding.contradictions and not folding.curved
+    meant = not folding.contradictions and not folding.curved and not folding.unordered
     seconds = time.process_time() - began
     return {
         **found.numbers,

@@ -354,7 +354,14 @@ class Sheet(Grounds, Electrodes, Thick):
 
     @statement()
     def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
-        """Holds panels or nodes along the named axes."""
+        """Holds panels or nodes along the named axes.
+
+        Raises:
+            InputError: no such panel, node or axis; nothing to hold.
+        """
+        panels, nodes = (list(v) if isinstance(v, Iterable) else [v] for v in (panels, nodes))
+        if not panels and not nodes:
+            raise InputError("nothing is held", field="panels, nodes", allowed="fix(panels=[0]), fix(nodes=[0, 1])")
         index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
         for a in axes:
             if a not in "xyz":

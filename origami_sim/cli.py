@@ -503,7 +503,7 @@ def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
     through = f"{motion.crossings().sum()} pairs of triangles through each other"
-    said = [str(motion.step), accuracy.sentence(motion.energy_error), through, f"{motion.wall:.1f} s of computing"]
+    said = [str(motion.step), accuracy.sentence(motion), through, f"{motion.wall:.1f} s of computing"]
     print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 
 

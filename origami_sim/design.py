@@ -18,7 +18,6 @@
 are those of the builders of patterns and of the statements of `Sheet`.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +30,7 @@ from origami_sim.build import Sheet
 from origami_sim.drive import CHANNELS, Drive, Signal
 from origami_sim.drive_file import as_table, called, check_known, read_drive, stated_in
 from origami_sim.errors import InputError, nearest
-from origami_sim.files import write_text
+from origami_sim.files import read_toml, write_text
 from origami_sim.model import Model, Parameters
 from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
@@ -77,8 +76,8 @@ class Design:
 def is_design(path: Path) -> bool:
     """Whether a TOML file states a sheet and its pattern, as calibrations and sidecars do not."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        data = read_toml(path)
+    except InputError:
         return False
     sheet = data["sheet"] if isinstance(data.get("sheet"), dict) else {}
     model = data["model"] if isinstance(data.get("model"), dict) else {}
@@ -92,12 +91,7 @@ def read_design(path: str | Path) -> Design:
         InputError: no such file, malformed TOML, an unknown key, pattern or statement, or what those refuse.
     """
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as e:
-        raise InputError(f"cannot be read ({e.strerror})", file=path) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as e:
-        raise InputError(f"is not valid TOML ({e})", file=path) from None
+    data = read_toml(path)
     for key in data:
         if key not in _KEYS:
             raise InputError(f"unknown key{nearest(key, _KEYS)}", file=path, field=key, allowed=", ".join(_KEYS))

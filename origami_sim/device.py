@@ -95,7 +95,7 @@ def device_module(given: str) -> ModuleType:
             found = importlib.import_module(place)
         except (ImportError, ValueError) as e:
             raise InputError(f"the module cannot be imported ({e})", field="device", value=place) from None
-        except Exception as e:  # the module's own code
+        except (Exception, SystemExit) as e:  # the module's own code
             raise InputError(
                 f"the module cannot be imported ({type(e).__name__}: {e})", field="device", value=place
             ) from e
@@ -130,7 +130,7 @@ def _executed(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except InputError:
         raise
-    except Exception as e:
+    except (Exception, SystemExit) as e:
         raise InputError(f"the device cannot be loaded: {_where(e, path)}", file=path) from e
     return module
 
@@ -183,7 +183,7 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
             return built(tuple(raw(s, **options)), path)
         except InputError as e:
             raise e if e.file is not None else InputError(str(e), file=path) from None
-        except Exception as e:
+        except (Exception, SystemExit) as e:
             raise InputError(f"build() fails: {_where(e, path)}", file=path) from e
 
     def timed(s: Settings, model: Model, parameters: Parameters, drive: Drive, **options) -> Trajectory:
@@ -355,7 +355,7 @@ def outcome_of(motion: Trajectory) -> Outcome:
         tables["creases"] = {"crease": names, "start_deg": angles[0], "furthest_deg": far, "end_deg": angles[-1]}
         most = int(np.abs(angles[-1] - angles[0]).argmax())
         numbers["largest_turn_deg"] = float(angles[-1, most] - angles[0, most])
-        summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:.2f} deg at the end")
+        summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:z.2f} deg at the end")
         past = int(np.abs(far).argmax())
         if abs(far[past]) > 180.0 + PAST:
             summary.append(

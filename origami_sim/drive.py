@@ -168,9 +168,9 @@ def held_to(end: float, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarr
     return np.append(times, end + 1.0), np.append(values, values[-1:], axis=0)
 
 
-def as_signal(value, unit: str = ANY) -> Signal:
+def as_signal(value, unit: str = ANY, name: str = "") -> Signal:
     """The signal of a number or of a quantity, which must have that unit."""
-    return value if isinstance(value, Signal) else Signal(offset=converted(value, unit, unit))
+    return value if isinstance(value, Signal) else Signal(offset=converted(value, unit, name or unit))
 
 
 def _seconds(duration: float | str) -> float:
@@ -202,15 +202,15 @@ class Drive:
         origin: Value = 0.0,
         sources: Sequence["Source | Sequence[Source]"] = (),
     ):
-        if len(field) != 3:
-            raise InputError("a field has three components", field="field", value=len(field), allowed="3")
+        if not isinstance(field, Sequence | np.ndarray) or isinstance(field, str) or len(field) != 3:
+            raise InputError("a field has three components", field="field", value=field, allowed="(x, y, z)")
         gradient = gradient if gradient is not None else ((0.0,) * 3,) * 3
         if len(gradient) != 3 or any(len(row) != 3 for row in gradient):
             raise InputError("a field gradient has 3 x 3 components", field="gradient", allowed="dB_i/dx_j [T/m]")
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
         values: list = [*field, *(g for row in gradient for g in row), temperature, load, origin, *voltages]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
-        self.signals = {n: as_signal(v, UNITS[n.partition("_")[0]]) for n, v in zip(names, values, strict=True)}
+        self.signals = {n: as_signal(v, UNITS[n.partition("_")[0]], n) for n, v in zip(names, values, strict=True)}
         self._place(sources)
 
     def _place(self, sources: Sequence["Source | Sequence[Source]"]) -> None:

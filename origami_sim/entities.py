@@ -15,6 +15,9 @@ _NAMED = {"crease": "crease", "triangle": "panel", "node": "node", "panel": "pan
 )
 """Family of an effect, and what its entities are named by: the triangles of a panel have its name."""
 
+OWNERS = {"inertia": "node", "body": "panel", "plane": ""}
+"""Owners of parameters that are no effects, and the family of their entities."""
+
 
 WAYS = {"factor": " (factor)", "added": " (added)"}
 """Ways in which a fitted number changes a parameter that a model has, and how its label ends."""
@@ -70,11 +73,13 @@ def tune(parameters: Parameters, model: Model, label: str, value: float) -> None
 
 
 def _named(entity: str, effect: str, model: Model, count: int, label: str, file: object, field: str) -> np.ndarray:
-    family = get(effect).family if effect in CATALOGUE else {"inertia": "node", "body": "panel"}.get(effect, "")
+    family = get(effect).family if effect in CATALOGUE else OWNERS.get(effect, "")
     kind = _NAMED.get(family, "")
     of = model.triangle_panel if family == "triangle" else np.arange(count)
     names = np.array([model.names[kind][k] if kind in model.names and k < len(model.names[kind]) else "" for k in of])
     chosen = np.flatnonzero(names == entity.strip())
+    if not len(chosen) and kind:  # "panel 1", as tables and pictures call what has no name
+        chosen = np.flatnonzero(np.array([model.name(kind, int(k)) for k in of]) == entity.strip())
     if not len(chosen) and entity.strip().isdecimal():
         chosen = np.flatnonzero(of == int(entity))
     if not len(chosen):

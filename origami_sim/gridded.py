@@ -7,6 +7,7 @@ divergence says how good it is.
 """
 
 import csv
+import io
 import re
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -17,6 +18,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import eigh
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_bytes
 from origami_sim.units import unit_factor
 
 LEAST = 4
@@ -254,10 +256,8 @@ def _read_npz(cls, path: Path) -> FieldTable:
 
 def _read_csv(cls, path: Path) -> FieldTable:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as f:
-            head, *rows = [r for r in csv.reader(f) if any(c.strip() for c in r)] or [[]]
-    except OSError as e:
-        raise InputError(f"cannot be read ({e.strerror})", file=path) from None
+        stream = io.StringIO(read_bytes(path).decode("utf-8-sig"), newline="")
+        head, *rows = [r for r in csv.reader(stream) if any(c.strip() for c in r)] or [[]]
     except (UnicodeDecodeError, csv.Error) as e:
         raise InputError(f"is no CSV file ({e})", file=path) from None
     found = {}

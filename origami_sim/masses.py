@@ -388,6 +388,8 @@ class Masses(Statements):
         count = self._counts()[family]
         if chosen is None:
             return np.arange(count)
+        if np.size(chosen) and np.asarray(chosen).dtype.kind not in "iu":
+            raise InputError(f"a {family} is given by its number", field=family, value=chosen, allowed="whole numbers")
         index = np.atleast_1d(np.asarray(chosen, int)) if np.size(chosen) else np.zeros(0, int)
         bad = index[(index < 0) | (index >= count)]
         if len(bad):
@@ -395,6 +397,8 @@ class Masses(Statements):
         return index
 
     def _triangles_of(self, panel: int) -> np.ndarray:
+        if not isinstance(panel, (int, np.integer)) or isinstance(panel, bool):
+            raise InputError("a panel is given by its number", field="panel", value=panel, allowed="a whole number")
         if not 0 <= panel < self.pattern.face_count:
             raise InputError(
                 "there is no such panel", field="panel", value=panel, allowed=f"0 to {self.pattern.face_count - 1}"

@@ -547,6 +547,10 @@ def _find(model: Model, channel: Channel, family: str, given: object, count: int
         return names.index(given)
     if isinstance(given, int) and 0 <= given < count:
         return given
+    if isinstance(given, str) and not names:  # "panel 1", as tables and pictures call what has no name
+        called = [model.name(family, k) for k in range(count)]
+        if given in called:
+            return called.index(given)
     raise InputError(
         f"several have that name, of which a {channel.kind} needs one"
         if given in names

@@ -3,7 +3,7 @@
 import numpy as np
 
 from origami_sim.drive import Drive
-from origami_sim.effects import get
+from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.ground import gaps, heights
 from origami_sim.materials import G
@@ -33,8 +33,10 @@ _CHANNELS = {
 
 
 def idle_drives(model: Model, parameters: Parameters, drive: Drive) -> list[str]:
-    """What the drive has and the model does not answer to."""
+    """What the drive has and the model does not answer to, and feet without a ground."""
     notes = []
+    if "ground" not in model.laws and len(model.contacts) and any(get(e).family in CONTACTS for e in model.laws):
+        notes.append("There are feet or contact points, and no ground that they could touch: Sheet.ground().")
     for kind, prefix in _CHANNELS.items():
         channels = [n for n, s in drive.signals.items() if n.startswith(prefix) and not s.is_zero]
         if prefix == "source_" and not any(n.endswith("_strength") for n in channels):

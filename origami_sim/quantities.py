@@ -73,8 +73,10 @@ def converted(value: Any, unit: str, field: str) -> Any:
     """A value in which every text is a quantity, in SI; numbers and what is no number pass through as they are.
 
     Raises:
-        InputError: a text that is no quantity of this unit.
+        InputError: a text that is no quantity of this unit, true or false.
     """
+    if isinstance(value, (bool, np.bool_)):
+        raise InputError("a switch is no number", field=field, value=bool(value), allowed="a number, or a quantity")
     if isinstance(value, str):
         return parsed(value, unit, field=field)
     if isinstance(value, np.ndarray) and value.dtype.kind in "US":

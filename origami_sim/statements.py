@@ -48,6 +48,8 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
             outermost, self._within = not self._within, True
             try:
                 out = method(self, *positional, **in_si)  # pyright: ignore[reportCallIssue]
+            except ValueError as e:  # of NumPy, about a word or a list where numbers belong
+                raise e if isinstance(e, InputError) else InputError(f"Sheet.{name} cannot be stated so ({e})") from e
             finally:
                 self._within = not outermost
             if outermost:

@@ -433,3 +433,56 @@ def test_a_panel_that_turns_past_half_a_turn_is_noted():
         notes.append(" ".join(outcome_of(motion).summary))
     assert "past half a turn" in notes[1] and "Sheet.touch()" in notes[1]
     assert "past half a turn" not in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (lambda s: s.patch(1, thickness=True), r"a switch is no number.*thickness"),
+        (lambda s: s.patch(1, thickness="1 mm", poling="x"), "Sheet.patch cannot be stated so"),
+        (lambda s: s.fix(panels=[0.5]), "given by its number.*0.5"),
+        (lambda s: s.fix(nodes=["hinge"]), "given by its number"),
+        (lambda s: s.fix(nodes=np.array([True, False])), "given by its number"),
+        (lambda s: s.fix(), "nothing is held"),
+        (lambda s: s.crease([0.5], stiffness=1e-3), "given by its number"),
+        (lambda s: s.gravity().set("ground", stiffness=True), "a switch is no number.*ground.stiffness"),
+    ],
+)
+def test_statements_refuse_what_is_no_number(state, said):
+    from origami_sim import Sheet, strip
+
+    with pytest.raises(InputError, match=said):
+        state(Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm"))
+    with pytest.raises(InputError, match="a switch is no number"):
+        Sheet(strip([0.01, 0.02], 0.02), thickness=True)
+
+
+def test_what_is_held_may_be_a_number_a_range_or_a_set():
+    from origami_sim import Sheet, strip
+
+    def sheet():
+        return Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm").crease(stiffness=1e-3)
+
+    held = [sheet().fix(nodes=n).build()[0].free for n in (range(4), {0, 1, 2, 3}, np.arange(4), [0, 1, 2, 3])]
+    held.append(sheet().fix(panels=0).build()[0].free)
+    assert all(np.array_equal(h, held[0]) for h in held) and not held[0][:4].any() and held[0][4:].all()
+
+
+def test_a_field_has_three_components_and_names_the_wrong_one():
+    from origami_sim import Drive
+
+    for field in (0.05, "50 mT", (0, 1)):
+        with pytest.raises(InputError, match="three components"):
+            Drive(field=field)
+    with pytest.raises(InputError, match=r"field_z.*mm"):
+        Drive(field=(0, 0, "5 mm"))
+
+
+def test_feet_without_a_ground_are_noted():
+    from origami_sim import Sheet, simulate, strip
+
+    notes = []
+    for ground in (False, True):
+        sheet = Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm").crease(stiffness=1e-3).feet([0, 1, 4, 5])
+        notes.append(simulate(*(sheet.ground() if ground else sheet).build(), duration=0.02).notes)
+    assert "no ground that they could touch" in " ".join(notes[0]) and not notes[1]

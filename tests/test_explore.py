@@ -10,8 +10,10 @@ from origami_sim.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.explore import Way, angle, find, gradient, moved, optimise, solve_for, sweep
+from origami_sim.explore.found import number
 from origami_sim.materials import MU0
 from origami_sim.pattern import miura, strip
+from origami_sim.quantities import si
 
 WIDTH, LENGTH, PATCH, REMANENCE = 0.02, 0.018, 3e-3, 0.13
 MOTION = Way(duration=0.05, rate=200.0, threads=1)
@@ -376,3 +378,25 @@ def test_what_a_sweep_kept_may_be_damaged(tmp_path):
     good = b'{"key": "a", "row": {"x": 1.0}}\n'
     (tmp_path / ROWS).write_bytes(good + b"[" * 100_000 + b'\n\xff\n{"key": "b", "row": 3}\n[1]\n')
     assert _Kept(tmp_path).rows == {"a": {"x": 1.0}}
+
+
+def test_quantities_of_another_kind_are_refused():
+    def build(gap="2 mm", field=0.05, parts=2, side="top", held=True):
+        return flap(gap=si(gap))
+
+    for grid, said in (
+        ({"gap": ["1 mT"]}, r"wrong unit.*gap.*mT"),
+        ({"gap": [True]}, r"a switch is no number.*gap"),
+        ({"parts": ["3 mm"]}, r"wrong unit.*parts"),
+        ({"field": ["strong"]}, r"not a number.*field"),
+    ):
+        with pytest.raises(InputError, match=said):
+            sweep(build, grid, {"fold": angle(0)})
+    assert number(build, "top", "side") == "top" and number(build, False, "held") is False
+    assert number(build, "20 mT", "field") == pytest.approx(0.02)
+    with pytest.raises(InputError, match=r"wrong unit.*target.*mm"):
+        solve_for(build, angle(0), "9 mm", {"gap": ("1 mm", "4 mm")})
+    with pytest.raises(InputError, match=r"wrong unit.*gap.*mT"):
+        solve_for(build, angle(0), "9 deg", {"gap": ("1 mT", "4 mT")})
+    with pytest.raises(InputError, match=r"wrong unit.*subject_to.*deg"):
+        optimise(build, angle(0), {"gap": ("1 mm", "4 mm")}, subject_to=[(moved("x"), "1 deg", None)])

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -285,6 +286,14 @@ def test_a_world_that_failed_is_still_written(contacts, tmp_path):
     _, frames = columns(file, "/sheet/faces", "Mesh3D:vertex_positions")
     assert np.all(np.isfinite(np.array(frames)))
     assert frames[-1] == pytest.approx(frames[4])
+
+
+def test_a_plot_of_what_does_not_change_warns_of_nothing(trajectory, tmp_path, capfd):
+    still = replace(trajectory, x=np.repeat(trajectory.x[:1], len(trajectory.x), axis=0), drive=Drive(),
+                    angles=np.repeat(trajectory.angles[:1], len(trajectory.angles), axis=0))  # fmt: skip
+    write_replay(tmp_path / "still.rrd", still)
+    said = capfd.readouterr()
+    assert not said.out and not said.err
 
 
 def test_bad_requests_name_the_field(trajectory, tmp_path):

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from origami_sim import cli, rescue
+from origami_sim.calibrate.curves import read_columns
+from origami_sim.calibrate.stated import read_text
+from origami_sim.design import is_design, read_design
 from origami_sim.errors import DiskFull, InputError, unwritable
 from origami_sim.files import LARGEST_TOML, read_bytes, read_toml, write_text
+from origami_sim.gridded import FieldTable
 from origami_sim.pattern import read_mesh, read_svg
 from origami_sim.recording import read_recording
 from origami_sim.recording.dataset import read_dataset
@@ -42,6 +46,19 @@ def test_devices_and_pipes_are_not_read(tmp_path):
     assert "a device" in refused(read_dataset, tmp_path / "list.toml")
     assert "a folder" in refused(read_bytes, tmp_path)
     assert "too large" in refused(read_bytes, tmp_path / "list.toml", 5)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in the file system here")
+@pytest.mark.parametrize("read", [read_design, read_text, lambda p: read_columns(p, {}), FieldTable.read])
+def test_no_reader_waits_for_a_pipe(tmp_path, read):
+    os.mkfifo(tmp_path / "pipe.toml")
+    assert "a device, a pipe or a socket" in refused(read, tmp_path / "pipe.toml")
+    assert not is_design(tmp_path / "pipe.toml")
+
+
+def test_a_design_that_is_a_trap(tmp_path):
+    (tmp_path / "trap.toml").write_text(".".join("a" * 50_000) + " = 1")
+    assert "nested too deeply" in refused(read_design, tmp_path / "trap.toml")
 
 
 @pytest.mark.parametrize(

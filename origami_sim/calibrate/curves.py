@@ -1,12 +1,14 @@
 """Measured curves: columns of CSV files in SI, and what a curve must be before anything is fitted to it."""
 
 import csv
+import io
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_bytes
 from origami_sim.recording.units import UNITS, unit_factor
 
 
@@ -32,10 +34,9 @@ def read_columns(path: str | Path, columns: Mapping[str, tuple[str | None, str]]
             raise InputError("the unit of a column is not stated", file=path, field=name, allowed=allowed)
         factors[name] = unit_factor(unit, dimension=dimension, file=path, field=name)
     try:
-        with path.open(newline="") as stream:
-            rows = list(csv.reader(stream))
-    except (OSError, UnicodeDecodeError, csv.Error) as e:
-        raise InputError(f"cannot be read ({getattr(e, 'strerror', None) or e})", file=path) from None
+        rows = list(csv.reader(io.StringIO(read_bytes(path).decode("utf-8"), newline="")))
+    except (UnicodeDecodeError, csv.Error) as e:
+        raise InputError(f"cannot be read ({e})", file=path) from None
     header = [cell.strip() for cell in rows[0]] if rows else []
     out = {}
     for name in columns:

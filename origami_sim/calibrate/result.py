@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.files import read_toml
 from origami_sim.pattern.files import write_atomic
 from origami_sim.recording.units import UNITS
 from origami_sim.scene import read_calibration
@@ -139,7 +139,7 @@ def read_result(path: str | Path) -> Calibration:
     """
     settings = read_calibration(path)
     text = settings.file.read_text()
-    data = tomllib.loads(text)
+    data = read_toml(settings.file)
     if COMMAND not in settings:
         raise InputError(
             "has no command that re-creates it", file=settings.file, field=COMMAND, allowed="a written calibration"

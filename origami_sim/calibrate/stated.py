@@ -8,6 +8,7 @@ from pathlib import Path
 
 from origami_sim.calibrate.result import Calibration, Quantity
 from origami_sim.errors import InputError
+from origami_sim.files import read_bytes
 from origami_sim.recording.units import UNITS
 
 MORE_UNITS = {
@@ -57,9 +58,7 @@ def read_text(path: str | Path) -> str:
     if path.suffix.lower() == ".pdf":
         raise InputError("is a PDF file; take its text out first", file=path, allowed="a text file (pdftotext -layout)")
     try:
-        text = path.read_text(encoding="utf-8", errors="strict")
-    except OSError as e:
-        raise InputError(f"cannot be read ({e.strerror})", file=path, allowed="a text file") from None
+        text = read_bytes(path).decode("utf-8")
     except UnicodeDecodeError:
         raise InputError("is not a text file", file=path, allowed="UTF-8 text") from None
     if not text.strip():

@@ -23,16 +23,22 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose.diagnosis import Candidate, Diagnosis
-from origami_sim.effects import CATALOGUE, get
-from origami_sim.entities import WAYS, located
+from origami_sim.effects import CATALOGUE, Parameter, get
+from origami_sim.entities import OWNERS, WAYS, located
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
-from origami_sim.model import Model, Parameters
+from origami_sim.model import BODY, Model, Parameters
 from origami_sim.scene import Settings
 
 _WORDS = ("site", "source", "at")
 _SWITCHES = ("more", "times")
+_OWNED = {
+    "inertia": [("mass", "kg")],
+    "body": [(n, {"mass": "kg", "centre": "m"}.get(n.split("_")[0], "kg m^2")) for n in BODY],
+    "plane": [("tilt", "rad"), ("azimuth", "rad"), ("height", "m"), ("reach", "m")],
+}
+"""Numbers of what is no effect, and their units."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ def read_additions(tree: object, file: Path) -> tuple[Addition, ...]:
         raise InputError("effects are tables, [effects.NAME]", file=file, field="effects", value=tree)
     out = []
     for name, entries in tree.items():
-        if name not in CATALOGUE:
+        if name not in CATALOGUE and name not in OWNERS:
             raise InputError(
                 "there is no such effect", file=file, field=f"effects.{name}", allowed=", ".join(CATALOGUE)
             )
@@ -81,16 +87,20 @@ def read_additions(tree: object, file: Path) -> tuple[Addition, ...]:
 
 
 def _addition(name: str, entry: object, file: Path) -> Addition:
-    where, effect = f"effects.{name}", get(name)
+    where = f"effects.{name}"
     if not isinstance(entry, dict):
         raise InputError("an effect is a table of its parameters", file=file, field=where, value=entry)
-    known = {p.name: p for p in effect.parameters if p.knots == 1}
+    known = _known(name)
     words, values, entities = {}, {}, None
     switches = {s: entry.get(s, False) for s in _SWITCHES}
     for key, value in switches.items():
         if not isinstance(value, bool):
             raise InputError("not a switch", file=file, field=f"{where}.{key}", value=value, allowed="true, false")
     changes = any(switches.values())
+    if name in OWNERS and not changes:
+        raise InputError(
+            "is no effect: its numbers can only be changed", file=file, field=where, allowed="more = true, times = true"
+        )
     if all(switches.values()) or ("at" in entry and "entities" in entry):
         fault = ("more", "times") if all(switches.values()) else ("at", "entities")
         raise InputError(f"give either {fault[0]} or {fault[1]}", file=file, field=f"{where}.{fault[0]}")
@@ -128,6 +138,14 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
     return Addition(name, values, entities, **switches, **words)
 
 
+def _known(name: str) -> dict[str, Parameter]:
+    """What a calibration may state of an effect, or change of bodies, nodes or the plane of the ground."""
+    if name in OWNERS:
+        free, of = (-np.inf, np.inf), f"of each {OWNERS[name] or name}"
+        return {n: Parameter(n, n, unit, 0.0, free, of) for n, unit in _OWNED[name]}
+    return {p.name: p for p in get(name).parameters if p.knots == 1}
+
+
 def switched_on(
     additions: Sequence[Addition], model: Model, parameters: Parameters, *, file: Path | None = None
 ) -> tuple[Model, Parameters]:
@@ -138,7 +156,7 @@ def switched_on(
     """
     additions = [_placed(a, model, parameters, file) for a in additions]
     for a in additions:
-        count = model.count(get(a.effect).family)
+        count = _count(a.effect, model, parameters)
         if a.entities is not None and max(a.entities) >= count:
             raise InputError(
                 "the model has no such entity",
@@ -147,35 +165,42 @@ def switched_on(
                 value=max(a.entities),
                 allowed=f"0 to {count - 1}",
             )
-    new = [a for a in additions if a.effect not in model.effects and not a.changes]
+    there = {*model.effects, *OWNERS}
+    new = [a for a in additions if a.effect not in there and not a.changes]
     richer = model.with_effects(*(a.effect for a in new))
     numbers = [_numbers(a) for a in new]
     missing = Hypothesis(tuple(Suspect(a.effect, a.site, "", n, a.entities) for a, n in zip(new, numbers, strict=True)))
     out = apply(parameters, missing, [f.start for n in numbers for f in n], richer)
     for a in additions:
-        if a.effect not in richer.effects:
+        if a.effect not in richer.effects and a.effect not in OWNERS:
             raise InputError(
                 "there is no such effect to have more of",
                 file=file,
                 field=f"effects.{a.effect}.{'more' if a.more else 'times'}",
                 value=True,
             )
-        if a.effect in model.effects or a.changes:
-            mine = np.arange(model.count(get(a.effect).family)) if a.entities is None else np.array(a.entities)
+        if a.effect in there or a.changes:
+            mine = np.arange(_count(a.effect, richer, out)) if a.entities is None else np.array(a.entities)
             for name, value in a.values.items():
-                bounds = get(a.effect).parameter(name).bounds
-                there = out[a.effect, name][mine]
-                new_value = there + value if a.more else there * value if a.times else value
+                bounds = _known(a.effect)[name].bounds
+                old = out[a.effect, name][mine]
+                new_value = old + value if a.more else old * value if a.times else value
                 out.set(a.effect, name, np.clip(new_value, *bounds), mine)
     return richer, out
+
+
+def _count(effect: str, model: Model, parameters: Parameters) -> int:
+    if effect in OWNERS:
+        return len(next(iter(parameters.of(effect).values())))
+    return model.count(get(effect).family)
 
 
 def _placed(a: Addition, model: Model, parameters: Parameters, file: Path | None) -> Addition:
     """The same with its entities by number."""
     if not a.at:
         return a
-    richer = model.with_effects(a.effect)
-    label = f"{a.effect}.{next(iter(a.values), get(a.effect).parameters[0].name)}[{a.at}]"
+    richer = model if a.effect in OWNERS else model.with_effects(a.effect)
+    label = f"{a.effect}.{next(iter(a.values), next(iter(_known(a.effect))))}[{a.at}]"
     found = located(label, richer, parameters.for_model(richer), file=file, field=f"effects.{a.effect}.at")
     return replace(a, entities=tuple(found.entities.tolist()), at="")
 
@@ -203,7 +228,7 @@ def of_channels(diagnosis: Diagnosis, settings: Settings) -> list[str]:
 
 
 def _of_channel(a: Addition) -> bool:
-    return get(a.effect).family == "measurement" and a.entities is not None
+    return a.effect in CATALOGUE and get(a.effect).family == "measurement" and a.entities is not None
 
 
 def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
@@ -278,7 +303,7 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
             lines.append(f"entities = {_toml(list(a.entities))}")
         lines += [f"{switch} = true" for switch in _SWITCHES if getattr(a, switch)]
         for name, value in a.values.items():
-            p = get(a.effect).parameter(name)
+            p = _known(a.effect)[name]
             lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")
         lines.append("")
     return write_text(path, "\n".join(lines))

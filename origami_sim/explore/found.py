@@ -13,7 +13,7 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
-from origami_sim.quantities import Quantity
+from origami_sim.quantities import ANY, Quantity, converted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory, simulate
 from origami_sim.solve.statics import Equilibrium, equilibrium
@@ -118,12 +118,44 @@ Measure = Callable[[Found], float]
 
 def angle(crease: int | str) -> Measure:
     """The measure that is the fold angle of a crease [rad]."""
-    return lambda found: found.angle(crease)
+    return _in("rad", lambda found: found.angle(crease))
 
 
 def moved(axis: str = "x") -> Measure:
     """The measure that is the way of the centre of mass along an axis [m]."""
-    return lambda found: found.moved(axis)
+    return _in("m", lambda found: found.moved(axis))
+
+
+def _in(unit: str, measure: Measure) -> Measure:
+    """A measure that knows its unit, so that a target of another kind is refused."""
+    measure.unit = unit  # pyright: ignore[reportFunctionMemberAccess]
+    return measure
+
+
+def unit_of(measure: Measure) -> str:
+    """SI unit of a measure; "SI" for any, where nobody stated it."""
+    return getattr(measure, "unit", ANY)
+
+
+def number(build: Build, value: Any, name: str) -> Any:
+    """A value of an argument of `build` in SI; words stay words, where the argument has one as its default.
+
+    Raises:
+        InputError: a quantity of another kind than the argument's default, true or false for a number.
+    """
+    try:
+        stated = inspect.signature(build).parameters.get(name)
+    except (TypeError, ValueError):  # built in
+        stated = None
+    default, unit = valued(stated.default) if stated is not None else (None, ANY)
+    if isinstance(default, float) and isinstance(value, (str, bool, np.bool_)):
+        return float(converted(value, unit, name))
+    if isinstance(value, str):
+        try:
+            return float(converted(value, ANY, name))
+        except InputError:
+            return value
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from scipy.optimize import brentq, least_squares, minimize
 from scipy.stats import qmc
 
 from origami_sim.errors import InputError
-from origami_sim.explore.found import Build, Found, Measure, Way, find
+from origami_sim.explore.found import Build, Found, Measure, Way, find, number, unit_of
 from origami_sim.explore.gradients import gradient
-from origami_sim.quantities import ANY, converted
+from origami_sim.quantities import converted
 
 Bounds = Mapping[str, tuple[float | str, float | str]]
 
@@ -70,11 +70,14 @@ def solve_for(
     Raises:
         InputError: bounds that are not an interval, as many targets as measures are not given.
     """
-    how, limits = way or Way(), _limits(bounds)
+    how, limits = way or Way(), _limits(build, bounds)
     every = [measure] if callable(measure) else list(measure)
-    wanted = [float(converted(t, ANY, "target")) for t in ([target] if np.ndim(target) == 0 else list(target))]  # pyright: ignore[reportArgumentType]
-    if len(every) != len(wanted):
-        raise InputError("measures and targets differ in number", field="target", value=len(wanted), allowed=len(every))
+    targets = [target] if isinstance(target, str) or np.ndim(target) == 0 else list(target)  # pyright: ignore[reportArgumentType]
+    if len(every) != len(targets):
+        raise InputError(
+            "measures and targets differ in number", field="target", value=len(targets), allowed=len(every)
+        )
+    wanted = [float(converted(t, unit_of(m), "target")) for m, t in zip(every, targets, strict=True)]
     if len(limits) == 1 and len(every) == 1:
         return _root(build, every[0], wanted[0], limits, fixed or {}, how, tolerance)
     tried: list[dict[str, float]] = []
@@ -102,9 +105,9 @@ def solve_for(
     return Solution(values, value, reached, message, last, tried)
 
 
-def _end(value: float | str | None, free: float) -> float:
+def _end(value: float | str | None, free: float, unit: str) -> float:
     """One end of what a measure may be [SI]; `free` where nothing is stated."""
-    return free if value is None else float(converted(value, ANY, "subject_to"))
+    return free if value is None else float(converted(value, unit, "subject_to"))
 
 
 def optimise(
@@ -133,9 +136,9 @@ def optimise(
     Raises:
         InputError: bounds that are not an interval, a sample in which no device is found.
     """
-    how, limits = way or Way(), _limits(bounds)
+    how, limits = way or Way(), _limits(build, bounds)
     low, width = _box(limits)
-    walls = [(m, _end(a, -np.inf), _end(b, np.inf)) for m, a, b in subject_to]
+    walls = [(m, _end(a, -np.inf, unit_of(m)), _end(b, np.inf, unit_of(m))) for m, a, b in subject_to]
     measures = [objective, *(m for m, _, _ in walls)]
     tried: list[dict[str, float]] = []
 
@@ -193,10 +196,10 @@ def optimise(
 # parts ----------------------------------------------------------------------------------------------------------------
 
 
-def _limits(bounds: Bounds) -> dict[str, tuple[float, float]]:
+def _limits(build: Build, bounds: Bounds) -> dict[str, tuple[float, float]]:
     out = {}
     for name, given in bounds.items():
-        low, high = (float(converted(v, ANY, name)) for v in given)
+        low, high = (float(number(build, v, name)) for v in given)
         if not low < high or not np.isfinite(high - low):
             raise InputError("bounds are an interval", field=name, value=given, allowed="(least, largest)")
         out[name] = (low, high)

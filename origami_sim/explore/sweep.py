@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.explore.found import TOGETHER, Build, Device, Measure, Way, at, found
-from origami_sim.quantities import ANY, converted
+from origami_sim.explore.found import TOGETHER, Build, Device, Measure, Way, at, found, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,7 +133,7 @@ def sweep(
     Raises:
         InputError: no points, no measures, points of different names, what `build` refuses.
     """
-    how, points = way or Way(), _points(grid)
+    how, points = way or Way(), _points(build, grid)
     if not measures:
         raise InputError("a sweep needs a measure", field="measures", allowed="{name: function of Found}")
     kept = _Kept(folder)
@@ -161,31 +160,23 @@ def sweep(
     return Sweep(columns, tuple(points[0]), tuple(measures), failures, len(todo))
 
 
-def _points(grid: Mapping[str, Sequence] | Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _points(build: Build, grid: Mapping[str, Sequence] | Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     if isinstance(grid, Mapping):
         count = prod(len(np.atleast_1d(np.asarray(given, object))) for given in grid.values())
         if count > MOST:
             raise InputError("a sweep of too many points", field="grid", value=count, allowed=f"up to {MOST}")
-        values = {n: [_plain(v, n) for v in np.atleast_1d(np.asarray(given, object))] for n, given in grid.items()}
+        values = {
+            n: [number(build, v, n) for v in np.atleast_1d(np.asarray(given, object))] for n, given in grid.items()
+        }
         points = [dict(zip(values, p, strict=True)) for p in product(*values.values())] if values else []
     else:
-        points = [{n: _plain(v, n) for n, v in p.items()} for p in grid]
+        points = [{n: number(build, v, n) for n, v in p.items()} for p in grid]
     if not points or not points[0]:
         raise InputError("a sweep needs points", field="grid", allowed="{name: [values]}, or a list of points")
     for p in points:
         if set(p) != set(points[0]):
             raise InputError("points state different numbers", field="grid", value=list(p), allowed=list(points[0]))
     return points
-
-
-def _plain(value: Any, name: str) -> Any:
-    """A number in SI; words that are no quantity stay words."""
-    if isinstance(value, str):
-        try:
-            return float(converted(value, ANY, name))
-        except InputError:
-            return value
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _measured(task: tuple[Build, list[dict[str, Any]], Mapping[str, Measure], Way]) -> list[dict[str, Any]]:

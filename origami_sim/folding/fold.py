@@ -126,6 +126,11 @@ class Folding:
         return sorted(found, key=lambda v: -v.bound)
 
     @property
+    def unordered(self) -> list[Vertex]:
+        """Vertices that close when they fold flat, but whose layers have no order: panels pass through each other."""
+        return [v for v in self.vertices if v.unordered and v.gap <= self.tolerance]
+
+    @property
     def curved(self) -> bool:
         """Whether sharply folded curves make up half of the vertices or more: no sheet folds these flat."""
         return 2 * sum(v.curved for v in self.vertices) > sum(bool(v.creases) for v in self.vertices)

@@ -36,7 +36,8 @@ def summarise(folding: Folding, thickness: float) -> Summary:
     missed = int(np.sum(errors > folding.tolerance))
     pairs = crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness)
     crossing = len(pairs)
-    reached = folding.reached and not crossing
+    unordered = folding.unordered
+    reached = folding.reached and not crossing and not unordered
     bends = np.abs(folding.angles[-1] - sheet.start)[len(sheet.mesh.creases) :]
     numbers = {
         "reached": float(reached),
@@ -66,6 +67,15 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         said.append(
             "A real sheet stops before these angles: its panels touch. Try: smaller angles for the creases around "
             "these panels (opacity in SVG, edges_foldAngle in FOLD)."
+        )
+    if folding.reached and unordered:
+        reason = reason or f"no order of layers at {_vertices(len(unordered))}"
+        x, y = 1e3 * sheet.mesh.vertices[unordered[0].node, :2]
+        said.append(
+            f"No order of layers at {_vertices(len(unordered))}, first at ({x:.1f}, {y:.1f}) mm: mountains less "
+            f"valleys are {unordered[0].excess} there, and 2 or -2 wherever sheets fold flat (Maekawa's theorem). Its "
+            "panels would pass through each other on the way. Try: a mountain in place of a valley there, or the other "
+            "way round; angles below 180 deg (opacity in SVG, edges_foldAngle in FOLD)."
         )
     if folding.snaps:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])

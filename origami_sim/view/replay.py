@@ -519,12 +519,12 @@ ROWS = 3
 """Plots above each other; further ones are tabs of the last. With four, an axis of a small window shows one number."""
 
 
-def _axis(plot: Plot, out: Writer) -> rrb.ScalarAxis:
-    """The vertical axis of a plot: from and to round numbers, so that more than one of them is shown."""
+def _axis(plot: Plot, out: Writer) -> rrb.ScalarAxis | None:
+    """The vertical axis of a plot: between round numbers, so that it shows more than one, or as the viewer likes."""
     found = [out.extents[p] for p in plot.paths if p in out.extents]
     low, high = min((a for a, _ in found), default=0.0), max((b for _, b in found), default=0.0)
     if not (np.isfinite(low) and np.isfinite(high)) or high - low <= 1e-9 * max(abs(low), abs(high)):
-        return rrb.ScalarAxis()
+        return None  # an empty one is a warning of the writer on standard error
     step = nice(0.35 * (high - low))
     return rrb.ScalarAxis(range=(step * np.floor(low / step), step * np.ceil(high / step)))
 

@@ -9,6 +9,7 @@ import pytest
 from origami_sim.diagnose.patch import additions, read_additions, switched_on, write_patch
 from origami_sim.diagnose.words import say
 from origami_sim.drive import Drive
+from origami_sim.entities import located
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
 from origami_sim.scene import read_calibration, scene_module, scene_settings
@@ -103,3 +104,29 @@ def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_mode
     assert [a.effect for a in again.effects] == ["crease_friction"]
     numbers["angle_offset.angle_offset"] = numbers.pop("angle_offset.angle_offset@1")  # of all channels
     assert [a.effect for a in additions(found, settings)] == ["crease_friction", "angle_offset"]  # type: ignore[arg-type]
+
+
+def test_numbers_of_bodies_are_patched_and_read_by_the_names_that_tables_show(tmp_path):
+    module = scene_module("pendulum_chain")
+    settings = scene_settings(module)
+    model, parameters, *_ = module.build(settings)
+    last = model.name("panel", model.panel_count - 1)
+    assert located(f"body.mass[{last}]", model, parameters).entities.tolist() == [model.panel_count - 1]
+    bare = replace(model, names={})
+    assert located("body.mass[panel 1]", bare, parameters).entities.tolist() == [1]
+    found = SimpleNamespace(
+        candidates=(), verdict="PARAMETER", sentence="", recordings=["swing"], changed=(),
+        patch={f"body.mass[{last}] (factor)": 1.2, "inertia.mass[0] (added)": 0.001},
+    )  # fmt: skip
+    path = write_patch(tmp_path / "patched.toml", settings, found, scene="pendulum_chain")
+    again = read_calibration(path)
+    _, changed = switched_on(again.effects, model, parameters)
+    assert changed["body", "mass"][-1, 0] == pytest.approx(1.2 * parameters["body", "mass"][-1, 0])
+    assert np.array_equal(changed["body", "mass"][:-1], parameters["body", "mass"][:-1])
+    assert changed["inertia", "mass"][0, 0] == pytest.approx(parameters["inertia", "mass"][0, 0] + 0.001)
+    with pytest.raises(InputError, match="can only be changed"):
+        read_additions({"body": {"mass": 0.1}}, tmp_path)
+    with pytest.raises(InputError, match="no such entity"):
+        switched_on(
+            read_additions({"body": {"mass": 2.0, "times": True, "entities": [9]}}, tmp_path), model, parameters
+        )

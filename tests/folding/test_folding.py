@@ -68,6 +68,27 @@ def test_a_map_folds_one_crease_after_the_other(tmp_path):
     assert np.degrees(both).max() > 175
 
 
+@pytest.mark.parametrize(("marks", "excess"), [("MMMM", 4), ("MVMV", 0), ("VVVV", -4), ("MMMV", None), ("VMVV", None)])
+def test_a_vertex_whose_layers_have_no_order_is_named(tmp_path, marks, excess):
+    """Half a turn up and down are one turn, so that angles alone let four mountains pass (Maekawa)."""
+    ends = [(1, 0), (2, 1), (1, 2), (0, 1)]
+    lines = [*frame(2, 2), *((m, 1, 1, *e) for m, e in zip(marks, ends, strict=True))]
+    folding = fold(read(drawn(tmp_path / "square.svg", lines)))
+    found = summarise(folding, 2e-4)
+    assert folding.reached and found.reached == (excess is None)
+    text = f"No order of layers at 1 vertex, first at (100.0, 100.0) mm: mountains less valleys are {excess} there"
+    assert (text in " ".join(found.sentences)) == (excess is not None)
+    if excess is not None:
+        assert found.reason == "no order of layers at 1 vertex"
+
+
+def test_layers_of_what_does_not_fold_flat_are_not_asked_for(tmp_path):
+    ends = [(1, 0), (2, 1), (1, 2), (0, 1)]
+    lines = [*frame(2, 2), *(("M", 1, 1, *e, 0.5) for e in ends)]
+    pattern = read(drawn(tmp_path / "square.svg", lines))
+    assert not any(v.unordered for v in vertices(Elastic(pattern)))
+
+
 def test_targets_that_contradict_each_other_are_said_to(tmp_path):
     """Three creases that fold flat never close (Maekawa): some crease stays 60 degrees off, wherever the sheet goes."""
     ends = [(0, 2), (-2, -2 / np.sqrt(3)), (2, -2 / np.sqrt(3))]
