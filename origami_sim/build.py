@@ -353,15 +353,17 @@ class Sheet(Grounds, Electrodes, Thick):
         return self
 
     @statement()
-    def fix(self, *, panels: Iterable[int] = (), nodes: Iterable[int] = (), axes: str = "xyz") -> "Sheet":
-        """Holds panels or nodes along the named axes.
+    def fix(
+        self, *, panels: Iterable[int] | None = None, nodes: Iterable[int] | None = None, axes: str = "xyz"
+    ) -> "Sheet":
+        """Holds panels or nodes along the named axes; lists may be empty.
 
         Raises:
-            InputError: no such panel, node or axis; nothing to hold.
+            InputError: no such panel, node or axis; neither panels nor nodes.
         """
-        panels, nodes = (list(v) if isinstance(v, Iterable) else [v] for v in (panels, nodes))
-        if not panels and not nodes:
+        if panels is None and nodes is None:
             raise InputError("nothing is held", field="panels, nodes", allowed="fix(panels=[0]), fix(nodes=[0, 1])")
+        panels, nodes = ([] if v is None else list(v) if isinstance(v, Iterable) else [v] for v in (panels, nodes))
         index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
         for a in axes:
             if a not in "xyz":
