@@ -234,6 +234,8 @@ def _settings(build: Callable, path: Path, own: Mapping[str, Any]) -> tuple[Sett
             raise InputError(
                 "this word has a meaning in calibrations", file=path, field=name, allowed="another name of the argument"
             )
+        if isinstance(p.default, int) and abs(p.default) > sys.float_info.max:
+            raise InputError("a default is too large", file=path, field=name, allowed="below 1e308")
         value, unit = valued(p.default)
         if value is not None:
             defaults[name] = p.default
@@ -247,17 +249,11 @@ def _settings(build: Callable, path: Path, own: Mapping[str, Any]) -> tuple[Sett
 
 
 def valued(default: Any) -> tuple[float | str | bool | None, str]:
-    """Value and SI unit of an argument's default; None for what no setting can be.
-
-    Raises:
-        InputError: an integer that is no float.
-    """
+    """Value and SI unit of an argument's default; None for what no setting can be."""
     if isinstance(default, bool):
         return default, ""
     if isinstance(default, Quantity):
         return float(default), default.unit
-    if isinstance(default, int) and abs(default) > sys.float_info.max:
-        raise InputError("a default is too large", value=f"about 2**{default.bit_length()}", allowed="below 2**1024")
     if isinstance(default, (int, float, np.number)):
         return float(default), "1" if isinstance(default, (int, np.integer)) else ANY
     if isinstance(default, str):

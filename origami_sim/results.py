@@ -486,7 +486,7 @@ def _read_states(file: Path, manifest: dict[str, Any]) -> Trajectory:
                 arrays.values[name] = data[name]
     except FileNotFoundError:
         raise InputError("is missing", file=file) from None
-    except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, zlib.error) as e:
+    except (OSError, ValueError, EOFError, KeyError, AttributeError, RuntimeError, zipfile.BadZipFile, zlib.error) as e:
         raise InputError(f"is damaged ({_first_line(e)})", file=file, field=arrays.current) from None
     try:
         return _trajectory(arrays, manifest)
@@ -494,7 +494,7 @@ def _read_states(file: Path, manifest: dict[str, Any]) -> Trajectory:
         if e.file is not None:
             raise
         raise InputError(f"does not fit this version: {e}", file=file) from None
-    except (TypeError, ValueError, IndexError, KeyError) as e:
+    except (TypeError, ValueError, LookupError, OverflowError) as e:
         raise InputError(f"does not fit its manifest ({_first_line(e)})", file=file) from None
 
 

@@ -144,7 +144,7 @@ def test_a_module_and_its_function(flap, monkeypatch, tmp_path):
         ("def build():\n    return 5\n", r"returns something else.*int"),
         ("def build(panels=3):\n    return 5\n", r"meaning in calibrations.*panels"),
         ("def build(gap):\n    return 5\n", r"needs a default.*gap"),
-        ("def build(gap=" + "9" * 400 + "):\n    return 5\n", r"a default is too large.*2\*\*1329"),
+        ("def build(gap=" + "9" * 400 + "):\n    return 5\n", r"a default is too large.*gap"),
         ("from origami_sim import *\ndef build():\n    return Sheet(strip([1], 1), thickness='1 mn')\n", r"wrong unit"),
     ],
 )

@@ -18,13 +18,15 @@ from origami_sim.sources import Source
 
 def columns_of(stated: Any) -> Iterator[str]:
     """Columns that `{ column = "..." }` names anywhere in what a sidecar states."""
-    if isinstance(stated, dict):
-        if isinstance(stated.get("column"), str):
-            yield stated["column"]
-        stated = list(stated.values())
-    if isinstance(stated, list):
-        for part in stated:
-            yield from columns_of(part)
+    left = [stated]
+    while left:  # a file may nest deeper than calls can
+        part = left.pop()
+        if isinstance(part, dict):
+            if isinstance(part.get("column"), str):
+                yield part["column"]
+            part = list(part.values())
+        if isinstance(part, list):
+            left += reversed(part)
 
 
 def placed_sources(stated: Any, table: Table, times: np.ndarray, path: Path) -> tuple[Source, ...]:
