@@ -18,6 +18,7 @@ from origami_sim.replay import COLOURS, TIMELINE, open_replay, read_series, scre
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.timestep import TimeStep
 from origami_sim.view.film import Film
+from origami_sim.view.replay import axis_numbers
 
 FRAMES, WORLDS, SIDE = 13, 2, 0.02
 FIELD, FREQUENCY = 0.06, 2.0
@@ -369,3 +370,10 @@ def test_screenshot_shows_the_sheet(file, tmp_path):
     assert view.std() > 10  # not blank
     assert share("passive") > 0.01
     assert share("magnet") > 0.01
+
+
+@pytest.mark.parametrize(
+    "ends, numbers", [((-25.0, 100.0), 1), ((-31.25, 106.25), 2), ((-2.0, 8.0), 9), ((0.0, 5.0), 4)]
+)
+def test_numbers_at_an_axis_are_counted_as_the_viewer_writes_them(ends, numbers):
+    assert axis_numbers(*ends) == numbers

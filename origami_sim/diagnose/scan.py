@@ -15,11 +15,15 @@ from origami_sim.fit.weights import Weights
 DOUBTED = 0.01
 """Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed.
 
-It only decides where fits begin. Of a crawler whose crease friction holds, numbers were 10 and 21 deviations off.
+It only decides where fits begin: half, double and fifty times as much change nothing in four swings. Of a crawler whose
+crease friction holds, numbers were 10 and 21 deviations off.
 """
 
 GRID = np.geomspace(1.0, 1e3, 7)
-"""Strengths of an effect that are tried, in the unit in which it is screened: what first shows, up to what blocks."""
+"""Strengths of an effect that are tried, in the unit in which it is screened: what first shows, up to what blocks.
+
+The friction of that crawler is found alike with 13; with 4, ten times apart, it is not.
+"""
 
 
 def strained(f: Fit) -> bool:

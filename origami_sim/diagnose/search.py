@@ -5,7 +5,7 @@ largest posterior that has not been fitted is fitted next, until what has not be
 judged by the linearisation that is nearest to it: its own, if it was fitted.
 
 Half and double of UNFITTED, LEADING and OWED change no word on four swings (two rub, one stiffens, one lacks nothing),
-and no probability by more than 0.03.
+and no probability by more than 0.011.
 """
 
 from collections.abc import Callable, Sequence
@@ -58,9 +58,6 @@ TIGHT = 1e-3
 
 Key = frozenset[int]
 
-POLISHED = frozenset((-1,))
-"""Where `Posterior.gains` has what sets gained that were fitted on."""
-
 
 @dataclass(eq=False)
 class Node:
@@ -71,6 +68,7 @@ class Node:
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
         grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
             problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
+        alone: log posterior of single effects in its place, as it judges them.
     """
 
     key: Key
@@ -82,6 +80,7 @@ class Node:
     foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
     wide: bool = False
+    alone: dict[Key, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +105,11 @@ class Posterior:
             posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
             was not possible.
         ranked: what single effects promise the model without any, best first. hoped: what sets that were fitted had
-            promised, by their labels. gains: by how much they were better, by the fit that the promise is about, and
-            what leaders gained that were fitted on, by POLISHED.
+            promised, by their labels. gains: by how much they were better, by the fit that the promise is about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
-        renewed: sets that were fitted again, from a fit of a larger one. polished: that are judged by derivatives of
-            the place where their fit ended.
+        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
+            were fitted on.
     """
 
     signatures: list[Signature]
@@ -128,7 +126,7 @@ class Posterior:
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
-    polished: set[Key] = field(default_factory=set)
+    polished: dict[Key, float] = field(default_factory=dict)
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
@@ -223,7 +221,9 @@ def _promise(out: Posterior, key: Key) -> float:
 
 
 def _most(gains: Sequence[float]) -> float:
-    """What the next set may gain over its promise at most, if it is like those before (but for UNFITTED)."""
+    """What the next set may gain over its promise at most, if it is like those before (but for UNFITTED); 0 if none."""
+    if not gains:
+        return 0.0
     off = np.array(gains if len(gains) > 1 else [0.0, *gains])
     doubt = np.sqrt(1.0 + 1.0 / len(off)) * np.std(off, ddof=1)
     return float(np.mean(off) + student.ppf(1.0 - UNFITTED, len(off) - 1) * doubt)
@@ -232,15 +232,19 @@ def _most(gains: Sequence[float]) -> float:
 def _alone(out: Posterior) -> Key | None:
     """A single effect to fit that may be best, if it is better than it promised by as much as other sets were.
 
-    About a model that is far from what was recorded what is linear promises too little, or too much. Of an effect that
-    was fitted alone, or is in the best set, there is no need to know more.
+    About a model that is far from what was recorded what is linear promises too little, or too much; about a fit that
+    leaves white noise it tells which effects could stand in its place. Of an effect that was fitted alone, or is in the
+    best set, there is no need to know more.
     """
-    gains = out.gains.get(frozenset(), [])
     best = max(out.total, key=lambda k: out.total[k])
-    least = out.total[best] + np.log(UNFITTED) - (_most(gains) if gains else 0.0)
+    near, bonus = out.total[best] + np.log(UNFITTED), _most(out.gains.get(frozenset(), []))
+    leader = out.nodes.get(best)
+    white = leader is not None and leader.fit.weights is not None and not leader.fit.weights.colour
+    instead = leader.alone if leader is not None and white else {}
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
-    singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise >= least][:LEADING]
-    return next((k for k in singles if not known & {out.suspect(n).effect for n in k}), None)
+    singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise + bonus >= near][:LEADING]
+    likely = (k for k in singles if instead.get(k, np.inf) >= near)
+    return next((k for k in likely if not known & {out.suspect(n).effect for n in k}), None)
 
 
 def polished(out: Posterior, forward: Predictor) -> bool:
@@ -251,13 +255,13 @@ def polished(out: Posterior, forward: Predictor) -> bool:
     prior, some = log_priors(out.signatures), False
     while True:
         best = max(out.total[k] for k in out.nodes)
-        gains = out.gains.get(POLISHED, [])
-        least = best + np.log(UNFITTED) - (max(0.0, _most(gains)) if gains else 0.0)
+        gains = list(out.polished.values())
+        least = best + np.log(UNFITTED) - max(0.0, _most(gains))
         leaders = [k for k in out.nodes if out.total[k] >= least and k not in out.polished]
         if not leaders:
             return some
         key, some = max(leaders, key=lambda k: out.total[k]), True
-        out.polished.add(key)
+        out.polished[key] = 0.0
         before, f = out.total[key], out.nodes[key].fit
         f = renewed(forward, f.reweighted(tight(f)))
         if f.cost - promised(forward, f) >= OWED:
@@ -265,7 +269,7 @@ def polished(out: Posterior, forward: Predictor) -> bool:
             f = f if f.failed or f.exact else renewed(forward, f)
         if not f.failed:
             _add(out, forward, key, f, prior)
-            out.gains.setdefault(POLISHED, []).append(out.total[key] - before)
+            out.polished[key] = out.total[key] - before
 
 
 def tight(f: Fit) -> Weights:
@@ -345,8 +349,8 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     singles = _judge(out, node, more, prior, cells, foresee=True)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
     if not key:
-        alone = [frozenset((node.others[n - len(own)],)) for n in ranked]
-        out.ranked = {k: out.promise[k] for k in alone if k in out.promise}
+        alone = {k: out.promise[k] for n in node.others if (k := frozenset((n,))) in out.promise}
+        out.ranked = dict(sorted(alone.items(), key=lambda item: -item[1]))
     pairs = []
     for a, one in enumerate(ranked[:LEADING]):
         first = frozenset((node.others[one - len(own)],))
@@ -416,6 +420,8 @@ def _judge(
         for n in np.argsort(-rank)[:LEADING]:
             promise[n] = total + log_prior[n] + node.foresight.gain([node.groups[g] for g in sets[n]], out.hyper)
     for n, key in enumerate(keys):
+        if len(key) == 1:
+            node.alone[key] = totals[n]
         if key in out.nodes and key and key < node.key and key not in out.renewed:
             if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
                 out.renewed.add(key)

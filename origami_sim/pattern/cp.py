@@ -2,16 +2,13 @@
 
 import math
 
-import numpy as np
-
 from ..errors import InputError
 from ..files import read_bytes
 from .crease_pattern import Pattern
-from .drawn import drawn_pattern
+from .drawn import listed_pattern
 
-LETTERS = {"1": "B", "2": "M", "3": "V"}
-AUXILIARY = ("0", "4")
-"""Lines of construction, which are no creases."""
+LETTERS = {"0": None, "1": "B", "2": "M", "3": "V", "4": None}
+"""Types of lines; None: auxiliary."""
 
 
 def read_cp(path, *, size=None, scale=None, merge_tolerance=None) -> Pattern:
@@ -32,13 +29,13 @@ def read_cp(path, *, size=None, scale=None, merge_tolerance=None) -> Pattern:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError("is no text", file=path, allowed="lines of 'type x1 y1 x2 y2'") from None
-    segments, strokes, auxiliary = [], [], 0
+    lines = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words:
             continue
         ends = [_number(w) for w in words[1:]]
-        if len(words) != 5 or words[0] not in (*LETTERS, *AUXILIARY) or not all(math.isfinite(x) for x in ends):
+        if len(words) != 5 or words[0] not in LETTERS or not all(math.isfinite(x) for x in ends):
             raise InputError(
                 "is no line of a crease pattern",
                 file=path,
@@ -46,18 +43,9 @@ def read_cp(path, *, size=None, scale=None, merge_tolerance=None) -> Pattern:
                 value=line.strip(),
                 allowed="type x1 y1 x2 y2 with type 1 (border), 2 (mountain), 3 (valley) or 4 (auxiliary)",
             )
-        if words[0] in AUXILIARY:
-            auxiliary += 1
-            continue
-        segments.append(ends)
-        strokes.append((LETTERS[words[0]], 1.0))
-    if not segments:
-        raise InputError("has no border, mountain or valley", file=path, allowed="lines of type 1, 2 or 3")
-    notes = [f"{auxiliary} auxiliary lines were left out."] if auxiliary else []
-    lines = np.array(segments).reshape(-1, 2, 2)
-    return drawn_pattern(
-        lines, strokes, size=size, scale=scale, merge_tolerance=merge_tolerance, notes=notes, file=path
-    )
+        lines.append((LETTERS[words[0]], ends))
+    limits = {"size": size, "scale": scale, "merge_tolerance": merge_tolerance}
+    return listed_pattern(lines, allowed="lines of type 1, 2 or 3", file=path, **limits)
 
 
 def _number(word: str) -> float:

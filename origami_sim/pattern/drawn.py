@@ -19,6 +19,31 @@ PRIORITY = "BCMVFU"
 MAX_SEGMENTS = 20_000
 
 
+def listed_pattern(lines, *, allowed, size=None, scale=None, merge_tolerance=None, file=None) -> Pattern:
+    """Return the pattern of a list of lines that fold by 180 degrees.
+
+    Args:
+        lines: pairs of assignment letter, or None for an auxiliary line, which is left out, and (x0, y0, x1, y1).
+        allowed: what else the file could hold, if it holds no crease. The rest as for `drawn_pattern`.
+
+    Raises:
+        InputError: no crease; what `drawn_pattern` refuses.
+    """
+    kept = [(letter, ends) for letter, ends in lines if letter is not None]
+    if not kept:
+        raise InputError("has no border, mountain or valley", file=file, allowed=allowed)
+    auxiliary = len(lines) - len(kept)
+    return drawn_pattern(
+        np.array([ends for _, ends in kept]).reshape(-1, 2, 2),
+        [(letter, 1.0) for letter, _ in kept],
+        size=size,
+        scale=scale,
+        merge_tolerance=merge_tolerance,
+        notes=[f"{auxiliary} auxiliary lines were left out."] if auxiliary else [],
+        file=file,
+    )
+
+
 def drawn_pattern(
     segments, strokes, *, size=None, scale=None, stated=None, merge_tolerance=None, notes, file=None
 ) -> Pattern:

@@ -17,7 +17,7 @@ from ..files import read_bytes
 from .crease_pattern import Pattern
 from .drawn import drawn_pattern
 from .svg import FLATNESS
-from .svg_drawing import letter_of
+from .svg_drawing import MAX_CHORDS, letter_of
 
 LAYERS = (("mountain", "M"), ("valley", "V"), ("border", "B"), ("boundary", "B"), ("outline", "B"), ("cut", "C"),
           ("facet", "F"))  # fmt: skip
@@ -28,8 +28,6 @@ BASIC = {1: (255, 0, 0), 2: (255, 255, 0), 3: (0, 255, 0), 4: (0, 255, 255), 5: 
 UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}
 """Metres of the units that `$INSUNITS` states."""
 BY_LAYER = 256
-MAX_CHORDS = 500
-"""Chords of one arc, as in `svg_drawing`."""
 
 
 def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLATNESS) -> Pattern:

@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
-
 from ..errors import InputError
 from ..files import read_bytes
 from .crease_pattern import Pattern
-from .drawn import drawn_pattern
+from .drawn import listed_pattern
 from .svg_drawing import parse_xml
 
 LETTERS = {0: None, 1: "B", 2: "M", 3: "V"}
@@ -29,27 +27,16 @@ def read_opx(path, *, size=None, scale=None, merge_tolerance=None) -> Pattern:
         InputError: malformed XML, an entity, a line without numbers, or what `drawn.drawn_pattern` refuses.
     """
     root = parse_xml(read_bytes(path), file=path)
-    segments, strokes, auxiliary = [], [], 0
-    lines = [e for e in root.iter("object") if str(e.get("class", "")).rpartition(".")[2] == "OriLineProxy"]
-    for number, line in enumerate(lines):
-        kind, *ends = (_property(line, name, f"line {number}", path) for name in ("type", "x0", "y0", "x1", "y1"))
+    lines, beans = [], [e for e in root.iter("object") if str(e.get("class", "")).rpartition(".")[2] == "OriLineProxy"]
+    for number, bean in enumerate(beans):
+        kind, *ends = (_property(bean, name, f"line {number}", path) for name in ("type", "x0", "y0", "x1", "y1"))
         if kind not in LETTERS:
             raise InputError(
                 "unknown type of line", file=path, field=f"line {number}", value=kind, allowed="0, 1, 2 or 3"
             )
-        letter = LETTERS[int(kind)]
-        if letter is None:
-            auxiliary += 1
-            continue
-        segments.append(ends)
-        strokes.append((letter, 1.0))
-    if not segments:
-        raise InputError("has no border, mountain or valley", file=path, allowed="lines that ORIPA has drawn")
-    notes = [f"{auxiliary} auxiliary lines were left out."] if auxiliary else []
-    drawn = np.array(segments).reshape(-1, 2, 2)
-    return drawn_pattern(
-        drawn, strokes, size=size, scale=scale, merge_tolerance=merge_tolerance, notes=notes, file=path
-    )
+        lines.append((LETTERS[int(kind)], ends))
+    limits = {"size": size, "scale": scale, "merge_tolerance": merge_tolerance}
+    return listed_pattern(lines, allowed="lines that ORIPA has drawn", file=path, **limits)
 
 
 def _property(bean, name, field, path) -> float:

@@ -526,7 +526,15 @@ def _axis(plot: Plot, out: Writer) -> rrb.ScalarAxis | None:
     if not (np.isfinite(low) and np.isfinite(high)) or high - low <= 1e-9 * max(abs(low), abs(high)):
         return None  # an empty one is a warning of the writer on standard error
     step = nice(0.35 * (high - low))
-    return rrb.ScalarAxis(range=(step * np.floor(low / step), step * np.ceil(high / step)))
+    low, high = float(step * np.floor(low / step)), float(step * np.ceil(high / step))
+    edge = 0.05 * (high - low)
+    return rrb.ScalarAxis(range=(low, high) if axis_numbers(low, high) > 1 else (low - edge, high + edge))
+
+
+def axis_numbers(low: float, high: float) -> int:
+    """How many numbers the viewer writes at an axis: at the powers of ten that part it by ten at most, off its ends."""
+    power = 10.0 ** (np.ceil(np.log10(high - low) - 1e-9) - 1.0)
+    return int(np.ceil(high / power - 1e-9) - np.floor(low / power + 1e-9)) - 1
 
 
 def _blueprint(scene: Film, out: Writer) -> rrb.Blueprint:
