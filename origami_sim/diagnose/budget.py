@@ -6,10 +6,12 @@ from math import factorial
 
 import numpy as np
 
-from origami_sim.diagnose.nominal import GAP
+from origami_sim.diagnose.words import pooled
+from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
 
 
@@ -27,13 +29,44 @@ class Share:
     share: float
 
 
-def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> list[Share]:
+@dataclass(frozen=True)
+class Budget:
+    """Where the mismatch goes.
+
+    Attributes:
+        shares: add up to one; none if nothing is missed. over: error that is left, over the recorder's noise (root mean
+            square over the components).
+    """
+
+    shares: list[Share]
+    over: float
+
+    @property
+    def named(self) -> float:
+        """What effects explain, of device or recorder."""
+        return sum(s.share for s in self.shares if s.kind in ("effect", "measurement"))
+
+    @property
+    def numbers(self) -> float:
+        return sum(s.share for s in self.shares if s.kind == "numbers")
+
+    @property
+    def rest(self) -> float:
+        """What is real and not named."""
+        return sum(s.share for s in self.shares if s.kind == "rest")
+
+
+def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
     What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
-    all numbers refitted. Before is the better of the model as given and refitted.
+    all numbers refitted. Noise is what is left beside the best explanation once forces that are missing are allowed for,
+    up to what the recorder shows; the budget allows for none.
     """
-    noise = Weights(forward.blocks[0].noise, gap=GAP)
+    assert best.weights is not None
+    recorder = recorder_noise(forward, best)
+    level, over = np.minimum(best.weights.deviation, recorder), pooled(best.rms() / recorder)
+    noise = Weights(level, best.weights.colour, HYPER.gaps[0])
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
     def missed(f: Fit) -> float:
@@ -45,14 +78,14 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> list[Share]:
     numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
     total = numbers + gain + rest
     if total <= 0.0:
-        return []
+        return Budget([], over)
     out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
     suspects = best.hypothesis.suspects
     parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
     for s, part in zip(suspects, parts, strict=True):
         out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", gain * part / total))
     out.append(Share("not named", "rest", rest / total))
-    return [Share(s.name, s.kind, float(s.share)) for s in out]
+    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over)
 
 
 def _parts(f: Fit, noise: Weights) -> np.ndarray:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.diagnose.budget import Share, budget
+from origami_sim.diagnose.budget import Budget, Share, budget
 from origami_sim.diagnose.screen import Signature
 from origami_sim.diagnose.search import Key, Node, Posterior, enter, log_priors, place
 from origami_sim.diagnose.verdict import COMPARED, best_of, decide, unnamed_verdict
@@ -76,7 +76,7 @@ class Stored:
         suspects: of the search, with sides and whether they can be tested. gaps: sizes that were stored.
         nodes: of each fitted set: members in order, groups, other suspects, problems by gap (where segments are not
             tied: one for all). wide: those by which sets that add to them were judged.
-        failed: sets that could not be fitted. shares: budget of each fitted set.
+        failed: sets that could not be fitted. budgets: of each fitted set.
         quiet: the verdict if nothing is named. compared: share of the frames.
     """
 
@@ -84,7 +84,7 @@ class Stored:
     gaps: tuple[float, ...]
     nodes: dict[Key, tuple[list[int], list[Group], list[int], dict[float, Reduced]]]
     failed: list[Key]
-    shares: dict[Key, list[Share]]
+    budgets: dict[Key, Budget]
     quiet: str
     compared: float
     wide: frozenset[Key]
@@ -151,11 +151,11 @@ class Stored:
 
     def decided(self, p: Posterior) -> dict[str, Any]:
         """Verdict, labels that are chosen and probability, as `verdict.judge` has them before it writes sentences."""
-        d = decide(p, self.shares.__getitem__)
+        d = decide(p, self.budgets.__getitem__)
         word, probability, chosen = d.word, None if np.isnan(d.probability) else d.probability, []
         if not d.lead and word != "UNTESTABLE":
-            word = "UNKNOWN" if word == "UNKNOWN" or self.quiet == "UNKNOWN" else self.quiet
-            word = "UNTESTABLE" if word != "UNKNOWN" and self.compared < COMPARED else word
+            quiet = "UNTESTABLE" if self.compared < COMPARED else self.quiet
+            word = word or quiet
             probability = None if word == "UNKNOWN" else probability
         elif word == "UNKNOWN":
             chosen = [p.label(d.best)]
@@ -171,7 +171,8 @@ class Stored:
         arrays: dict[str, np.ndarray] = {}
         nodes = []
         for n, (key, (members, groups, others, problems)) in enumerate(self.nodes.items()):
-            shares = [[s.name, s.kind, s.share] for s in self.shares[key]]
+            mismatch = self.budgets[key]
+            shares = [[s.name, s.kind, s.share] for s in mismatch.shares]
             told = [
                 [list(g.columns), g.strengths, g.at.tolist(), g.side]
                 + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), [g.usual])]
@@ -179,7 +180,7 @@ class Stored:
             ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
-                | {"wide": key in self.wide}
+                | {"wide": key in self.wide, "over": mismatch.over}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))
@@ -216,7 +217,7 @@ class Stored:
                 arrays = {k: data[k] for k in data.files}
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"is no stored search ({error})", file=path) from None
-        nodes, shares = {}, {}
+        nodes, budgets = {}, {}
         for n, node in enumerate(about["nodes"]):
             key = frozenset(node["members"])
             groups = [
@@ -241,11 +242,11 @@ class Stored:
                 size, constant = arrays[f"{n}.{k}.size"], float(arrays[f"{n}.{k}.constant"])
                 problems[float(gap)] = Reduced(gram, cross, size, constant)
             nodes[key] = list(node["members"]), groups, list(node["others"]), problems
-            shares[key] = [Share(*s) for s in node["shares"]]
+            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"])
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
         wide = frozenset(frozenset(n["members"]) for n in about["nodes"] if n["wide"])
-        return cls(suspects, tuple(about["gaps"]), nodes, failed, shares, about["quiet"], about["compared"], wide)
+        return cls(suspects, tuple(about["gaps"]), nodes, failed, budgets, about["quiet"], about["compared"], wide)
 
 
 def _wide(values: Sequence[float | None], none: float = np.inf) -> np.ndarray:

@@ -1,11 +1,11 @@
 """The verdict: sums over the posterior, put into words."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from origami_sim.diagnose.budget import Share, budget
+from origami_sim.diagnose.budget import Budget, Share, budget
 from origami_sim.diagnose.implied import OwnColumns
 from origami_sim.diagnose.search import Key, Node, Posterior
 from origami_sim.diagnose.words import distinct, joined, pooled, said, say, title
@@ -23,11 +23,8 @@ ALONE = 0.8
 LISTED = 3
 """Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time."""
 
-MOSTLY = 0.5
-"""Share of the mismatch that has to be named, or else what is left is the news."""
-
 FAR = 2.0
-"""Error over the noise of the recorder from which a model that is refitted is not adequate, whatever is more probable.
+"""Error over the noise of the recorder from which something real is left, whatever is more probable.
 
 Of ten objects with nothing missing it is 0.96 to 1.14, also with trackers that average over frames.
 """
@@ -74,11 +71,11 @@ class Decision:
     probability: float
 
 
-def decide(p: Posterior, shares: Callable[[Key], Sequence[Share]]) -> Decision:
+def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     """The verdict on a posterior over sets of effects.
 
     Args:
-        shares: the budget of a fitted set.
+        budgets: the budget of a fitted set.
     """
     chance = p.probabilities()
     classes = by_effects(p, chance)
@@ -92,10 +89,8 @@ def decide(p: Posterior, shares: Callable[[Key], Sequence[Share]]) -> Decision:
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    budgeted = shares(best)
-    rest = sum(s.share for s in budgeted if s.kind == "rest")
-    named = sum(s.share for s in budgeted if s.kind in ("effect", "measurement"))
-    if rest > MOSTLY and rest > named and np.sum(p.cells(best)[~p.hyper.clean]) > MOSTLY:
+    left = budgets(best)
+    if left.rest > left.named and (left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE):
         return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])
@@ -112,10 +107,12 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     Args:
         given, base: the model as given, and refitted. compared: share of the frames that were compared.
     """
-    shares: dict[Key, list[Share]] = {}
+    budgets: dict[Key, Budget] = {}
 
-    def budgeted(key: Key) -> list[Share]:
-        return shares.setdefault(key, budget(forward, given, base, p.nodes[key].fit))
+    def budgeted(key: Key) -> Budget:
+        if key not in budgets:
+            budgets[key] = budget(forward, given, base, p.nodes[key].fit)
+        return budgets[key]
 
     d = decide(p, budgeted)
     chance = p.probabilities()
@@ -124,7 +121,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if class_of(p, k) != d.lead]
-    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best)}
+    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares}
     suspects = shown.hypothesis.suspects
     chosen = [s.label for s in suspects]
     if d.word == "UNTESTABLE":
@@ -172,9 +169,11 @@ def unnamed_verdict(
         unknown: whether a discrepancy is real that the refitted model leaves.
     """
     over = pooled(base.rms() / recorder_noise(forward, base))
-    if over > FAR or unknown:
-        text = f"The refitted model misses the recordings by {over:.2f} times the noise, and nothing in the catalogue "
-        return "UNKNOWN", f"{text}explains it.", []
+    if unknown:
+        text = f"The refitted model misses the recordings by {over:.2f} times the noise"
+        if over < FAR:
+            text = "The refitted model follows the recordings only if forces that it lacks act on the device"
+        return "UNKNOWN", f"{text}, and nothing in the catalogue explains it.", []
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
         return "UNTESTABLE", text, []
@@ -306,14 +305,11 @@ def deviations(node: Node, p: Posterior) -> np.ndarray:
     return out
 
 
-def _explained(shares: Sequence[Share]) -> str:
-    named = sum(s.share for s in shares if s.kind in ("effect", "measurement"))
-    numbers = sum(s.share for s in shares if s.kind == "numbers")
-    rest = sum(s.share for s in shares if s.kind == "rest")
-    text = f"explains {named:.0%} of the mismatch"
-    if numbers >= 0.005:
-        text += f", numbers of the model {numbers:.0%}"
-    return text + (f"; {rest:.0%} is real and not named" if rest >= 0.005 else "")
+def _explained(b: Budget) -> str:
+    text = f"explains {b.named:.0%} of the mismatch"
+    if b.numbers >= 0.005:
+        text += f", numbers of the model {b.numbers:.0%}"
+    return text + (f"; {b.rest:.0%} is real and not named" if b.rest >= 0.005 else "")
 
 
 def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from origami_proof import command, rejudge
-from origami_sim.diagnose.budget import Share
+from origami_sim.diagnose.budget import Budget, Share
 from origami_sim.diagnose.stored import Reduced, Stored
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, problem
@@ -29,7 +29,7 @@ def stored(strengths, seed: int = 0, rows: int = 200) -> Stored:
     shapes = np.linalg.qr(rng.normal(size=(rows, len(EFFECTS))))[0]
     waves = np.cos(np.pi * np.outer(np.arange(rows) / rows, np.arange(4)))
     y = shapes @ np.asarray(strengths, float) + rng.normal(size=rows)
-    nodes, shares = {}, {}
+    nodes, budgets = {}, {}
     for own in ([], *([n] for n in np.flatnonzero(strengths).tolist())):
         others = [n for n in range(len(EFFECTS)) if n not in own]
         at = {n: float(shapes[:, n] @ y) for n in own}
@@ -40,9 +40,11 @@ def stored(strengths, seed: int = 0, rows: int = 200) -> Stored:
             Group((k,), 1, np.full(1, at.get(n, 0.0)), 0, np.full(1, np.inf)) for k, n in enumerate([*own, *others])
         ]
         nodes[frozenset(own)] = own, groups, others, {HYPER.gaps[0]: Reduced.of(whole)}
-        shares[frozenset(own)] = [Share("not named", "rest", 0.1 if own else 1.0)]
+        budgets[frozenset(own)] = Budget(
+            [Share("effects", "effect", 0.9 if own else 0.0), Share("not named", "rest", 0.1)], 1.0
+        )
     every = [(suspect(e), 0, "") for e in EFFECTS]
-    return Stored(every, HYPER.gaps, nodes, [], shares, "ADEQUATE", 1.0, frozenset(nodes))
+    return Stored(every, HYPER.gaps, nodes, [], budgets, "ADEQUATE", 1.0, frozenset(nodes))
 
 
 def answer(kind: str, names: list[str], d: float = 0.0, **more) -> dict:
