@@ -41,6 +41,9 @@ FASTEST = 3.0
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
 
+FINER = 20
+"""Simulated frames for each recorded one, at most, where these come at uneven times: it bounds memory."""
+
 FILMED = 64e6
 """Bytes of positions that are kept before they are read; more would not be faster."""
 
@@ -199,7 +202,7 @@ class Rollouts(Worlds, ABC):
         worlds, local = worlds[part], None if local is None else local[part]
         k, count = len(worlds), len(blocks)
         model, times = worlds[0][0], blocks[0].times
-        step = float(np.median(np.diff(recording.times)))
+        step = film_step(recording.times)
         ends = round(blocks[0].lasting / step)
         if ends:  # the next block begins at a frame of the film
             step = blocks[0].lasting / ends
@@ -233,7 +236,7 @@ class Rollouts(Worlds, ABC):
             parameters = Parameters.join([p for _, p in worlds], repeat=count)
             rested = self.start != "fit"
             values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
-        elif np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+        elif len(times) <= len(grid) and np.allclose(times, grid[: len(times)], atol=1e-6 * step):
             values = plain[: len(times)]
         else:
             values = spline(grid, plain)(times)
@@ -428,6 +431,18 @@ def carried(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:
     v = (q2 - q0) / (2 * step) - j * step**2 / 6
     shift = q1 + longer * (v + longer * (a / 2 + longer * j / 6))
     return np.concatenate([shift, v1 + longer * (a + longer * j / 2)])
+
+
+def film_step(times: np.ndarray) -> float:
+    """Time between simulated frames [s]: as recorded, or as close as the closest where frames do not lie on a grid.
+
+    At most FINER times as many as were recorded.
+    """
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    if np.all(np.abs(steps / usual - np.round(steps / usual)) < 0.1):
+        return usual
+    return max(float(steps.min()), float(times[-1] - times[0]) / (FINER * len(times)))
 
 
 def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):

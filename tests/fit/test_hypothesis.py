@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from origami_sim.fit.hypothesis import Hypothesis, distinct_sites, suspects, told_apart
 from origami_sim.fit.rigid import RigidRollouts
@@ -99,3 +100,27 @@ def test_a_segments_memory_does_not_depend_on_which_others_are_asked_for(forward
     fresh = RigidRollouts(subject(3), [forward.recordings[0].window(2.5, 3.0)], segment=0.5)
     last = fresh.predict(mullins, [theta])[0][0]
     assert np.abs(whole[-1][0][: len(last)] - last[: len(whole[-1][0])]).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        np.concatenate(
+            [[0], np.arange(1, 40, 3), np.arange(40, 60), np.arange(60, 120, 7)]
+        ),  # the median step is short
+        np.concatenate([np.arange(0, 100, 10), np.arange(100, 104)]),  # and long, with frames close together at the end
+    ],
+)
+def test_frames_at_uneven_times_are_predicted_as_those_of_an_even_film(kept):
+    whole = record(panels=2, duration=2.0, rate=60)
+    late = np.where(np.arange(len(kept)) % 2, 0.004, 0.0)  # off any grid
+    channels = {n: replace(c, values=c.values[kept]) for n, c in whole.channels.items()}
+    some = replace(whole, times=whole.times[kept] + late, channels=channels)
+    dense = replace(whole, times=whole.times)
+    even, uneven = (RigidRollouts(subject(2), [r], tied=False) for r in (dense, some))
+    start = even.blocks[0]
+    uneven.blocks = [replace(b, pose=start.pose, rates=start.rates) for b in uneven.blocks]
+    at = np.array([[f.start for f in even.subject.nominals]])
+    (film,), (found,) = (f.predict(Hypothesis(), at, np.zeros((1, 1, f.local))) for f in (even, uneven))
+    smooth = CubicSpline(whole.times, film[0])(some.times)
+    np.testing.assert_allclose(found[0], smooth, atol=2e-4 * np.ptp(film))

@@ -74,6 +74,10 @@ def test_unsorted_rows_are_told_from_a_clock_that_starts_again():
     mixed[[50, 51]] = mixed[[51, 50]]
     with pytest.raises(InputError, match=r"runs backwards from 0\.425 s at row 52: the rows are not sorted \(1 of 399"):
         lint(mixed, markers(track(0)))
+    twice = TIMES.copy()
+    twice[51] = twice[50] * (1 + 1e-15)  # a point of a printed diagram, read twice
+    with pytest.raises(InputError, match="the time is repeated at row 52"):
+        lint(twice, markers(track(0)))
     again = np.concatenate([TIMES[:200], TIMES[:200]])
     with pytest.raises(InputError, match=r"runs backwards from 1\.65833333 s at row 201 \("):
         lint(again, markers(track(0)))
