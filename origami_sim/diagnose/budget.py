@@ -60,8 +60,8 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
     What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
-    all numbers refitted. Noise is what is left beside the best explanation once forces that are missing are allowed for,
-    up to what the recorder shows; the budget allows for none.
+    all numbers refitted. Noise is what the best explanation leaves once forces that are missing are allowed for, up to
+    what the recorder shows; the budget allows for none.
     """
     assert best.weights is not None
     recorder = recorder_noise(forward, best)

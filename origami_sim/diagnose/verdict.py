@@ -314,15 +314,15 @@ def _explained(b: Budget) -> str:
 
 def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:
     """Where else the same effects may act, in words."""
-    labels = {p.suspect(n).label for n in best}
-    others: dict[str, float] = {}
+    where: dict[str, float] = {}
     for key, value in chance.items():
-        if class_of(p, key) == lead and {p.suspect(n).label for n in key} != labels:
-            name = p.label(key)
-            others[name] = others.get(name, 0.0) + value
-    total = sum(v for k, v in chance.items() if class_of(p, k) == lead)
-    likely = [n for n, v in others.items() if v > (1.0 - CREDIBLE) * total]
-    return f" (or {joined(sorted(likely)[:3])})" if likely else ""
+        if class_of(p, key) >= lead:
+            name = joined(sorted({p.suspect(n).label for n in key if p.suspect(n).effect in lead}))
+            where[name] = where.get(name, 0.0) + value
+    least = (1.0 - CREDIBLE) * sum(where.values())
+    where.pop(joined(sorted({p.suspect(n).label for n in best if p.suspect(n).effect in lead})), None)
+    likely = sorted(n for n, v in where.items() if v > least)
+    return f" (or {joined(likely[:3])})" if likely else ""
 
 
 def _name(effects: frozenset[str]) -> str:

@@ -34,7 +34,7 @@ def stiffnesses(symbol: str, unit: str, meaning: str) -> tuple[Parameter, ...]:
 
 def matrix(parameters: Mapping[str, np.ndarray]) -> np.ndarray:
     """The matrices [..., 3, 3] of parameters [...]."""
-    a, b, c, d, e, f = (np.asarray(parameters[f"stiffness_{k}"]) for k in COMPONENTS)
+    a, b, c, d, e, f = np.broadcast_arrays(*(parameters[f"stiffness_{k}"] for k in COMPONENTS))
     return np.stack([np.stack(r, axis=-1) for r in ((a, c, e), (c, b, f), (e, f, d))], axis=-2)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
+from origami_sim.effects._effect import Effect
 from origami_sim.entities import tune
 from origami_sim.model import Model, Parameters, magnets
 from origami_sim.places import across, points, stretches
@@ -310,7 +311,7 @@ def apply(
     for s in hypothesis.suspects:
         for f in s.free:
             bounds = get(s.effect).parameter(f.name).bounds
-            if s.effect in given:  # more or less of what the model has
+            if s.more:  # or less, of what the model has
                 mine = slice(None) if s.entities is None else np.array(s.entities)
                 out.set(
                     s.effect, f.name, np.clip(parameters[s.effect, f.name][mine] + values[index], *bounds), s.entities
@@ -330,8 +331,9 @@ def suspects(
 
     An effect of the drive is a suspect only if the channels that it acts on are driven; one of the measurement, if a
     channel of its kind was recorded; one of the ground, if the device has contact points. Creases, panels and feet are
-    suspected one by one and all together; those that share a name are one. An effect that the model has to state
-    (`Effect.stated`) is a suspect where it does so and leaves it at no strength.
+    suspected one by one and all together; those that share a name are one. An effect that the model has at no strength
+    is a suspect like any other. One of which more has to be stated (`Effect.stated`) is one if the model states that,
+    for it or for another effect of its family.
     """
     kinds = {c.kind for r in recordings for c in r.channels.values()}
     driven = _driven(recordings, drive)
@@ -339,10 +341,10 @@ def suspects(
     for name, effect in CATALOGUE.items():
         if not effect.fitted or not model.count(effect.family):
             continue
-        if name in model.effects and not (effect.stated and parameters and _off(parameters, name)):
+        if name in model.effects and not (parameters and _off(parameters, name)):
             found += _more_of(model, name, parameters)
             continue
-        if effect.stated and name not in model.effects:
+        if effect.stated and not any(_tells(model, n, effect) for n in model.effects):
             continue
         if effect.family == "measurement" and effect.channels and not kinds & set(effect.channels):
             continue
@@ -400,6 +402,11 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
             )
         out.append(Suspect(name, site, kind, (strength,), entities, len(each), more=True))
     return out
+
+
+def _tells(model: Model, name: str, effect: Effect) -> bool:
+    """Whether an effect of the model has what another one needs to be told."""
+    return get(name).family == effect.family and set(effect.stated) <= {p.name for p in get(name).parameters}
 
 
 def _several_magnets(model: Model, parameters: Parameters) -> bool:

@@ -123,3 +123,19 @@ def test_a_field_that_grows_is_one_for_all_panels_and_knows_the_plane_of_motion(
 def test_uneven_effects_are_those_of_families_with_stretches():
     uneven = {n for n, e in CATALOGUE.items() if e.uneven}
     assert uneven >= UNEVEN and all(CATALOGUE[n].family in ("crease", "bend", "triangle") for n in uneven)
+
+
+def test_what_a_model_has_at_no_strength_is_a_suspect_and_sheets_may_lose_energy():
+    module = import_module("origami_sim.scenes.magnetic_arch")
+    model, parameters, drive = module.build(scene_settings(module).replace(relaxing_modulus=0.0, cells=6, rows=2))
+    assert "mass_damping" in model.effects and "shell_membrane_relaxation" not in model.effects
+    every = {s.effect: s for s in asked(model, parameters, drive)}
+    assert {"mass_damping", "shell_membrane_relaxation", "shell_bending_relaxation"} <= set(every)
+    loss = Hypothesis((every["shell_membrane_relaxation"], every["mass_damping"]))
+    richer = model.with_effects("shell_membrane_relaxation")
+    out = apply(parameters, loss, [0.3, *(f.start for f in loss.suspects[0].free[1:]), 7.0], richer)
+    for c in ("11", "22", "66"):  # the loss is a share of the sheet's own stiffness
+        name = f"stiffness_{c}"
+        np.testing.assert_array_equal(out["shell_membrane_relaxation", name], parameters["shell_membrane", name])
+    assert np.all(out["shell_membrane_relaxation", "share_1"] == 0.3)
+    assert np.all(out["mass_damping", "decay_rate"] == 7.0)

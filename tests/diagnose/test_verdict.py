@@ -1,12 +1,20 @@
 """What a verdict is made of: sets of explanations, and words for what is left."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
+from origami_sim.diagnose.budget import Budget, Share
 from origami_sim.diagnose.describe import described
 from origami_sim.diagnose.diagnosis import Acting, Curve, Place
-from origami_sim.diagnose.verdict import credible
+from origami_sim.diagnose.screen import Signature
+from origami_sim.diagnose.search import Posterior
+from origami_sim.diagnose.verdict import credible, decide
 from origami_sim.diagnose.words import joined, said, title
+from origami_sim.fit.hyper import HYPER
+from origami_sim.fit.hypothesis import Free, Suspect
+from origami_sim.fit.weights import Weights
 
 
 def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():
@@ -65,3 +73,26 @@ def test_what_is_left_is_placed_by_the_actions_that_leave_least():
     assert said.startswith("What is missing acts like a moment on panel2 or a moment at fold1, goes")
     assert described([], [far]) == ""
     assert "acts at several places" in described([place(lambda a, w: a, share=0.4)], [])
+
+
+@pytest.mark.parametrize(
+    ("named", "rest", "over", "missing", "word"),
+    [
+        (0.1, 0.02, 1.0, 0.0, "MECHANISM"),
+        (0.001, 0.02, 1.0, 0.99, "UNKNOWN"),  # forces are missing, though numbers explain nearly all
+        (0.001, 0.02, 3.0, 0.0, "UNKNOWN"),  # no forces, but three times the noise
+        (0.001, 0.02, 1.0, 0.3, "MECHANISM"),  # nothing shows that the rest is real
+        (0.1, 0.02, 3.0, 0.99, "MECHANISM"),  # more is named than left
+    ],
+)
+def test_unknown_is_what_leaves_more_than_it_names_and_leaves_something_real(named, rest, over, missing, word):
+    drag = Suspect("air_drag", "all panels", "panel", (Free("air_drag", "drag_coefficient", "-", 0.0, 1.0),))
+    p = Posterior([Signature(drag, [np.zeros(0)], 1.0)], Weights(np.ones(1)))
+    cells = np.where(HYPER.clean, (1.0 - missing) / HYPER.clean.sum(), missing / (~HYPER.clean).sum())
+    with np.errstate(divide="ignore"):
+        p.log = {frozenset(): np.log(cells) - 20.0, frozenset({0}): np.log(cells)}
+    p.total = {frozenset(): -20.0, frozenset({0}): 0.0}
+    p.nodes = cast(dict, dict.fromkeys(p.total))
+    parts = ("numbers", 1.0 - named - rest), ("effect", named), ("rest", rest)
+    budget = Budget([Share(kind, kind, share) for kind, share in parts], over)
+    assert decide(p, lambda key: budget).word == word
