@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.run import machine
 from origami_sim.diagnose import Options, diagnose
-from origami_sim.diagnose.page import geometry_of, write_report
+from origami_sim.report.page import geometry_of, write_report
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}

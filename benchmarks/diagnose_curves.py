@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.diagnose import Diagnosis, Subject, diagnose
-from origami_sim.diagnose.locate_curves import sign_changes
+from origami_sim.locate.locate_curves import sign_changes
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scene import read_calibration, recordings_folder, scene_module, scene_settings

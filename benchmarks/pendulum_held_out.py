@@ -16,11 +16,11 @@ import numpy as np
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.command import read_recordings
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.starts import local_line
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.predict.starts import local_line
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P
 from origami_sim.scene import read_calibration, scene_module
 

@@ -18,9 +18,9 @@ from origami_sim.cli import (
     _soundness,
     _tell,
 )  # fmt: skip
+from origami_sim.demo_page import Section, write_report
 from origami_sim.recording import read_recording, stand_in_double_pendulum
 from origami_sim.recording.stand_in import write_stand_in_sidecar
-from origami_sim.report import Section, write_report
 from origami_sim.results import check_writable
 from origami_sim.scene import recordings_folder, scene_module, scene_settings
 

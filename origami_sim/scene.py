@@ -25,8 +25,8 @@ from origami_sim.solve.quasistatic import quasistatic
 from origami_sim.solve.statics import equilibrium
 
 if TYPE_CHECKING:
-    from origami_sim.diagnose.patch import Addition
     from origami_sim.recording import Recording
+    from origami_sim.report.patch import Addition
 
 NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
@@ -197,7 +197,7 @@ def read_calibration(source: str | Path) -> Settings:
     data = read_toml(path)
     additions: Sequence[Addition] = ()
     if "effects" in data:
-        from origami_sim.diagnose.patch import read_additions
+        from origami_sim.report.patch import read_additions
 
         additions = read_additions(data.pop("effects"), path)
     given = {word: data.pop(word, None) for word in ("panels", "motion", "accuracy")}
@@ -477,7 +477,7 @@ def extended(build: Callable) -> Callable:
         if s.panels == "rigid":
             model, parameters = rigid(model, parameters)
         if s.effects:
-            from origami_sim.diagnose.patch import switched_on
+            from origami_sim.report.patch import switched_on
 
             model, parameters = switched_on(s.effects, model, parameters, file=s.file)
         return (model, parameters, *rest)

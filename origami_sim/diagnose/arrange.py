@@ -6,21 +6,21 @@ import numpy as np
 
 from origami_sim.articulation import Articulation
 from origami_sim.diagnose.inertia import calmer, inertia
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
-from origami_sim.fit.bars import BarRollouts
-from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.least_squares import linearise
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.prescribed import curves
 from origami_sim.fit.recorder import recorder_noise
-from origami_sim.fit.rigid import RigidRollouts
-from origami_sim.fit.rollouts import Rollouts
-from origami_sim.fit.slow import Slow, restless
-from origami_sim.fit.starts import channel_tangent, local_line, spans
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.predict.bars import BarRollouts
+from origami_sim.predict.channels import stacked, units_of
+from origami_sim.predict.prescribed import curves
+from origami_sim.predict.rigid import RigidRollouts
+from origami_sim.predict.rollouts import Rollouts
+from origami_sim.predict.slow import Slow, restless
+from origami_sim.predict.starts import channel_tangent, local_line, spans
 from origami_sim.recording import Recording
 
 GROWTH = 3.0

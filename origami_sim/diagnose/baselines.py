@@ -10,11 +10,11 @@ from itertools import product
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import Baseline
-from origami_sim.diagnose.locate import motion
 from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.infer.diagnosis import Baseline
+from origami_sim.locate.locate import motion
 
 KNOTS = 9
 

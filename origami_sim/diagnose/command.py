@@ -16,21 +16,21 @@ from types import ModuleType
 
 from origami_sim.device import device_module, is_device
 from origami_sim.diagnose.diagnose import diagnose
-from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import attempt
 from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.overlay import write_overlays
-from origami_sim.diagnose.page import geometry_of, write_report
-from origami_sim.diagnose.patch import patched, write_patch
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Free, Subject
 from origami_sim.fit.subject import alignments, divided, numbers, split, spreads
+from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, Parameters
 from origami_sim.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
+from origami_sim.report.page import geometry_of, write_report
+from origami_sim.report.patch import patched, write_patch
 from origami_sim.scene import (
     NAMES,
     Settings,

@@ -10,31 +10,31 @@ import numpy as np
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
-from origami_sim.diagnose.describe import unnamed
-from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.experiment import explanations, propose
-from origami_sim.diagnose.held_out import held_out
-from origami_sim.diagnose.impulses import impulses
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.observed import assumed, unobserved
-from origami_sim.diagnose.onset import onset
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
-from origami_sim.diagnose.screen import Signature, screen
-from origami_sim.diagnose.search import Posterior, marginals, search
-from origami_sim.diagnose.stored import Stored
 from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
-from origami_sim.diagnose.verdict import judge
-from origami_sim.diagnose.where import located
 from origami_sim.effects import get
-from origami_sim.fit.channels import stacked, units_of
 from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
+from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.infer.held_out import held_out
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.screen import Signature, screen
+from origami_sim.infer.search import Posterior, marginals, search
+from origami_sim.infer.stored import Stored
+from origami_sim.infer.verdict import judge
+from origami_sim.locate.describe import unnamed
+from origami_sim.locate.impulses import impulses
+from origami_sim.locate.onset import onset
+from origami_sim.locate.where import located
 from origami_sim.possible import Possible
+from origami_sim.predict.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.scene import scene_module
 

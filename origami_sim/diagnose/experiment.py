@@ -18,14 +18,14 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
-from origami_sim.diagnose.diagnosis import Experiment
 from origami_sim.diagnose.menu import Trial, menu
-from origami_sim.diagnose.search import Key, Posterior
-from origami_sim.diagnose.verdict import widened
 from origami_sim.fit.least_squares import Fit, changed, first_steps, links, start_steps
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.diagnosis import Experiment
+from origami_sim.infer.search import Key, Posterior
+from origami_sim.infer.verdict import widened
 from origami_sim.possible import Possible
 
 LEADING, LEAST = 5, 0.01

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from origami_sim.diagnose.diagnosis import Diagnosis
-from origami_sim.diagnose.stored import Stored
-from origami_sim.fit.cache import Cache
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.worlds import Worlds
+from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.infer.stored import Stored
+from origami_sim.predict.cache import Cache
+from origami_sim.predict.worlds import Worlds
 
 
 class Keep:

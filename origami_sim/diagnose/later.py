@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.options import Report
 from origami_sim.errors import InputError
+from origami_sim.infer.diagnosis import Diagnosis
 
 T = TypeVar("T")
 

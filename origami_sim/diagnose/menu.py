@@ -8,11 +8,11 @@ import numpy as np
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
-from origami_sim.fit.curves import Curves
 from origami_sim.fit.predictor import Block, Predictor
-from origami_sim.fit.rollouts import Rollouts
 from origami_sim.model import Parameters
 from origami_sim.possible import UPSIDE_DOWN, Possible
+from origami_sim.predict.curves import Curves
+from origami_sim.predict.rollouts import Rollouts
 
 LENGTH = 8
 """A proposed experiment is simulated in four stretches of this part of a recording."""

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.diagnose.diagnosis import Diagnosis
 from origami_sim.diagnose.keep import Keep
 from origami_sim.effects import get
-from origami_sim.fit.channels import stacked
 from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Block, Predictor
-from origami_sim.fit.starts import channel_tangent
+from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, dihedral_angles
+from origami_sim.predict.channels import stacked
+from origami_sim.predict.starts import channel_tangent
 from origami_sim.recording import Channel
 from origami_sim.replay import Overlay, write_overlay
 

@@ -1,1 +1,1 @@
-"""The estimator: numbers with priors, what a hypothesis predicts, least squares and evidence."""
+"""The estimator: numbers with priors, suspects, noise, least squares of any `Predictor`, and evidence."""

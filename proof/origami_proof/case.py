@@ -16,12 +16,12 @@ from origami_sim.build import Sheet
 from origami_sim.diagnose import Diagnosis, Options, Subject, diagnose, factor
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
-from origami_sim.diagnose.page import geometry_of, write_report
 from origami_sim.drive import Drive
 from origami_sim.files import write_text
 from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble
 from origami_sim.recording import read_recording
+from origami_sim.report.page import geometry_of, write_report
 from origami_sim.scene import scene_module, scene_settings
 
 RIGIDITY = 2e5

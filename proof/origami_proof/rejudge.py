@@ -1,7 +1,7 @@
 """Opened cases judged anew from what they stored, with any hyperparameters: what half and double of each do.
 
 No simulation and no fit is made: each case keeps the linearisations of its search (`stored.npz`, see
-`origami_sim.diagnose.stored`), so that hundreds are judged in minutes.
+`origami_sim.infer.stored`), so that hundreds are judged in minutes.
 """
 
 import json
@@ -16,10 +16,10 @@ import numpy as np
 
 from origami_proof.case import STORED
 from origami_proof.score import BOARD, calibration_error, judge, wilson
-from origami_sim.diagnose.stored import Stored
-from origami_sim.diagnose.verdict import by_effects
 from origami_sim.errors import InputError
 from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.infer.stored import Stored
+from origami_sim.infer.verdict import by_effects
 
 REJUDGED = "rejudged.json"
 """What comes out, in the folder of the run."""

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from origami_proof import command, rejudge
-from origami_sim.diagnose.budget import Budget, Share
-from origami_sim.diagnose.stored import Reduced, Stored
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, problem
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.hypothesis import Free, Suspect
 from origami_sim.fit.linear import Linearisation, Rows
+from origami_sim.infer.budget import Budget, Share
+from origami_sim.infer.stored import Reduced, Stored
 
 EFFECTS = ("crease_friction", "air_drag", "crease_stiffening", "angle_scale")
 

@@ -13,16 +13,16 @@ from diagnose.swings import FRICTION, NOISE, QUICK, SIDECAR, WAVE, T, main, reco
 import origami_sim
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
 from origami_sim.diagnose.observed import assumed
-from origami_sim.diagnose.page import read_report
-from origami_sim.diagnose.patch import Addition, additions, switched_on, write_patch
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
-from origami_sim.fit import cache
 from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.subject import spreads
+from origami_sim.predict import cache
 from origami_sim.recording import read_recording
 from origami_sim.replay import read_series
+from origami_sim.report.page import read_report
+from origami_sim.report.patch import Addition, additions, switched_on, write_patch
 from origami_sim.results import load_run
 from origami_sim.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
@@ -114,11 +114,11 @@ def test_the_replay_shows_the_recorded_object_over_both_simulations(diagnosed):
 
 def test_films_are_what_was_fitted(recorded, monkeypatch):
     """The drawn simulation has the channels of the fit, and the drawn recording those that were measured."""
-    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
     from origami_sim.observe import panel_angle
+    from origami_sim.predict.bars import BarRollouts
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
     forward = BarRollouts(subject, [recording], segment=0.4)
@@ -143,10 +143,10 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
 
 
 def test_an_error_of_one_channel_moves_no_node(recorded):
-    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
+    from origami_sim.predict.bars import BarRollouts
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
     forward = BarRollouts(subject, [recording], segment=0.4)
@@ -192,8 +192,8 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
 
 def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeypatch):
     """Another start, number, site or recording never finds a stored prediction; a damaged file is computed again."""
-    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis, suspects
+    from origami_sim.predict.bars import BarRollouts
 
     monkeypatch.setattr(cache, "WORTH", 0.0)  # however quick they are
     module, s = single()
@@ -231,10 +231,10 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeyp
 def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypatch):
     import warp as wp
 
-    from origami_sim.fit.bars import BarRollouts
     from origami_sim.fit.hypothesis import Hypothesis, suspects
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
+    from origami_sim.predict.bars import BarRollouts
 
     @wp.func
     def moment(angle: scalar, runaway: scalar):
@@ -280,7 +280,7 @@ def test_missing_values_that_are_allowed_do_not_change_the_answer(recorded, tmp_
 def test_a_drive_on_its_own_clock_reaches_the_model():
     """Samples between the frames are kept, also where the recording is thinned and starts later than the drive."""
     from origami_sim.diagnose.prepare import thinned
-    from origami_sim.fit.drives import drive_of
+    from origami_sim.predict.drives import drive_of
     from origami_sim.recording import Channel, DriveChannel, Recording
 
     times = 2.0 + np.arange(40) / 20.0
@@ -293,7 +293,7 @@ def test_a_drive_on_its_own_clock_reaches_the_model():
 
 
 def test_drives_of_several_components_reach_their_channels():
-    from origami_sim.fit.drives import drive_of
+    from origami_sim.predict.drives import drive_of
 
     gradient = drive_of(recorded_drive("gradient", np.arange(9.0), "T/m", constant=True), Drive())
     assert [float(gradient[f"gradient_{i}{j}"](0.3)) for i in "xyz" for j in "xyz"] == list(range(9))

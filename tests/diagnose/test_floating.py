@@ -11,18 +11,18 @@ from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines
-from origami_sim.diagnose.held_out import held_out
-from origami_sim.diagnose.impulses import impulses
-from origami_sim.diagnose.locate import locate, motion, motions_of, touching
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
-from origami_sim.fit.drives import drive_of
 from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
-from origami_sim.fit.track import placed, track
+from origami_sim.infer.held_out import held_out
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.locate.impulses import impulses
+from origami_sim.locate.locate import locate, motion, motions_of, touching
 from origami_sim.materials import MU0
 from origami_sim.pattern import strip
 from origami_sim.pattern.assemble import assemble
+from origami_sim.predict.drives import drive_of
+from origami_sim.predict.track import placed, track
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scene import read_calibration

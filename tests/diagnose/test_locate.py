@@ -7,12 +7,12 @@ import pytest
 
 from origami_sim.articulation import Articulation
 from origami_sim.diagnose import Options
-from origami_sim.diagnose.acting import _actions, acting
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.diagnosis import REVERSAL
-from origami_sim.diagnose.locate import locate, motions_of, phase, reversals, since
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
+from origami_sim.infer.diagnosis import REVERSAL
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.locate.acting import _actions, acting
+from origami_sim.locate.locate import locate, motions_of, phase, reversals, since
 from origami_sim.model import dihedral_angles
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box

@@ -8,9 +8,9 @@ import pytest
 from origami_sim.diagnose import Subject
 from origami_sim.diagnose.observed import channel_tangents, check_recording, unobserved
 from origami_sim.errors import InputError
-from origami_sim.fit.bars import BarRollouts
-from origami_sim.fit.curves import Static
-from origami_sim.fit.prescribed import curves
+from origami_sim.predict.bars import BarRollouts
+from origami_sim.predict.curves import Static
+from origami_sim.predict.prescribed import curves
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.scene import scene_module, scene_settings

@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.errors import InputError
-from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
 from origami_sim.fit.least_squares import Fit, fit
 from origami_sim.fit.weights import Weights
 from origami_sim.model import State
+from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.scene import read_calibration, recordings_folder
 from origami_sim.scenes import cube_toss, falling_ball

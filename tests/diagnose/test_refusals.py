@@ -9,9 +9,9 @@ import pytest
 from diagnose.swings import SIDECAR, WAVE, T, main, recorded_drive, single, swing, table
 
 from origami_sim.diagnose import EXIT, command
-from origami_sim.diagnose.patch import Addition, read_additions, switched_on
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.report.patch import Addition, read_additions, switched_on
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +243,7 @@ def test_the_start_can_be_chosen_but_not_rest_for_segments():
     ],
 )
 def test_drives_that_cannot_be_are_refused(name, values, unit, said):
-    from origami_sim.fit.drives import drive_of
+    from origami_sim.predict.drives import drive_of
 
     recording = recorded_drive(name, values, unit)
     recording.metadata["sidecar"] = "r.toml"

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from origami_sim.build import Sheet
-from origami_sim.diagnose.budget import Share
-from origami_sim.diagnose.diagnosis import (
+from origami_sim.effects import CATALOGUE
+from origami_sim.errors import InputError
+from origami_sim.infer.budget import Share
+from origami_sim.infer.diagnosis import (
     VERDICTS,
     Acting,
     Baseline,
@@ -28,14 +30,12 @@ from origami_sim.diagnose.diagnosis import (
     Suspected,
     Trace,
 )
-from origami_sim.diagnose.page import geometry_of, page, read_report, write_report
-from origami_sim.diagnose.page.law import law_of
-from origami_sim.diagnose.page.markup import amount, element, interval, percent, plus_minus
-from origami_sim.diagnose.page.plots import POINTS, Plot, ticks
-from origami_sim.diagnose.page.wording import number_of, worded, words_of
-from origami_sim.effects import CATALOGUE
-from origami_sim.errors import InputError
 from origami_sim.pattern import grid
+from origami_sim.report.page import geometry_of, page, read_report, write_report
+from origami_sim.report.page.law import law_of
+from origami_sim.report.page.markup import amount, element, interval, percent, plus_minus
+from origami_sim.report.page.plots import POINTS, Plot, ticks
+from origami_sim.report.page.wording import number_of, worded, words_of
 
 NAN = math.nan
 CREASES = ("left crease", "middle <b> & crease", "right crease")
@@ -280,7 +280,7 @@ def test_no_identifier_is_read_outside_of_the_calibration(verdict):
     d.patch, d.settings = {}, {}  # these are to be typed, not read
     words = " ".join(Read(page(d, GEOMETRY)).words)
     assert not [n for n in CATALOGUE if "_" in n and n in words]
-    how = "origami_sim.diagnose.page.read_report(path)"
+    how = "origami_sim.report.page.read_report(path)"
     assert not re.search(r"\b[a-z]+_[a-z]+\b", words.replace(how, ""))
 
 

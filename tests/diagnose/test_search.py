@@ -10,16 +10,16 @@ from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.experiment import propose
-from origami_sim.diagnose.held_out import folds, held_out
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import marginals, search
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
+from origami_sim.infer.held_out import folds, held_out
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.screen import screen
+from origami_sim.infer.search import marginals, search
 from origami_sim.recording import DriveChannel, Recording
 from tests.diagnose.strips import record, subject
 

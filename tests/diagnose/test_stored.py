@@ -7,17 +7,17 @@ import pytest
 
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.nominal import nominal_fits
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.diagnose.screen import screen
-from origami_sim.diagnose.search import Posterior, _node, enter, log_priors, place, search
-from origami_sim.diagnose.stored import Reduced, Stored
-from origami_sim.diagnose.verdict import judge
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import problem, summed
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.linear import Linearisation, Rows
+from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.screen import screen
+from origami_sim.infer.search import Posterior, _node, enter, log_priors, place, search
+from origami_sim.infer.stored import Reduced, Stored
+from origami_sim.infer.verdict import judge
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}

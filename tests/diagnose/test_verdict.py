@@ -5,16 +5,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from origami_sim.diagnose.budget import Budget, Share
-from origami_sim.diagnose.describe import described
-from origami_sim.diagnose.diagnosis import Acting, Curve, Place
-from origami_sim.diagnose.screen import Signature
-from origami_sim.diagnose.search import Posterior
-from origami_sim.diagnose.verdict import credible, decide
-from origami_sim.diagnose.words import joined, said, title
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.hypothesis import Free, Suspect
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.budget import Budget, Share
+from origami_sim.infer.diagnosis import Acting, Curve, Place
+from origami_sim.infer.screen import Signature
+from origami_sim.infer.search import Posterior
+from origami_sim.infer.verdict import credible, decide
+from origami_sim.infer.words import joined, said, title
+from origami_sim.locate.describe import described
 
 
 def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():

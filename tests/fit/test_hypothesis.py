@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from origami_sim.fit.hypothesis import Hypothesis, distinct_sites, suspects, told_apart
-from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.predict.rigid import RigidRollouts
 from tests.diagnose.strips import record, subject
 
 

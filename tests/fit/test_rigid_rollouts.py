@@ -11,13 +11,13 @@ from origami_sim.bodies import rigid
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
-from origami_sim.fit.bars import BarRollouts
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.rigid import RigidRollouts
 from origami_sim.fit.weights import Weights
 from origami_sim.model import State
 from origami_sim.pattern import strip
+from origami_sim.predict.bars import BarRollouts
+from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, subject

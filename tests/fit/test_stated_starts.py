@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from origami_sim.errors import InputError
-from origami_sim.fit.rigid import RigidRollouts
+from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Recording, Start
 from tests.diagnose.strips import record, subject
 

@@ -1,0 +1,318 @@
+"""What a diagnosis says: plain data that the report shows and that JSON holds whole."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from origami_sim.files import write_text
+from origami_sim.infer.budget import Share
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+VERDICTS = ("ADEQUATE", "PARAMETER", "MEASUREMENT", "MECHANISM", "TIE", "SEVERAL", "UNKNOWN", "UNTESTABLE")
+
+EXIT = {name: 10 + n for n, name in enumerate(VERDICTS)}
+"""Exit codes of `origami-sim diagnose`; 0 would hide the verdict, 1 to 3 and 130 mean what they mean elsewhere."""
+
+
+@dataclass
+class Number:
+    """A fitted number with its 95 % interval [SI]; `prior` and `spread` are what was known before (nan: nothing)."""
+
+    label: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    prior: float
+    spread: float
+    at_bound: bool
+
+
+@dataclass
+class Candidate:
+    """One row of the table of explanations.
+
+    Attributes:
+        label: effects and sites, "nominal as given" or "nominal refitted". kind: nominal, parameter, mechanism,
+            measurement.
+        effects, sites: of its suspects. numbers: what was fitted.
+        probability: posterior. odds: logarithm of the posterior odds over the model without an effect.
+        rms: held-out rms residual by component [SI]. fit: fit % = 100 (1 - NRMSE) by component, on all data.
+        why: why it lost or won. distrust: when not to trust the row, or "". failed: why it could not be fitted, or "".
+    """
+
+    label: str
+    kind: str
+    effects: list[str]
+    sites: list[str]
+    numbers: list[Number]
+    probability: float
+    odds: float
+    rms: list[float]
+    fit: list[float]
+    why: str = ""
+    distrust: str = ""
+    failed: str = ""
+
+
+@dataclass
+class Suspected:
+    """One suspect in the screening: score z, its strength with standard deviation [unit], part explained."""
+
+    label: str
+    effect: str
+    site: str
+    kind: str
+    z: float
+    strength: float
+    error: float
+    unit: str
+    explained: float
+    status: str = ""
+
+
+@dataclass
+class Curve:
+    """Residual moment of one coordinate binned against something: x, mean, its standard error, number in the bin."""
+
+    against: str
+    unit: str
+    x: list[float]
+    mean: list[float]
+    error: list[float]
+    count: list[int]
+
+
+REVERSAL = "time since a reversal"
+"""Against this, the missing moment is that along the motion: it would cancel itself otherwise."""
+
+
+@dataclass
+class Place:
+    """What equation error says about one coordinate (a crease's fold angle, a coordinate of the root).
+
+    Attributes:
+        site: name. score: how much structure its residual moment has, in standard deviations. share: its part
+            of all structure. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
+            [s], nan: never.
+        times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
+        curves: the residual moment against angle, rate, what drives, its phase if it is periodic, and time since the
+            last step of a drive and the last reversal (then the moment along the motion).
+        balance: unexplained power [W], blocks of 0.1 s or more of the first recording against time; None: not known.
+    """
+
+    site: str
+    score: float
+    share: float
+    power: float
+    onset: float
+    times: list[float]
+    moment: list[float]
+    error: list[float]
+    curves: list[Curve] = field(default_factory=list)
+    balance: Curve | None = None
+
+
+@dataclass
+class Acting:
+    """What one action alone, whatever its size in time, leaves of the forces that are missing.
+
+    Attributes:
+        what: "moment at" a crease; "force across" a panel in its middle, "moment on" it about its crease. site: which.
+        left: root mean square of what it leaves, in standard deviations: 1 if it explains all.
+        same: actions that are no different in these recordings.
+        like: of the others, the one that is most like it. overlap: |cos| of the two, 1 if they look the same.
+        unit: "N m" or "N". curves: its size in time (means over windows of the first recording), and against angle and
+            rate of the crease there (of a panel: the one that moves it), what drives, and the rest as in `Place`.
+    """
+
+    what: str
+    site: str
+    left: float
+    same: list[str]
+    like: str
+    overlap: float
+    unit: str = ""
+    curves: list[Curve] = field(default_factory=list)
+
+
+@dataclass
+class Impulse:
+    """What a contact does to the device in a blow.
+
+    Attributes:
+        recording, time: which [s]. site: node that is lowest. recorded, predicted: impulse on the device (x, y, z)
+            [N s], of the motion that was recorded and of the refitted model's. error: (3) deviation of either.
+        apart: their difference [standard deviations].
+    """
+
+    recording: str
+    time: float
+    site: str
+    recorded: list[float]
+    predicted: list[float]
+    error: list[float]
+    apart: float
+
+
+@dataclass
+class Trace:
+    """One component of one recording: times [s], recorded, predicted before, refitted and after; band is +-2 sd."""
+
+    recording: str
+    component: str
+    unit: str
+    noise: float
+    times: list[float]
+    recorded: list[float]
+    before: list[float]
+    refitted: list[float]
+    after: list[float]
+    band: float
+    breaks: list[int]
+    """Indices at which a segment with a start of its own begins."""
+
+
+@dataclass
+class Correlation:
+    """Autocorrelation of a component's residual, and cross-correlation with the drive or the rate, before and after."""
+
+    component: str
+    lags: list[float]
+    before: list[float]
+    after: list[float]
+    against: str = ""
+    cross_before: list[float] = field(default_factory=list)
+    cross_after: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Experiment:
+    """A proposed next experiment.
+
+    Attributes:
+        what: to do. separates: explanations that it tells apart, the best one first.
+        information: by how much it is expected to lower the entropy of the posterior over explanations [bits].
+        entropy: that is there now [bits]. repeats: recordings that tell most of what it can; 9999: no number does.
+    """
+
+    what: str
+    separates: list[str]
+    information: float
+    entropy: float
+    repeats: int
+
+
+@dataclass
+class Baseline:
+    """A method that names no physics, on the same folds: held-out rms by component [SI]."""
+
+    name: str
+    rms: list[float]
+    note: str = ""
+
+
+@dataclass(repr=False)
+class Diagnosis:
+    """All that was found.
+
+    Attributes:
+        verdict: one of VERDICTS. sentence: what opens the report. probability: of the chosen explanation (or set); nan
+            for UNKNOWN, where the one that comes closest is chosen but not believed.
+        chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
+        candidates: ordered, best first. screening: all suspects, best first.
+        isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
+        impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
+        onset: when the refitted nominal first departs lastingly [s]; nan: never.
+        traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
+        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
+        notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
+        patch: numbers to write into the calibration: label -> value. changed: effects of it that the model has
+            already: their numbers are changes of what it has.
+        unfinished: stages after the verdict that were not reached when this was written; empty at the end. Fields that
+            they give, from `places` on, are empty until then.
+    """
+
+    verdict: str
+    sentence: str
+    probability: float
+    chosen: list[str]
+    candidates: list[Candidate]
+    screening: list[Suspected]
+    budget: list[Share]
+    marginals: dict[str, float]
+    compared: float
+    components: list[str]
+    units: list[str]
+    noise: list[float]
+    error_before: list[float]
+    error_refitted: list[float]
+    error_after: list[float]
+    notes: list[str]
+    settings: dict
+    seconds: dict[str, float]
+    patch: dict[str, float]
+    subject: str = ""
+    recordings: list[str] = field(default_factory=list)
+    changed: list[str] = field(default_factory=list)
+    places: list[Place] = field(default_factory=list)
+    acting: list[Acting] = field(default_factory=list)
+    impulses: list[Impulse] = field(default_factory=list)
+    onset: float = float("nan")
+    traces: list[Trace] = field(default_factory=list)
+    correlations: list[Correlation] = field(default_factory=list)
+    isolability_labels: list[str] = field(default_factory=list)
+    isolability: list[list[float]] = field(default_factory=list)
+    experiments: list[Experiment] = field(default_factory=list)
+    baselines: list[Baseline] = field(default_factory=list)
+    unfinished: list[str] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT[self.verdict]
+
+    def __repr__(self) -> str:
+        from origami_sim.view.findings import diagnosis_line  # only who looks pays for it
+
+        return diagnosis_line(self)
+
+    def _repr_html_(self) -> str:
+        from origami_sim.view.findings import diagnosis_html
+
+        return diagnosis_html(self)
+
+    def plot(self) -> "Figure":
+        """Where the mismatch goes, and the first recording beside the model as given and the best explanation."""
+        from origami_sim.view.findings import plot_diagnosis
+
+        return plot_diagnosis(self)
+
+    def to_dict(self) -> dict:
+        """Plain lists and numbers; what is not finite becomes None."""
+        return {k: _plain(v) for k, v in asdict(self).items()}
+
+    def save_json(self, path: str | Path) -> Path:
+        """Writes everything as JSON."""
+        return write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
+
+
+def _plain(value):
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    return value

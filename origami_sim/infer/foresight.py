@@ -1,0 +1,83 @@
+"""What sets of effects would leave, and how probable that is in noise of its own, without a simulation.
+
+A fit that lacks an effect leaves coloured noise, in which the effect hardly shows. So a set is judged by the noise that
+it would leave itself: all is linear, the residuals that follow are looked at as those of a fit are (`implied`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, summed, with_priors, without_numbers
+from origami_sim.fit.hyper import Hyper
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights, log_volume, patterns, recast
+from origami_sim.infer.implied import OwnColumns, left_by
+
+
+@dataclass(frozen=True, eq=False)
+class Foresight:
+    """A fit in white noise of the size of what it leaves.
+
+    Attributes:
+        own: groups of the fit's own effects. numbers: of the model, whose columns come first.
+        white: its problem. root: [k, P + C + 1] with the same least squares as nominal numbers, effects and residual
+            once the starts suit each. parts: [R, P + C + 1], what is left then of each in the data of all segments,
+            over the noise.
+    """
+
+    forward: Predictor
+    fit: Fit
+    weights: Weights
+    own: Sequence[Group]
+    numbers: int
+    white: Summed
+    root: np.ndarray
+    parts: np.ndarray
+
+    @classmethod
+    def of(cls, forward: Predictor, f: Fit, own: OwnColumns, effects: list[np.ndarray], hyper: Hyper) -> "Foresight":
+        """Of a fit and the whitened columns of its own and of further effects, per segment [r, C]."""
+        assert f.linear is not None and f.weights is not None
+        plain = Weights(f.weights.deviation, gap=f.weights.gap)
+        line = f.linear.reweighted(f.weights, plain)
+        theirs = recast(effects, line.rows, f.weights, plain)
+        columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
+        whole = with_priors(line.cleared(columns), own.precision[own.nominal], own.away[own.nominal])
+        root = np.asarray(np.linalg.qr(whole, mode="r"))
+        white = summed(without_numbers(whole, count, theirs[0].shape[1], -line.spread), 0.0, hyper.flaws[0])
+        parts = np.concatenate([s[: r.data] for s, r in zip(line.smoothed(columns), line.rows, strict=True)])
+        return cls(forward, f, plain, own.groups, count, white, root, parts)
+
+    def gain(self, groups: Sequence[Group], hyper: Hyper) -> float:
+        """Log evidence that effects gain over the fit, each in noise of its own."""
+        new = sum(g.strengths for g in groups if g not in self.own)
+        gain = self._likely(groups) - self._before
+        d = np.sqrt(2.0 * max(gain, 1.0) / max(new, 1))
+        return gain + new * (float(log_slab(np.array(d), hyper)) + 0.5 * float(np.log(2.0 * np.pi)))
+
+    @cached_property
+    def _before(self) -> float:
+        return self._likely(self.own)
+
+    def _likely(self, groups: Sequence[Group]) -> float:
+        """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part."""
+        use = [*range(self.numbers), *(self.numbers + c for g in groups for c in g.columns)]
+        none = np.full(self.numbers, np.inf)
+        low = np.concatenate([-none, *(np.minimum(g.bounds()[0] - g.at, -1e-12) for g in groups)])
+        high = np.concatenate([none, *(np.maximum(g.bounds()[1] - g.at, 1e-12) for g in groups)])
+        change = lsq_linear(self.root[:, use], self.root[:, -1], (low, high)).x
+        assert self.fit.linear is not None
+        rows, blocks = self.fit.linear.rows, self.fit.blocks
+        rest = np.split(self.parts[:, -1] - self.parts[:, use] @ change, np.cumsum([r.data for r in rows])[:-1])
+        each = zip(rest, (self.forward.blocks[b].seen() for b in blocks), strict=True)
+        left = [np.where(seen, r.reshape(seen.shape) * self.weights.deviation, np.nan) for r, seen in each]
+        noise = left_by(self.forward, left, self.weights.gap)
+        out = noise.log_prior - log_volume(noise, rows)
+        for mine in patterns(rows):
+            out -= 0.5 * float(np.sum(noise.whitened(np.stack([left[n] for n in mine]), rows[mine[0]]) ** 2))
+        return out

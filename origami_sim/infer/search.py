@@ -1,0 +1,556 @@
+"""Search for the sets of effects that the recordings support: linear evidence proposes, fits decide.
+
+About every fit the evidence of all sets that add one or two effects to it is known in closed form. The set with the
+largest posterior that has not been fitted is fitted next, until what has not been fitted holds little. Each set is
+judged by the linearisation that is nearest to it: its own, if it was fitted.
+
+Half and double of UNFITTED, LEADING and OWED change no word on four swings (two rub, one stiffens, one lacks nothing),
+and no probability by more than 0.011.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import t as student
+
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
+from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, usual
+from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
+from origami_sim.fit.linear import Linearisation
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights, log_volume, recast
+from origami_sim.infer.foresight import Foresight
+from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
+from origami_sim.infer.nominal import level
+from origami_sim.infer.scan import scanned, strained
+from origami_sim.infer.screen import Signature
+
+UNFITTED = 0.05
+"""Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
+
+FITS = 16
+"""Sets that are fitted at most, before leaders are polished and after."""
+
+LEADING = 12
+"""Single effects, those that promise most, that are paired with all others, and fitted if they may be best.
+
+It bounds the time of a search.
+"""
+
+OWED = 1.0
+"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
+
+CELLS = 8
+"""Cells of the grid of discrepancies for which pairs are judged: those that hold nearly all of the posterior."""
+
+MANY = 200
+"""Sets beyond which only these cells are looked at."""
+
+SMOOTH = 40
+"""Cosines of a channel's discrepancy in one recording, at most: slower than noise, faster than an offset."""
+
+TIGHT = 1e-3
+"""Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
+
+Key = frozenset[int]
+
+
+@dataclass(eq=False)
+class Node:
+    """A fitted set.
+
+    Attributes:
+        key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
+        groups: columns of the fit's own effects, then of the others'. others: indices of these.
+        grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
+            problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
+        alone: log posterior of single effects in its place, as it judges them.
+    """
+
+    key: Key
+    fit: Fit
+    evidence: np.ndarray
+    groups: list[Group]
+    others: list[int]
+    grid: list[Summed | None]
+    foresight: Foresight | None = None
+    problems: dict[float, Problem] = field(default_factory=dict)
+    wide: bool = False
+    alone: dict[Key, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
+
+    `near`: how many effects that one has more or less, and its evidence, the better the smaller.
+    """
+
+    parent: Key
+    groups: tuple[int, ...]
+    values: np.ndarray
+    near: tuple[int, float]
+
+
+@dataclass(eq=False)
+class Posterior:
+    """Over sets of effects, and sizes of discrepancy.
+
+    Attributes:
+        signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
+            posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
+            was not possible.
+        ranked: what single effects promise the model without any, best first. hoped: what sets that were fitted had
+            promised, by their labels. gains: by how much they were better, by the fit that the promise is about.
+        promise: log posterior that sets which were not fitted may have. weights: of the signatures.
+        store: whether nodes keep their problems, to be judged anew (`stored`).
+        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
+            were fitted on.
+    """
+
+    signatures: list[Signature]
+    weights: Weights
+    hyper: Hyper = HYPER
+    nodes: dict[Key, Node] = field(default_factory=dict)
+    log: dict[Key, np.ndarray] = field(default_factory=dict)
+    total: dict[Key, float] = field(default_factory=dict)
+    estimates: dict[Key, Estimate] = field(default_factory=dict)
+    failed: dict[Key, str] = field(default_factory=dict)
+    ranked: dict[Key, float] = field(default_factory=dict)
+    gains: dict[Key, list[float]] = field(default_factory=dict)
+    hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
+    promise: dict[Key, float] = field(default_factory=dict)
+    store: bool = False
+    renewed: set[Key] = field(default_factory=set)
+    polished: dict[Key, float] = field(default_factory=dict)
+    _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
+
+    def probabilities(self) -> dict[Key, float]:
+        """Of each set, over all sizes of discrepancy; of those that differ in where their shapes begin, the best."""
+        log = self.total
+        best: dict[tuple[str, ...], Key] = {}
+        for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
+            best[self.labels(key)] = key
+        p = np.array([log[k] for k in best.values()])
+        total = logsumexp(p)
+        return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Effects of a set and their sites."""
+        if key not in self._labels:
+            self._labels[key] = tuple(sorted(self.suspect(n).label for n in key))
+        return self._labels[key]
+
+    def drop(self, key: Key) -> None:
+        """Leaves out what is known of a set that was not fitted."""
+        del self.log[key], self.total[key], self.promise[key], self.estimates[key]
+
+    def cells(self, key: Key | None = None) -> np.ndarray:
+        """(cells,) posterior of sizes of discrepancy and flaws, given a set or over all."""
+        log = self.log[key] if key is not None else logsumexp(np.stack(list(self.log.values())), axis=0)
+        return np.exp(log - logsumexp(log))
+
+    def suspect(self, n: int) -> Suspect:
+        return self.signatures[n].suspect
+
+    def label(self, key: Key) -> str:
+        return " + ".join(self.labels(key)) or "nominal"
+
+
+def search(
+    forward: Predictor,
+    base: Fit,
+    signatures: list[Signature],
+    weights: Weights,
+    *,
+    progress: Callable[[float], None] | None = None,
+    most: int = FITS,
+    store: bool = False,
+) -> Posterior:
+    """The posterior over sets of effects, from the refitted model without any."""
+    out = Posterior(signatures, weights, store=store)
+    _add(out, forward, frozenset(), base, log_priors(signatures))
+    extended(out, forward, progress=progress, most=most)
+    while polished(out, forward):
+        extended(out, forward, progress=progress, most=most)
+    return out
+
+
+def extended(
+    out: Posterior, forward: Predictor, *, progress: Callable[[float], None] | None = None, most: int = FITS
+) -> Posterior:
+    """Fits sets until none that has not been fitted holds much of the posterior."""
+    prior = log_priors(out.signatures)
+    for n in range(most):
+        if progress:
+            progress(n / most)
+        key = _likely(out)
+        if n % 2 or key is None:
+            key = _alone(out) or key
+        if key is None:
+            break
+        labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
+        out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
+        fitted = _fitted(out, forward, key)
+        if fitted.failed:
+            out.failed[key] = fitted.failed
+            out.drop(key)
+            continue
+        _add(out, forward, key, fitted, prior)
+        out.gains.setdefault(parent, []).append(out.total[key] - promise)
+    return out
+
+
+def _likely(out: Posterior) -> Key | None:
+    """The set to fit next: that which promises most, if it may hold much of the posterior."""
+    least = max(out.total[k] for k in out.nodes) + np.log(UNFITTED)
+    doubts = {k: min(0.0, _most(gains)) for k, gains in out.gains.items() if len(gains) > 1}
+    unfitted = {k: _promise(out, k) + doubts.get(e.parent, 0.0) for k, e in out.estimates.items()}
+    # another start of the shape of a set that was fitted has to promise more than that did
+    better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
+    return max(better, key=lambda k: unfitted[k], default=None)
+
+
+def _promise(out: Posterior, key: Key) -> float:
+    """Log posterior that a set which was not fitted may have, by the nearest fit."""
+    return max(out.total[key], out.promise[key])
+
+
+def _most(gains: Sequence[float]) -> float:
+    """What the next set may gain over its promise at most, if it is like those before (but for UNFITTED); 0 if none."""
+    if not gains:
+        return 0.0
+    off = np.array(gains if len(gains) > 1 else [0.0, *gains])
+    doubt = np.sqrt(1.0 + 1.0 / len(off)) * np.std(off, ddof=1)
+    return float(np.mean(off) + student.ppf(1.0 - UNFITTED, len(off) - 1) * doubt)
+
+
+def _alone(out: Posterior) -> Key | None:
+    """A single effect to fit that may be best, if it is better than it promised by as much as other sets were.
+
+    About a model that is far from what was recorded what is linear promises too little, or too much; about a fit that
+    leaves white noise it tells which effects could stand in its place. Of an effect that was fitted alone, or is in the
+    best set, there is no need to know more.
+    """
+    best = max(out.total, key=lambda k: out.total[k])
+    near, bonus = out.total[best] + np.log(UNFITTED), _most(out.gains.get(frozenset(), []))
+    leader = out.nodes.get(best)
+    white = leader is not None and leader.fit.weights is not None and not leader.fit.weights.colour
+    instead = leader.alone if leader is not None and white else {}
+    known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
+    singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise + bonus >= near][:LEADING]
+    likely = (k for k in singles if instead.get(k, np.inf) >= near)
+    return next((k for k in likely if not known & {out.suspect(n).effect for n in k}), None)
+
+
+def polished(out: Posterior, forward: Predictor) -> bool:
+    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
+
+    Leaders are those that hold part of the posterior, or would if they gained as much as others did.
+    """
+    prior, some = log_priors(out.signatures), False
+    while True:
+        best = max(out.total[k] for k in out.nodes)
+        gains = list(out.polished.values())
+        least = best + np.log(UNFITTED) - max(0.0, _most(gains))
+        leaders = [k for k in out.nodes if out.total[k] >= least and k not in out.polished]
+        if not leaders:
+            return some
+        key, some = max(leaders, key=lambda k: out.total[k]), True
+        out.polished[key] = 0.0
+        before, f = out.total[key], out.nodes[key].fit
+        f = renewed(forward, f.reweighted(tight(f)))
+        if f.cost - promised(forward, f) >= OWED:
+            f = carried_on(forward, f)
+            f = f if f.failed or f.exact else renewed(forward, f)
+        if not f.failed:
+            _add(out, forward, key, f, prior)
+            out.polished[key] = out.total[key] - before
+
+
+def tight(f: Fit) -> Weights:
+    """The noise that a fit implies, with gaps that leave its steps linear."""
+    assert f.weights is not None
+    return replace(f.weights, gap=max(f.weights.gap, TIGHT))
+
+
+def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:
+    """Log prior of each suspect being one that was left out, given that one was: effects, then their sites, alike."""
+    kinds: dict[str, list[int]] = {}
+    for n, s in enumerate(signatures):
+        kinds.setdefault(s.suspect.effect, []).append(n)
+    out = np.zeros(len(signatures))
+    for mine in kinds.values():  # a recorder as a whole is as likely to be wrong as all of its channels alone
+        share = {signatures[n].suspect.label: 1.0 / signatures[n].suspect.sites for n in mine}
+        for n in mine:
+            out[n] = np.log(share[signatures[n].suspect.label] / sum(share.values())) - np.log(len(kinds))
+    return out + np.log(hyper.effects)
+
+
+def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
+    """Log prior of a set: any order of the same effects is one set."""
+    k = len(key)
+    return float(sum(prior[n] for n in key) + np.log(1.0 - hyper.effects) + np.sum(np.log(np.arange(1, k + 1))))
+
+
+def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
+    """Judges a fitted set, and all that add one or two effects to it if it leads, or leads those of its size."""
+    node, effects = _node(out, forward, key, f)
+    if _leads(out, node, prior):
+        own = OwnColumns(node.fit)
+        coloured = node.fit.weights is not None and node.fit.weights.colour
+        node.foresight = Foresight.of(forward, node.fit, own, effects, out.hyper) if coloured else None
+        place(out, node, prior)
+    else:
+        enter(out, node, prior)
+
+
+def _leads(out: Posterior, node: Node, prior: np.ndarray) -> bool:
+    """Whether a set holds part of the posterior, or is the best of so many effects."""
+    total = float(logsumexp(node.evidence + out.hyper.log_cells)) + _log_prior(node.key, prior, out.hyper)
+    others = {k: out.total[k] for k in out.nodes if k != node.key}
+    alike = max((t for k, t in others.items() if len(k) == len(node.key)), default=-np.inf)
+    return total >= min(alike, max(others.values(), default=-np.inf) + np.log(UNFITTED))
+
+
+def enter(out: Posterior, node: Node, prior: np.ndarray) -> None:
+    """Enters a judged set into a posterior."""
+    key = node.key
+    forget(out, key)
+    out.nodes[key] = node
+    out.log[key] = node.evidence + out.hyper.log_cells + _log_prior(key, prior, out.hyper)
+    out.total[key] = float(logsumexp(out.log[key]))
+    out.estimates.pop(key, None)
+
+
+def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
+    """Enters a judged set, and all that add one or two effects to it, into a posterior."""
+    hyper, key, f = out.hyper, node.key, node.fit
+    cells = hyper.log_cells
+    enter(out, node, prior)
+    node.wide = True
+    members = _members(f.hypothesis, out)
+    own = tuple(range(len(members)))
+    fewer = [s for n in range(len(own)) for s in combinations(own, n)]
+    later = [n + len(own) for n in range(len(node.others))]
+
+    def joined(with_: tuple[int, ...]) -> list[tuple[int, ...]]:
+        mine = frozenset(members[k] for k in with_)
+        return [(*with_, n) for n in later if _compatible(out, mine, node.others[n - len(own)])]
+
+    _judge(out, node, fewer, prior, cells)
+    for s in fewer:
+        _judge(out, node, joined(s), prior, cells)
+    more = joined(own)
+    singles = _judge(out, node, more, prior, cells, foresee=True)
+    ranked = [more[n][-1] for n in np.argsort(-singles)]
+    if not key:
+        alone = {k: out.promise[k] for n in node.others if (k := frozenset((n,))) in out.promise}
+        out.ranked = dict(sorted(alone.items(), key=lambda item: -item[1]))
+    pairs = []
+    for a, one in enumerate(ranked[:LEADING]):
+        first = frozenset((node.others[one - len(own)],))
+        if len(own) + 2 > hyper.most:
+            break
+        pairs += [(*own, one, n) for n in ranked[a + 1 :] if _compatible(out, first, node.others[n - len(own)])]
+    _judge(out, node, pairs, prior, cells, foresee=True)
+    node.foresight = None  # it is large
+
+
+def forget(out: Posterior, key: Key) -> None:
+    """Leaves out a fit of a set, and what was estimated by it."""
+    out.nodes.pop(key, None)
+    for k in [k for k, e in out.estimates.items() if e.parent == key]:
+        out.drop(k)
+
+
+def _members(hypothesis: Hypothesis, out: Posterior) -> list[int]:
+    """Indices of a hypothesis' suspects."""
+    place = {id(s.suspect): n for n, s in enumerate(out.signatures)}
+    return [place[id(s)] for s in hypothesis.suspects]  # the same objects also after weights have changed
+
+
+def _judge(
+    out: Posterior,
+    node: Node,
+    sets: list[tuple[int, ...]],
+    prior: np.ndarray,
+    cells: np.ndarray,
+    *,
+    foresee: bool = False,
+) -> np.ndarray:
+    """Judges sets of groups by a node, and keeps that where no other node is nearer; how they rank (n,)."""
+    if not sets:
+        return np.zeros(0)
+    members = _members(node.fit.hypothesis, out)
+    own = len(members)
+    keys = [frozenset(members[c] if c < own else node.others[c - own] for c in s) for s in sets]
+    found, peak = np.full((len(sets), len(cells)), -np.inf), np.full(len(sets), -np.inf)
+    values: dict[int, np.ndarray] = {}
+    order = np.argsort(-(node.evidence + cells))
+    width: dict[tuple[int, int], list[int]] = {}
+    for n, s in enumerate(sets):
+        width.setdefault((len(s), sum(len(node.groups[g].columns) for g in s)), []).append(n)
+    count = next(len(c.gram) for c in node.grid if c is not None) - 1
+    laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
+    log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
+    for c in order[: CELLS if len(sets) > MANY else None]:
+        cell = node.grid[c]
+        if cell is None:
+            continue
+        for mine, rows in laid:
+            log, value = cell.of(rows, out.hyper)
+            found[mine, c] = log + cells[c] + log_prior[mine]
+            for n in np.flatnonzero(found[mine, c] > peak[mine]):
+                peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
+    rank = promise = logsumexp(found, axis=1)
+    totals: list[float] = rank.tolist()
+    if foresee and node.foresight is not None:
+        # what is missing explains some of the colour, and all that flaws and discrepancy would
+        bare = np.array([smooth == 0.0 and flaws == out.hyper.flaws[0] for _, smooth, flaws in out.hyper.cells])
+        total, rank, promise = float(logsumexp((node.evidence + cells)[bare])), rank.copy(), promise.copy()
+        for mine, rows in laid:
+            log, value = node.foresight.white.of(rows, out.hyper)
+            rank[mine] = log + log_prior[mine]
+            values.update(zip(mine, value, strict=True))
+        for n in np.argsort(-rank)[:LEADING]:
+            promise[n] = total + log_prior[n] + node.foresight.gain([node.groups[g] for g in sets[n]], out.hyper)
+    for n, key in enumerate(keys):
+        if len(key) == 1:
+            node.alone[key] = totals[n]
+        if key in out.nodes and key and key < node.key and key not in out.renewed:
+            if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
+                out.renewed.add(key)
+                forget(out, key)
+        if key in out.nodes or key in out.failed or n not in values:
+            continue
+        before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
+        if before is None or near <= before.near:
+            out.log[key], out.total[key], out.promise[key] = found[n], totals[n], float(promise[n])
+            out.estimates[key] = Estimate(node.key, sets[n], values[n], near)
+    return rank
+
+
+def _compatible(out: Posterior, key: Key, n: int) -> bool:
+    """Whether a suspect can be added to a set."""
+    if len(key) >= out.hyper.most:
+        return False
+    s = out.suspect(n)
+    return all(distinct_sites(out.suspect(k), s) and not _same_place(out.suspect(k), s) for k in key)
+
+
+def _same_place(a: Suspect, b: Suspect) -> bool:
+    """Whether both are one effect at all sites and at one of them, of which the second is no further effect."""
+    return a.effect == b.effect and (a.entities is None or b.entities is None)
+
+
+def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, list[np.ndarray]]:
+    """A judged fit, and the columns of its own and of all further effects, per segment."""
+    hyper, f = out.hyper, with_own_noise(forward, f, out.hyper)
+    line, own = f.linear, OwnColumns(f)
+    assert line is not None and f.weights is not None
+    # order: the fit's own columns by suspect, then one column for each other suspect
+    others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
+    count, groups = len(own.columns), list(own.groups)
+    for n, o in enumerate(others):
+        one = out.signatures[o]
+        groups.append(
+            Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, usual(one.suspect))
+        )
+    added = [np.zeros((len(t), len(others))) for t in line.tangent]
+    for k, o in enumerate(others):
+        for columns, part in zip(added, out.signatures[o].parts, strict=True):
+            columns[:, k] = part
+    added = recast(added, line.rows, out.weights, f.weights)
+    effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
+    smooth = cosines(forward, f, line)
+    tied = any(t is not None for t in line.tie)
+    laid = own.sets(count + len(others))
+    volume = f.weights.log_prior - log_volume(f.weights, line.rows)
+    grid: list[Summed | None] = []
+    evidence, problems = np.full(len(hyper.cells), -np.inf), {}
+    for c, (gap, size, flaws) in enumerate(hyper.cells):
+        if not tied and gap != hyper.gaps[0]:
+            grid.append(None)
+            continue
+        if gap not in problems:
+            now, theirs = regapped(line, effects, f.weights, gap)
+            made = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
+            problems[gap] = replace(made, constant=made.constant + volume)
+        cell = summed(problems[gap], size, flaws)
+        grid.append(cell)
+        evidence[c] = cell.of(laid, hyper)[0][0]
+    return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
+
+
+def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:
+    """Per block [r, K]: smooth curves in each channel over each recording, of unit root mean square times 1/order."""
+    dims = len(forward.components)
+    chains: list[list[int]] = []
+    for n, b in enumerate(f.blocks):
+        tied = n > 0 and line.tie[n - 1] is not None
+        same = n > 0 and forward.blocks[b].recording == forward.blocks[f.blocks[n - 1]].recording
+        if tied or (same and not forward.separate):
+            chains[-1].append(n)
+        else:
+            chains.append([n])
+    most = max(2, min(SMOOTH, 240 // max(1, dims * len(chains))))
+    kinds = [max(2, min(sum(line.rows[n].data for n in chain) // dims // 10, most)) for chain in chains]
+    total = sum(kinds) * dims
+    out = [np.zeros((r.count, total)) for r in line.rows]
+    column = 0
+    for chain, count in zip(chains, kinds, strict=True):
+        frames = [line.rows[n].data // dims for n in chain]
+        first = np.cumsum([0, *frames])
+        for n, a in zip(chain, first[:-1], strict=True):
+            t = (a + np.arange(line.rows[n].data // dims) + 0.5) / first[-1]
+            seen = forward.blocks[f.blocks[n]].seen()
+            for d in range(dims):
+                for k in range(count):
+                    shape = np.cos(np.pi * k * t) / (1.0 + k / 4.0)
+                    out[n][d : line.rows[n].data : dims, column + d * count + k] = np.where(seen[:, d], shape, 0.0)
+        column += count * dims
+    return out
+
+
+def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
+    """Fits a set, from where the linear estimate of the nearest fitted one puts it."""
+    estimate = out.estimates[key]
+    node = out.nodes[estimate.parent]
+    members = _members(node.fit.hypothesis, out)
+    begin, suspects = [node.fit.theta[: len(forward.subject.nominals)]], []
+    own = np.cumsum([len(begin[0]), *(len(s.free) for s in node.fit.hypothesis.suspects)])
+    column = 0
+    for g in estimate.groups:
+        if g < len(members):
+            suspects.append(node.fit.hypothesis.suspects[g])
+            begin.append(node.fit.theta[own[g] : own[g + 1]])
+        else:
+            signature = out.signatures[node.others[g - len(members)]]
+            first, *rest = signature.suspect.free
+            strength = np.clip(first.start + estimate.values[column] * signature.size, first.lower, first.upper)
+            suspects.append(signature.suspect)
+            begin.append(np.array([strength, *(f.start for f in rest)]))
+        column += len(node.groups[g].columns)
+    hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
+    assert parent.linear is not None and parent.weights is not None
+    by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
+    given = scanned(forward, hypothesis, by, parent.local) if len(suspects) == 1 and strained(parent) else None
+    if given is not None:
+        return fit(forward, hypothesis, by, theta=given, local=parent.local)
+    # derivatives by the numbers of the model and by starts hardly change with an effect
+    near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
+    return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
+
+
+def marginals(p: Posterior) -> dict[str, float]:
+    """Posterior of each effect at each site, over all sets."""
+    out: dict[str, float] = {}
+    for key, value in p.probabilities().items():
+        for label in {p.suspect(n).label for n in key}:
+            out[label] = out.get(label, 0.0) + value
+    return dict(sorted(out.items(), key=lambda item: -item[1]))

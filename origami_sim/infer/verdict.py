@@ -1,0 +1,338 @@
+"""The verdict: sums over the posterior, put into words."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from origami_sim.effects import get
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.recorder import recorder_noise
+from origami_sim.infer.budget import Budget, Share, budget
+from origami_sim.infer.implied import OwnColumns
+from origami_sim.infer.search import Key, Node, Posterior
+from origami_sim.infer.words import distinct, joined, pooled, said, say, title
+
+CREDIBLE = 0.95
+"""Probability that the stated set of explanations holds."""
+
+ALONE = 0.8
+"""Probability from which one explanation is named alone: to name a wrong one is four times as bad as a tie."""
+
+LISTED = 3
+"""Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time."""
+
+FAR = 2.0
+"""Error over the noise of the recorder from which something real is left, whatever is more probable.
+
+Of ten objects with nothing missing it is 0.96 to 1.14, also with trackers that average over frames.
+"""
+
+COMPARED = 0.9
+"""Share of the frames that has to be compared before nothing may be said to be missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What is said.
+
+    Attributes:
+        verdict, sentence, probability, chosen: see `Diagnosis`. best: the fit to show. tied: explanations that are not
+            told from it, itself among them. others: the next best. budget: of the mismatch. notes: what else to say.
+    """
+
+    verdict: str
+    sentence: str
+    probability: float
+    chosen: list[str]
+    best: Fit
+    tied: list[Fit] = field(default_factory=list)
+    others: list[Fit] = field(default_factory=list)
+    budget: list[Share] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a posterior says, before it is put into words.
+
+    Attributes:
+        word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
+        credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
+            named, or of them.
+    """
+
+    word: str
+    best: Key
+    lead: frozenset[str]
+    credible: list[frozenset[str]]
+    tie: bool
+    probability: float
+
+
+def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
+    """The verdict on a posterior over sets of effects.
+
+    Args:
+        budgets: the budget of a fitted set.
+    """
+    chance = p.probabilities()
+    classes = by_effects(p, chance)
+    lead, beside = surely(classes)
+    top = max(classes, key=lambda c: classes[c])
+    best = best_of(p, chance, lead or top)
+    may_be, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
+
+    def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
+        return Decision(word, best, lead or top, may_be, tie, probability)
+
+    if all(s.status for s in p.signatures):
+        return as_("UNTESTABLE", 1.0)
+    left = budgets(best)
+    if left.rest > left.named and (left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE):
+        return as_("UNKNOWN", np.nan)
+    if not top:
+        return as_("", classes[top])
+    if not lead or beside:
+        return as_("MEASUREMENT" if all(map(_of_recorder, may_be)) else "TIE", total, tie=True)
+    named = [n for n in best if p.suspect(n).effect in lead]
+    word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if len(named) > 1 else "MECHANISM"
+    return as_(word, sum(v for c, v in classes.items() if c >= lead))
+
+
+def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
+    """The verdict in words.
+
+    Args:
+        given, base: the model as given, and refitted. compared: share of the frames that were compared.
+    """
+    budgets: dict[Key, Budget] = {}
+
+    def budgeted(key: Key) -> Budget:
+        if key not in budgets:
+            budgets[key] = budget(forward, given, base, p.nodes[key].fit)
+        return budgets[key]
+
+    d = decide(p, budgeted)
+    chance = p.probabilities()
+    classes = by_effects(p, chance)
+    shown, explained = widened(p, d.best), _explained(budgeted(d.best))
+    tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
+    ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
+    others = [widened(p, k) for k in ranked if class_of(p, k) != d.lead]
+    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares}
+    suspects = shown.hypothesis.suspects
+    chosen = [s.label for s in suspects]
+    if d.word == "UNTESTABLE":
+        text = "None of the catalogue's suspects is excited by these recordings."
+        text = text if p.signatures else "There is no suspect that could act here."
+        return Judgement(d.word, text, d.probability, [], **common)
+    if not d.lead:
+        word, text, chosen = unnamed_verdict(forward, given, base, compared, unknown=d.word == "UNKNOWN")
+        return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
+    if d.word == "UNKNOWN":
+        text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
+        return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
+    if d.tie:
+        names = distinct([f for f in tied if f.hypothesis.suspects]) + (
+            ["nothing"] if frozenset() in d.credible else []
+        )
+        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4]]
+        more = f" and {len(d.credible) - 4} more" if len(d.credible) > 4 else ""
+        text = f"These recordings do not decide between {joined(each)}{more}. "
+        return Judgement(d.word, f"{text}The best is {say(shown)}, which {explained}.", d.probability, names, **common)
+    # the shown set may hold more than what surely acts: of that, each effect by its own probability
+    named = [s for s in suspects if s.effect in d.lead]
+    chosen = [s.label for s in named]
+    if d.word == "MEASUREMENT":
+        text = f"The measurement, not the device, explains the mismatch: {say(shown, only=d.lead)}"
+    else:
+        text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
+    who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
+    explained = explained if who == "it" else explained.replace("explains", "explain", 1)
+    text += f", p = {d.probability:.2f}; {who} {explained}."
+    more = 1.0 - classes.get(d.lead, 0.0) / d.probability
+    if more > ALONE:
+        each = _besides(classes, d.lead)
+        likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""
+        text += f" Something acts besides (p = {more:.2f}), and these recordings do not tell what{likely}."
+    return Judgement(d.word, text, d.probability, chosen, **common)
+
+
+def unnamed_verdict(
+    forward: Predictor, given: Fit, base: Fit, compared: float, *, unknown: bool = False
+) -> tuple[str, str, list[str]]:
+    """Word, sentence and numbers where no effect is more probable than none: adequate, a number, or real and not named.
+
+    Args:
+        unknown: whether a discrepancy is real that the refitted model leaves.
+    """
+    over = pooled(base.rms() / recorder_noise(forward, base))
+    if unknown:
+        text = f"The refitted model misses the recordings by {over:.2f} times the noise"
+        if over < FAR:
+            text = "The refitted model follows the recordings only if forces that it lacks act on the device"
+        return "UNKNOWN", f"{text}, and nothing in the catalogue explains it.", []
+    if compared < COMPARED:
+        text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
+        return "UNTESTABLE", text, []
+    off = [m for m, v in zip(base.free, base.theta, strict=True) if abs(v - m.start) > m.spread]
+    if odds_of_numbers(given, base) <= 0.0 or not off:
+        text = f"The model is adequate: within what is known of its numbers, its error is {over:.2f} times the noise."
+        return "ADEQUATE", text, []
+    far = sorted(zip(base.free, base.theta, strict=True), key=lambda m: -abs(m[1] - m[0].start) / m[0].spread)
+    f, t = far[0]
+    beyond = [m for m, v in far if abs(v - m.start) > m.spread]
+    aligned = all(m.aligned for m in beyond)
+    recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in beyond)
+    strain = abs(t - f.start) / f.spread
+    text = "Aligning the recording" if aligned else "Refitting the numbers of the model"
+    text += f" is enough: {f.label} goes from {said(f.start, f.unit)} to {said(t, f.unit)}, {strain:.1f} standard "
+    text += f"deviations of what was known; the error is then {over:.2f} times the noise."
+    return "MEASUREMENT" if recorder else "PARAMETER", text, [m.label for m in beyond]
+
+
+def odds_of_numbers(given: Fit, base: Fit) -> float:
+    """Log odds that numbers of the model are off within their priors, against that they are exactly as given."""
+    line = base.linear
+    assert line is not None
+    if not line.tangent[0].shape[1]:
+        return -np.inf
+    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 1e-6 for n in base.free])
+    a = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])
+    size = np.abs(np.diag(np.linalg.qr(a, mode="r")))
+    return float(0.5 * (given.misfit - base.cost) - np.sum(np.log(size / prior)))
+
+
+def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], float]:
+    """Posterior of each set of effects, wherever they act."""
+    out: dict[frozenset[str], float] = {}
+    for key, value in chance.items():
+        c = class_of(p, key)
+        out[c] = out.get(c, 0.0) + value
+    return out
+
+
+def class_of(p: Posterior, key: Key) -> frozenset[str]:
+    return frozenset(p.suspect(n).effect for n in key)
+
+
+def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
+    """Posterior of each effect, whatever acts besides."""
+    out: dict[str, float] = {}
+    for c, value in classes.items():
+        for effect in c:
+            out[effect] = out.get(effect, 0.0) + value
+    return out
+
+
+def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
+    """Effects that act together with at least `ALONE`; and the few explanations that add to them, if one surely does.
+
+    What is added is listed where `LISTED` explanations or fewer hold `ALONE`.
+    """
+    marginal = of_each(classes)
+    lead: frozenset[str] = frozenset()
+    for effect in sorted(marginal, key=lambda e: (-marginal[e], e)):
+        larger = lead | {effect}
+        if sum(v for c, v in classes.items() if c >= larger) < ALONE:
+            break
+        lead = larger
+    likely = sorted((c for c in classes if c > lead), key=lambda c: -classes[c])[:LISTED]
+    for n in range(1, len(likely) + 1 if lead else 1):
+        if sum(classes[c] for c in likely[:n]) >= ALONE:
+            return lead, likely[:n]
+    return lead, []
+
+
+def _besides(classes: dict[frozenset[str], float], lead: frozenset[str]) -> list[tuple[str, float]]:
+    """The most probable effects that act beside others, with their probabilities."""
+    chance = of_each({c - lead: value for c, value in classes.items() if c >= lead})
+    likely = sorted(chance.items(), key=lambda item: (-item[1], item[0]))[:LISTED]
+    return [(e, v) for e, v in likely if v > 1.0 - CREDIBLE]
+
+
+def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> Key:
+    """The most probable fitted set of these effects; or else of these and others, or else of any."""
+    if not effects:
+        return frozenset()
+    classes = {k: class_of(p, k) for k in p.nodes}
+    mine = [k for k, c in classes.items() if c == effects]
+    mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
+    return max(mine, key=lambda k: chance.get(k, 0.0))
+
+
+def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]], float]:
+    """The smallest set of explanations that holds 95 %; what only adds to another one is left out."""
+    total, out = 0.0, []
+    for c in sorted(classes, key=lambda c: -classes[c]):
+        if total >= CREDIBLE:
+            break
+        total += classes[c]
+        if not any(c > d for d in out if d):
+            out.append(c)
+    return out, min(total, 1.0)
+
+
+def widened(p: Posterior, key: Key) -> Fit:
+    """A fit whose intervals count flaws and discrepancy."""
+    node = p.nodes[key]
+    f = node.fit
+    own = len(f.free) - len(f.hypothesis.free)
+    if not f.hypothesis.suspects:
+        return f
+    sd = deviations(node, p)
+    plain = f.deviations()
+    wider = np.ones(len(f.free))
+    wider[own:] = np.maximum(sd, plain[own:]) / np.maximum(plain[own:], 1e-300)
+    return replace(f, wider=wider)
+
+
+def deviations(node: Node, p: Posterior) -> np.ndarray:
+    """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI]."""
+    cell = node.grid[int(np.argmax(node.evidence + p.hyper.log_cells))]
+    assert cell is not None
+    own = OwnColumns(node.fit)
+    count, first = len(own.columns), len(own.nominal)
+    spread = np.concatenate([g.spread for g in own.groups])
+    strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in own.groups])
+    known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread)
+    cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known**2), rcond=1e-14)
+    out = np.zeros(count)
+    scale = np.array([node.fit.free[c].scale for c in own.columns])
+    out[np.array(own.columns) - first] = scale * np.sqrt(np.maximum(np.diag(cover), 0.0))
+    return out
+
+
+def _explained(b: Budget) -> str:
+    text = f"explains {b.named:.0%} of the mismatch"
+    if b.numbers >= 0.005:
+        text += f", numbers of the model {b.numbers:.0%}"
+    return text + (f"; {b.rest:.0%} is real and not named" if b.rest >= 0.005 else "")
+
+
+def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:
+    """Where else the same effects may act, in words."""
+    where: dict[str, float] = {}
+    for key, value in chance.items():
+        if class_of(p, key) >= lead:
+            name = joined(sorted({p.suspect(n).label for n in key if p.suspect(n).effect in lead}))
+            where[name] = where.get(name, 0.0) + value
+    least = (1.0 - CREDIBLE) * sum(where.values())
+    where.pop(joined(sorted({p.suspect(n).label for n in best if p.suspect(n).effect in lead})), None)
+    likely = sorted(n for n, v in where.items() if v > least)
+    return f" (or {joined(likely[:3])})" if likely else ""
+
+
+def _name(effects: frozenset[str]) -> str:
+    return " with ".join(sorted(title(e) for e in effects)) or "nothing missing"
+
+
+def _of_recorder(effects: frozenset[str]) -> bool:
+    return bool(effects) and all(get(e).family == "measurement" for e in effects)
+
+
+def log_odds(p: Posterior, key: Key) -> float:
+    """Log posterior odds of a set over the model without an effect."""
+    return p.total[key] - p.total[frozenset()]

@@ -1,0 +1,139 @@
+"""Rollouts of bars: of devices whose panels bend, from rest or from free starts."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.fit.predictor import Block
+from origami_sim.model import Model, Parameters, State
+from origami_sim.predict.channels import stacked
+from origami_sim.predict.rollouts import Rollouts, Shots, film
+from origami_sim.recording import Recording
+from origami_sim.solve.timestep import gradient_norms, stable_step
+
+CALM = 0.04
+"""Time at the start of a segment in which panels are damped [s].
+
+A segment starts with flat panels, because markers do not show how they bend. Real panels bend under their load; without
+the damping they would begin to ring. What is measured in that time is not compared.
+"""
+
+RATIO = 0.3
+"""Damping of panels in that time, as a ratio of critical for each bar and bending line."""
+
+CALMING = {"bar_viscosity": "bars", "panel_viscosity": "panel_bending"}
+"""What calms panels, by what keeps them in shape."""
+
+
+class BarRollouts(Rollouts):
+    """A `Predictor` of devices whose panels bend.
+
+    Args:
+        segment: length of a segment [s]; None: each recording is one segment. most: at most so many segments of each
+            recording, evenly spread, for a quick look; None: all. The rest as for `Rollouts`.
+    """
+
+    panels = "elastic"
+
+    def __init__(
+        self,
+        subject: Subject,
+        recordings: Sequence[Recording],
+        *,
+        segment: float | None = None,
+        start: str = "fit",
+        most: int | None = None,
+        threads: int | None = None,
+    ):
+        super().__init__(subject, recordings, start=start, threads=threads)
+        settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
+        self.calm = CALM if settles else 0.0
+        for index, recording in enumerate(self.recordings):
+            self.blocks += self._segments(index, recording, segment, most)
+
+    def _program(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*super()._program(), *CALMING]))
+
+    def _segments(self, index: int, recording: Recording, segment: float | None, most: int | None) -> list[Block]:
+        values, noise = stacked(recording)
+        step = float(np.median(np.diff(recording.times)))
+        frames = len(recording.times) if segment is None else max(8, round(segment / step) + 1)
+        calm = self._calm_frames(recording, frames)
+        firsts = np.arange(0, max(1, len(recording.times) - frames + 1), max(1, frames - 1 - calm))
+        if most is not None and len(firsts) > most:
+            firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
+        if self.start == "fit":
+            told = [self.tells(recording, values, noise, int(first)) for first in firsts]
+            firsts = firsts[told] if any(told) else firsts
+        return [self.segment(index, int(first), frames) for first in firsts]
+
+    def _calm_frames(self, recording: Recording, frames: int) -> int:
+        step = float(np.median(np.diff(recording.times)))
+        return min(int(np.ceil(self.calm / step)), frames // 4)
+
+    def segment(self, index: int, first: int, frames: int) -> Block:
+        block = super().segment(index, first, frames)
+        compared = block.values.copy()
+        compared[: self._calm_frames(self.recordings[index], frames)] = np.nan
+        return replace(block, values=compared)
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """The solver's step for one world, a frame at most [s]; 0 if no model can be built."""
+        frame = float(np.median(np.diff(self.recordings[0].times)))
+        try:
+            world = self.world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return 0.0
+        return min(frame, stable_step(*world).dt)
+
+    def _filmed(self, shots: Shots) -> tuple[np.ndarray, None]:
+        recording, model = self.recordings[shots.recording], shots.worlds[0][0]
+        parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
+        drive, state, step = self._driven(shots, model, parameters), self._state(shots), shots.step
+        substeps = max(1, int(np.ceil(step / stable_step(model, parameters).dt * (1 - 1e-12))))
+        raw: list[np.ndarray] = []
+        calm = min(self._calm_frames(recording, len(shots.blocks[0].times)), shots.frames - 1)
+        if calm:
+            quiet, damped = calmed(model, parameters)
+            finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
+            batch = self._batch(quiet, damped, drive, _with_effects(state, quiet))
+            raw += film(batch, recording, calm + 1, finer, step)
+            state = _with_effects(batch.state(), model, step=calm * substeps)
+        batch = self._batch(model, parameters, drive, state)
+        raw += film(batch, recording, shots.frames - sum(map(len, raw)), substeps, step, first=not calm)
+        out = np.concatenate(raw)
+        out[:, :, batch.status() >= 0] = np.nan
+        return out, None
+
+
+def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
+    """The same model with damped panels; folding is not damped."""
+    added = [e for e, of in CALMING.items() if of in model.effects]
+    quiet = model.with_effects(*added)
+    out = parameters.for_model(quiet)
+    with np.errstate(divide="ignore"):
+        mobility = np.any(model.free, axis=1)[:, None] / parameters["inertia", "mass"]
+        if "bars" in model.effects:
+            lighter = 1.0 / np.maximum(mobility[model.bars].sum(axis=1), 1e-300)
+            dashpot = 2 * RATIO * np.sqrt(parameters["bars", "stiffness"] * np.minimum(lighter, 1e300))
+            out.set("bar_viscosity", "viscosity", out["bar_viscosity", "viscosity"] + dashpot)
+        if "panel_bending" in model.effects:
+            nodes, slopes = gradient_norms(model, "bend")
+            inertia = 1.0 / np.maximum((mobility[nodes] * slopes[:, :, None] ** 2).sum(axis=1), 1e-300)
+            dashpot = 2 * RATIO * np.sqrt(parameters["panel_bending", "stiffness"] * np.minimum(inertia, 1e300))
+            out.set("panel_viscosity", "viscosity", out["panel_viscosity", "viscosity"] + dashpot)
+    return quiet, out
+
+
+def _with_effects(state: State, model: Model, step: int | None = None) -> State:
+    """A state for a model whose further effects have no memory; work is counted anew."""
+    count = len(model.laws)
+    return replace(
+        state.copy(),
+        work=np.zeros((count, state.worlds)),
+        power=np.zeros((count, state.worlds)),
+        step=state.step if step is None else step,
+    )

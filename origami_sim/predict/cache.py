@@ -1,0 +1,134 @@
+"""Predictions that are kept on disk, so that work which was interrupted goes on.
+
+Nearly all time goes into predictions, which are pure functions of model, parameters, starts and drive. Each is
+stored under a digest of these and of the package's own sources; a diagnosis that is started again finds them and so
+arrives in seconds where it was stopped. Nothing is pickled.
+"""
+
+import hashlib
+import os
+import shutil
+import time as clock
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.predictor import Prediction
+from origami_sim.predict.worlds import Worlds
+
+WORTH = 0.02
+"""Predictions that took less [s] are not stored."""
+
+_SOURCES = ("*.py", "effects/*.py", "solve/*.py", "recording/*.py", "fit/*.py")
+
+
+class Cache:
+    """Predictions that were made, in a folder.
+
+    Attributes:
+        found, computed: predictions that were found on disk, and those that were made.
+    """
+
+    def __init__(self, folder: str | Path):
+        self.folder = Path(folder)
+        self.found = self.computed = 0
+
+    def recalled(
+        self,
+        forward: Worlds,
+        each: Sequence[Hypothesis],
+        theta: Sequence[np.ndarray] | np.ndarray,
+        local: np.ndarray | None,
+        wanted: Sequence[int],
+        made: Callable[[], Prediction],
+    ) -> Prediction:
+        """What was predicted before, or else what is made now."""
+        file = self.folder / f"{digest(forward, each, theta, local, wanted)}.npz"
+        stored = _read(file, len(wanted))
+        if stored is not None:
+            self.found += 1
+            return stored
+        began = clock.perf_counter()
+        new = made()
+        # in the order of memory that a file has: sums depend on it in their last digit
+        ends = [None if e is None else np.ascontiguousarray(e) for e in new.ends]
+        out = Prediction([np.ascontiguousarray(v) for v in new.values], ends)
+        self.computed += 1
+        if clock.perf_counter() - began > WORTH:
+            _write(file, out)
+        return out
+
+    def clear(self) -> None:
+        """Forgets the predictions on disk."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def digest(forward: Worlds, each: Sequence[Hypothesis], theta, local, wanted: Sequence[int]) -> str:
+    """Digest of all that a prediction depends on."""
+    effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+    sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
+    numbers = [f.name for f in forward.subject.nominals]
+    h = hashlib.sha256(repr((_sources(), forward.kind(), numbers, effects, sites, list(wanted))).encode())
+    nominal = np.array([f.start for f in forward.subject.nominals])
+    model, parameters = forward.world(Hypothesis(), nominal, ())
+    h.update(model.hash.encode() + parameters.hash.encode())
+    for values in theta:
+        h.update(np.asarray(values, float).tobytes() + b"|")
+    if local is not None:  # what is remembered at a start depends on the first world's starts before it
+        h.update(np.ascontiguousarray(np.asarray(local)[:, wanted]).tobytes() + np.asarray(local)[0].tobytes())
+    for b in wanted:
+        block = forward.blocks[b]
+        h.update(repr((block.recording, block.first, block.lasting)).encode())
+        for part in (
+            block.times,
+            block.values[:1],
+            block.rates,
+            block.pose.rotation,
+            block.pose.centre,
+            block.pose.angles,
+        ):
+            h.update(np.ascontiguousarray(part).tobytes())
+    for part in forward.inputs():
+        h.update(b"-" if part is None else part if isinstance(part, bytes) else np.asarray(part, float).tobytes())
+    return h.hexdigest()[:32]
+
+
+@cache
+def _sources() -> str:
+    """Digest of the package: predictions of another version are not its own."""
+    h = hashlib.sha256()
+    home = Path(__file__).parents[1]
+    for pattern in _SOURCES:
+        for file in sorted(home.glob(pattern)):
+            h.update(file.name.encode() + file.read_bytes())
+    return h.hexdigest()
+
+
+def _read(file: Path, count: int) -> Prediction | None:
+    """Stored predictions; None if there are none, or if the file is damaged."""
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            ends = [data[f"end{n}"] if f"end{n}" in data else None for n in range(count)]
+            return Prediction([data[str(n)] for n in range(count)], ends)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def _write(file: Path, prediction: Prediction) -> None:
+    """Stores predictions, if the disk takes them: without, only an interruption costs more."""
+    part = file.with_name(f".{file.stem}.{os.getpid()}.part")
+    arrays = {str(n): v for n, v in enumerate(prediction.values)}
+    arrays |= {f"end{n}": e for n, e in enumerate(prediction.ends) if e is not None}
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, "wb") as f:
+            np.savez(f, allow_pickle=False, **arrays)
+        part.replace(file)
+    with suppress(OSError):
+        part.unlink(missing_ok=True)

@@ -1,0 +1,198 @@
+"""Rollouts of rigid panels: recordings cut into short segments that are tied to each other."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from origami_sim.articulation import Pose
+from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.fit.predictor import Block
+from origami_sim.model import Parameters, State, node_mass
+from origami_sim.predict.rollouts import Motion, Rollouts, Shots, film, joined_poses
+from origami_sim.predict.worlds import World
+from origami_sim.recording import Recording
+from origami_sim.solve.rigid import RigidBatch, Topology, check_inertia
+
+FEWEST = 8
+"""Frames of a segment, at least: as many as tell its start's rate."""
+
+TOLERANCE = 1e-8
+"""Error of a step of a rollout [rad]: far below any recorder's, and below what differences of rollouts can see.
+
+Ten times less costs 1.6 times the steps; ten times more begins to show in derivatives.
+"""
+
+FINEST = 1e-4
+"""Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
+
+Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
+"""
+
+
+class RigidRollouts(Rollouts):
+    """A `Predictor` of devices whose panels do not visibly bend.
+
+    Args:
+        segment: length of a segment [s]; None: a recording is one segment. tied: whether a segment begins where the one
+            before ends. The rest as for `Rollouts`.
+
+    Raises:
+        InputError: what rigid panels refuse; closed loops, a root that is held in part.
+    """
+
+    panels, nudge, blur = "rigid", 0.3, TOLERANCE
+
+    def __init__(
+        self,
+        subject: Subject,
+        recordings: Sequence[Recording],
+        *,
+        segment: float | None = None,
+        start: str = "fit",
+        tied: bool = True,
+        threads: int | None = None,
+    ):
+        super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
+        self._tree = Topology(self.model)
+        check_tree(self._tree, self.articulation.floating)
+        for index, recording in enumerate(self.recordings):
+            self.blocks += self._segments(index, recording, segment, tied)
+
+    def _segments(self, index: int, recording: Recording, segment: float | None, tied: bool) -> list[Block]:
+        step, count = float(np.median(np.diff(recording.times))), len(recording.times)
+        frames = count if segment is None or self.start != "fit" else max(FEWEST, round(segment / step))
+        pieces = max(1, round(count / frames))
+        firsts = np.arange(0, count, -(-count // pieces))  # of equal length, but for the last
+        firsts = np.append(firsts[count - firsts >= min(FEWEST, count)], count)
+        out = [self.segment(index, int(a), int(b - a)) for a, b in pairwise(firsts)]
+        if not tied or self.start != "fit":
+            return out
+        usual = self.usual_rates(index)
+        for n, (block, after) in enumerate(pairwise(out)):
+            lasting = float(recording.times[after.first] - recording.times[block.first])
+            # a force that is missing by chance changes rates, and coordinates by their integral
+            reach = np.concatenate([usual * lasting / np.sqrt(3.0), usual])
+            out[n] = replace(block, reach=reach, lasting=lasting)
+        return out
+
+    def world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> World:
+        """See `Worlds.world`.
+
+        Raises:
+            InputError: masses that leave a panel without inertia; what a model refuses.
+        """
+        model, parameters = super().world(hypothesis, values, effects)
+        check_inertia(model, self._tree, model.position, node_mass(model, parameters)[:, 0])
+        return model, parameters
+
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """A frame [s], since steps adapt themselves; 0 if no model can be built."""
+        try:
+            self.world(hypothesis, theta, hypothesis.effects)
+        except InputError:
+            return 0.0
+        return float(np.median(np.diff(self.recordings[0].times)))
+
+    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+        recording, model = self.recordings[shots.recording], shots.worlds[0][0]
+        parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
+        state = self._state(shots)
+        drive = self._driven(shots, model, parameters)
+        batch = self._batch(model, parameters, drive, state, tolerance=TOLERANCE)
+        if isinstance(batch, RigidBatch):
+            batch.finest = FINEST
+        begun, arrived, raw = 0, [], []
+        stops = [shots.ends + n for n in ((0, 1, 2) if shots.clocked else (1,))] if shots.ends else []
+        for frame in stops:
+            raw += film(batch, recording, frame - begun, 1, shots.step, first=not begun)
+            arrived.append(self._arrived(shots, batch.state()))
+            begun = frame
+        if shots.frames > begun:
+            raw += film(batch, recording, shots.frames - begun, 1, shots.step, first=not begun)
+        ends = np.stack(arrived) if arrived else None
+        out = np.concatenate(raw)
+        lost = batch.status() >= 0
+        out[:, :, lost] = np.nan
+        if ends is not None:
+            ends[..., lost] = np.nan
+        return out, ends
+
+    def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
+        """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other."""
+        numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
+        blocks = [self.blocks[n] for n in numbers]
+        if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
+            return super()._motion(r, world, local)
+        (model, parameters), m = world, self.articulation.size
+        step = float(np.median(np.diff(self.recordings[r].times)))
+        shifts = np.zeros((len(blocks), 2 * m)) if local is None else local[numbers]
+        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)], axis=1)
+        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)], axis=1)
+        x = np.moveaxis(self._placed(angles[:, :1]), 0, 1)
+        begin = State.at_rest(model, position=x)
+        begin.memory[:] = self._rested(r, [world], 0, x).remembered()
+        shots = Shots(r, blocks[:1], [world], np.zeros((1, 1)), None, None, step, len(self.recordings[r].times), 0)
+        drive = self._driven(shots, model, parameters)
+        batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
+        assert isinstance(batch, RigidBatch)
+        batch.finest = FINEST
+        films, memory = [angles[:, :1]], {}
+        for n, block in enumerate(blocks):
+            memory[block.first] = batch.remembered()[:, 0]
+            batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
+            after = block.lasting if block.reach is not None else block.times[-1]
+            frames = round(after / step)
+            if frames:
+                filmed = batch.film(frames, 1, after / frames, np.inf)[1]
+                films.append(filmed[:, self.articulation.creases, 0].T)
+        q = np.concatenate(films, axis=1)
+        if not np.all(np.isfinite(q)):  # a world that goes unstable
+            return super()._motion(r, world, local)
+        return Motion(self._placed(q), memory)
+
+    def _arrived(self, shots: Shots, state: State) -> np.ndarray:
+        """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""
+        arm, count = self.articulation, len(shots.blocks)
+        following = {(b.recording, b.first): b for b in self.blocks}
+        frames = [b.first + len(b.times) for b in shots.blocks]
+        after = [following[shots.recording, f] for f in frames]
+        base = joined_poses([b.pose for b in after])
+        rates = np.stack([b.rates for b in after], axis=1)
+        out = np.empty((2 * arm.size, state.worlds))
+        alike: dict[bytes, list[int]] = {}
+        for n, (own, _) in enumerate(shots.worlds):
+            alike.setdefault(own.position.tobytes(), []).append(n)
+        for key, mine in alike.items():
+            at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
+            own, b = self._arms[key], np.tile(np.arange(count), len(mine))
+            pose = own.poses_of(state.x[:, at], state.angles[:, at])
+            out[: arm.size, at] = shift_between(base.select(b), pose, arm.floating)
+            out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
+        return out
+
+
+def shift_between(base: Pose, pose: Pose, floating: bool) -> np.ndarray:
+    """Small displacement [m, W] of the coordinates that leads from one pose to another; angles by less than a turn."""
+    from scipy.spatial.transform import Rotation
+
+    angles = pose.angles - base.angles
+    angles = angles - 2 * np.pi * np.round(angles / (2 * np.pi))
+    if not floating:
+        return angles
+    turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
+    return np.concatenate([(pose.centre - base.centre).T, turn.T, angles])
+
+
+def check_tree(tree: Topology, floating: bool) -> None:
+    """Refuses what has other coordinates than the fold angles of a tree and the six of a free root.
+
+    Raises:
+        InputError: closed loops; a root that is held in part.
+    """
+    if len(tree.row_node):
+        raise InputError("panels that close a loop are predicted with bars", field="panels", allowed="elastic")
+    if len(tree.turns) != 6 * floating:
+        raise InputError("a panel that is held in part is predicted with bars", field="panels", allowed="elastic")

@@ -1,0 +1,494 @@
+"""Predictions by simulation: batches of rollouts that start where segments of recordings do."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from origami_sim.articulation import Articulation, Pose
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.fit.hypothesis import (
+    Hypothesis,
+    Subject,
+    Suspect,
+    along_every_axis,
+    at_several_times,
+    told_apart,
+)
+from origami_sim.fit.predictor import Block, Prediction
+from origami_sim.model import Model, Parameters, State
+from origami_sim.predict.channels import angle_mask, channel_values, depths, stacked, turned_axes
+from origami_sim.predict.drives import drive_of, shifted
+from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
+from origami_sim.predict.starts import CAREFUL, NEAR, channel_tangent, read_start, seen_first, spans
+from origami_sim.predict.stated import stated
+from origami_sim.predict.track import coordinates
+from origami_sim.predict.worlds import World, Worlds
+from origami_sim.recording import Recording
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.rigid import batch_of
+
+LEAD = 1500
+"""Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
+
+FASTEST = 3.0
+"""Frames below which a time constant is not told from none."""
+
+SPARE = 3
+"""Frames simulated beyond a segment, for measurements that lag."""
+
+FINER = 20
+"""Simulated frames for each recorded one, at most, where these come at uneven times: it bounds memory."""
+
+FILMED = 64e6
+"""Bytes of positions that are kept before they are read; more would not be faster."""
+
+TOGETHER = 4096
+"""Rollouts that are made at once, which bounds memory; more would not be faster."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """Rollouts that begin together: worlds times blocks of equal times.
+
+    Attributes:
+        recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
+            [s]. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
+            step: between frames [s]. frames: of each rollout. ends:
+            the frame at which the next blocks begin; 0: none is tied to them. clocked: whether a clock runs fast or
+            slow, so that they begin a little before or after that frame.
+    """
+
+    recording: int
+    blocks: list[Block]
+    worlds: list[World]
+    late: np.ndarray
+    local: np.ndarray | None
+    memory: np.ndarray | None
+    step: float
+    frames: int
+    ends: int
+    clocked: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What laws remember where segments start.
+
+    Attributes:
+        positions: [F, N, 3] of all frames [m]. memory: (M,) of the world that moved so, by first frame, where known.
+    """
+
+    positions: np.ndarray
+    memory: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+class Rollouts(Worlds, ABC):
+    """A `Predictor` that simulates; see there for what is public.
+
+    Args:
+        subject: how to build the model. recordings: of one object.
+        start: "fit" if segments have starts that are fitted, "rest" if recordings start from rest in the model's
+            reference state. threads: see `Batch`.
+    """
+
+    panels, separate, curve = "", True, False
+
+    def __init__(
+        self, subject: Subject, recordings: Sequence[Recording], *, start: str = "fit", threads: int | None = None
+    ):
+        super().__init__(subject, recordings, threads)
+        self.start = start
+        self.drives = [drive_of(r, self.drive) for r in self.recordings]
+        self._recorded: dict[int, Motion | None] = {}
+        self._usual: dict[int, np.ndarray] = {}
+        self.local = 2 * self.articulation.size if start == "fit" else 0
+
+    # --- segments
+
+    def segment(self, index: int, first: int, frames: int) -> Block:
+        """The segment of so many frames of a recording that begins at a frame."""
+        recording = self.recordings[index]
+        values, noise = stacked(recording)
+        part = slice(first, first + frames)
+        arm, m = self.articulation, self.articulation.size
+        pose, rates, known, found, shows = arm.reference(), np.zeros(m), np.zeros(0), None, None
+        if self.start == "fit":
+            found = read_start(self.model, arm, recording, values, noise, first)
+            pose, rates, shows = found.pose, found.rates, found.tangent
+            usual = np.maximum(self.usual_rates(index), 1e-9)
+            told = np.isfinite(found.error)
+            wide = np.hypot(CAREFUL * np.where(told, found.error, 0.0), np.maximum(usual, np.abs(rates)))
+            known = np.concatenate([spans(arm, self.model), wide])
+        times = recording.times[part] - recording.times[first]
+        begin = seen_first(values[part])
+        block = Block(index, first, times, values[part].copy(), noise, pose, rates, known, begin=begin, shows=shows)
+        if found is None or first > 0:
+            return block
+        return stated(self, block, self.usual_rates(index), found.error, found.shown)
+
+    def usual_rates(self, index: int) -> np.ndarray:
+        """(m,) root mean square of the rates of the coordinates in a recording, where channels tell them.
+
+        What no channel tells is taken to move as fast as what they do tell, a radian as a device's size.
+        """
+        if index not in self._usual:
+            recording, arm = self.recordings[index], self.articulation
+            values, noise = stacked(recording)
+            picked = np.unique(np.linspace(0, len(values) - 1, 24).astype(int))
+            found = [read_start(self.model, arm, recording, values, noise, int(k)) for k in picked]
+            size = spans(arm, self.model)
+            rates = np.stack([np.where(np.isfinite(f.error), f.rates, np.nan) for f in found]) / size
+            squares = np.array([np.mean(r[np.isfinite(r)] ** 2) if np.any(np.isfinite(r)) else np.nan for r in rates.T])
+            most = np.nanmax(squares) if np.any(np.isfinite(squares)) else 1.0
+            self._usual[index] = np.sqrt(np.where(np.isfinite(squares), squares, most)) * size
+        return self._usual[index]
+
+    def tells(self, recording: Recording, values, noise, first: int) -> bool:
+        """Whether what was seen near a frame tells all coordinates that the channels can tell."""
+        near = np.isfinite(values[max(0, first - NEAR) : first + NEAR + 1]).any(axis=0)
+        ever = np.isfinite(values).any(axis=0)
+        if np.array_equal(near, ever):
+            return True
+        pose = self.articulation.reference()
+        _, tangent = channel_tangent(self.model, self.articulation, recording, pose, values[first])
+        by = tangent / noise[:, None]
+        return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
+
+    # --- predictions
+
+    def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
+        effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
+        values: dict[int, np.ndarray] = {}
+        ends: dict[int, np.ndarray | None] = {}
+        for r in range(len(self.recordings)):
+            mine = [b for b in wanted if self.blocks[b].recording == r]
+            if not mine:
+                continue
+            worlds, impossible = self.worlds_of(each, theta, effects, r)
+            first = None if local is None else local[0]
+            memories = self._memories(r, worlds, [self.blocks[b] for b in mine], first)
+            for group in _by_length(self.blocks, mine):
+                most = max(1, TOGETHER // len(group))
+                parts = [
+                    self._roll(r, group, worlds, local, memories, slice(k, k + most))
+                    for k in range(0, len(worlds), most)
+                ]
+                for n, b in enumerate(group):
+                    values[b] = np.concatenate([p[0][n] for p in parts])
+                    values[b][impossible] = np.nan
+                    tied = parts[0][1] is not None
+                    ends[b] = np.concatenate([p[1][n] for p in parts]) if tied else None  # type: ignore[index]
+        return Prediction([values[b] for b in wanted], [ends[b] for b in wanted])
+
+    def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
+        """See `Predictor.admitted`: those with a time constant with several. See also `told_apart`."""
+        frame = float(np.median(np.diff(self.recordings[0].times)))
+        longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
+        every = along_every_axis(told_apart(every, len(self.components)))
+        return at_several_times(every, FASTEST * frame, longest)
+
+    @abstractmethod
+    def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
+        """See `Predictor.step`."""
+
+    def _roll(self, r: int, group: list[int], worlds: list[World], local, memories, part: slice):
+        """Per block values [K, n, D] and ends [K, L] of a part of the worlds; batches run over these, then blocks."""
+        recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
+        worlds, local = worlds[part], None if local is None else local[part]
+        k, count = len(worlds), len(blocks)
+        model, times = worlds[0][0], blocks[0].times
+        step = film_step(recording.times)
+        ends = round(blocks[0].lasting / step)
+        if ends:  # the next block begins at a frame of the film
+            step = blocks[0].lasting / ends
+        begins = recording.times[[b.first for b in blocks]] - recording.times[0]
+        once = Parameters.join([p for _, p in worlds])
+        late, shown = lateness(model, once, k, begins, self.start == "fit")
+        longer = lateness(model, once, k, begins + blocks[0].lasting, self.start == "fit")[0] - late
+        clocked = bool(ends and np.any(longer))
+        last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
+        frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
+        starts = None if local is None else local[:, group]
+        moves, of = distinct_motions(worlds, late, starts)
+        some = None if starts is None else starts[moves]
+        memory = None
+        if memories is not None:
+            first = np.stack([memories[b.first][:, part][:, moves] for b in blocks], axis=2)
+            memory = first.reshape(len(first), -1)
+        chosen = [worlds[m] for m in moves]
+        frames = max(frames, ends + 2 if clocked else ends + 1)
+        shots = Shots(r, blocks, chosen, late[moves], some, memory, step, frames, ends, clocked)
+        raw, arrived = self._filmed(shots)
+        turning = angle_mask(recording)
+        begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
+        continuous(raw[:, : len(turning)], turning, begun)
+        columns = (of[:, None] * count + np.arange(count)).ravel()
+        channels = raw[:, :, columns]
+        plain = channels[:, : len(turning)]  # without the depths
+        grid = np.arange(len(raw)) * step
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        if distort:
+            parameters = Parameters.join([p for _, p in worlds], repeat=count)
+            rested = self.start != "fit"
+            values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
+        elif len(times) <= len(grid) and np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+            values = plain[: len(times)]
+        else:
+            values = spline(grid, plain)(times)
+        values = values.reshape(len(times), -1, k, count)
+        tied = None
+        if arrived is not None:
+            near = arrived[..., columns]
+            tied = (carried(near, longer.ravel(), step) if clocked else near[0]).reshape(-1, k, count)
+        return (
+            [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
+            None if tied is None else [tied[:, :, b].T for b in range(count)],
+        )
+
+    @abstractmethod
+    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+        """Channels and depths [frames, D + k, K B] before anything measures them, and ends [1, L, K B] of tied blocks.
+
+        If `Shots.clocked`, ends [3, L, K B]: a frame before, where the next begins as recorded, and a frame after.
+        """
+
+    def _driven(self, shots: Shots, model: Model, parameters: Parameters) -> Drive:
+        """The drive that reaches every rollout."""
+        recording, span = self.recordings[shots.recording], shots.frames * shots.step
+        begins = recording.times[[b.first for b in shots.blocks]] - recording.times[0]
+        given = self.drives[shots.recording]
+        if np.any(shots.late):
+            drive = shifted(given, (begins + shots.late).ravel(), span, 1)
+        else:
+            drive = shifted(given, begins, span, len(shots.worlds))
+        return distorted(model, parameters, drive, span)
+
+    def _state(self, shots: Shots) -> State:
+        """The starts of all rollouts [world, block]."""
+        worlds, blocks, local = shots.worlds, shots.blocks, shots.local
+        count, model = len(blocks), worlds[0][0]
+        if self.start != "fit":
+            x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
+            return remembering(State.at_rest(model, x.shape[1], position=x), shots)
+        m = self.articulation.size
+        base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
+        x = np.empty((len(model.position), len(worlds) * count, 3))
+        v = np.empty_like(x)
+        alike: dict[bytes, list[int]] = {}
+        for n, (own, _) in enumerate(worlds):
+            alike.setdefault(own.position.tobytes(), []).append(n)
+        for key, mine in alike.items():
+            if key not in self._arms:
+                self._arms[key] = Articulation(worlds[mine[0]][0])
+            arm = self._arms[key]
+            pose, u = base.select(np.tile(np.arange(count), len(mine))), np.tile(rates, len(mine))
+            if local is not None:
+                shift = local[mine].reshape(-1, 2 * m).T
+                pose, u = arm.moved(pose, shift[:m]), u + shift[m:]
+            at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
+            x[:, at] = own_x = arm.positions(pose)
+            v[:, at] = np.einsum("mnwa,mw->nwa", arm.jacobian(pose, own_x), u)
+        state = State.at_rest(model, x.shape[1], position=x)
+        state.v[:] = v
+        return remembering(state, shots)
+
+    def _memories(
+        self, r: int, worlds: list[World], wanted: Sequence[Block], local: np.ndarray | None
+    ) -> dict[int, np.ndarray] | None:
+        """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
+
+        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
+        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
+        carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
+        """
+        model = worlds[0][0]
+        every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
+        every = np.union1d(every, [b.first for b in wanted])
+        if not len(State.at_rest(model).memory) or not np.any(every):
+            return None
+        motion = self._motion(r, worlds[0], local)
+        if motion is None:
+            return None
+        some, of = distinct_memories(worlds)
+        if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
+            return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
+        worlds, path = [worlds[k] for k in some], motion.positions[:, :, None]
+        step = float(np.median(np.diff(self.recordings[r].times)))
+        out: dict[int, np.ndarray] = {}
+        last, batch = -LEAD - 1, None
+        for first in map(int, every[every <= max(b.first for b in wanted)]):
+            if batch is None or first - last > LEAD:
+                last = max(first - LEAD, 0)
+                batch = self._rested(r, worlds, last, path[last])
+            if first > last:
+                batch.carry(path[last : first + 1], step)
+            carried = batch.remembered()
+            if first in motion.memory:
+                carried = carried + (motion.memory[first][:, None] - carried[:, :1])
+            last, out[first] = first, carried[:, of]
+        return out
+
+    def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:
+        """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on."""
+        model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
+        times = self.recordings[r].times - self.recordings[r].times[0]
+        step = float(np.median(np.diff(times)))
+        span = float(times[-1] - times[frame]) + step
+        drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
+        held = replace(model, free=np.zeros_like(model.free))
+        state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
+        batch = self._batch(held, parameters, drive.held(0.0), state, supports=model)
+        batch.carry(np.stack([x, x]), LEAD * step)
+        return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()), supports=model)
+
+    def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
+        return batch_of(model, parameters, drive, state, threads=self.threads, among=self.shared, **options)
+
+    def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
+        """The motion of a recording that laws remember: here the recorded one.
+
+        Args:
+            world: of whose motion. local: [B, L] shifts of all segments' starts.
+        """
+        return self.recorded(r)
+
+    def recorded(self, r: int) -> Motion | None:
+        """The recorded motion, smoothed; None if the channels do not tell it."""
+        if r not in self._recorded:
+            found = coordinates(self, r)
+            self._recorded[r] = None
+            if found is not None:
+                q = savgol_filter(found[0], 7, 3, axis=1) if found[0].shape[1] > 7 else found[0]
+                self._recorded[r] = Motion(self._placed(q))
+        return self._recorded[r]
+
+    def _placed(self, q: np.ndarray) -> np.ndarray:
+        """Positions [F, N, 3] of coordinates [m, F] of a device that is held."""
+        arm = self.articulation
+        pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
+        return np.moveaxis(arm.positions(pose), 1, 0)
+
+
+def remembering(state: State, shots: Shots) -> State:
+    """The state with the memory that the laws have there."""
+    if shots.memory is not None:
+        state.memory[:] = shots.memory
+    return state
+
+
+def joined_poses(poses: Sequence[Pose]) -> Pose:
+    """Poses as one of as many worlds."""
+    return Pose(
+        np.concatenate([p.rotation for p in poses]),
+        np.concatenate([p.centre for p in poses]),
+        np.concatenate([p.angles for p in poses], axis=1),
+    )
+
+
+def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two remember the same motion differently, and (K,) which of them each world is like."""
+    telling = {e for e in worlds[0][0].effects if get(e).memory or get(e).family == "drive"}
+    found: dict[bytes, int] = {}
+    of = [
+        found.setdefault(b"".join(parameters[p].tobytes() for p in parameters if p[0] in telling), len(found))
+        for _, parameters in worlds
+    ]
+    return [of.index(n) for n in range(len(found))], np.array(of)
+
+
+def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two move alike, and (K,) which of them each world moves like: a measurement moves nothing.
+
+    Args:
+        more: what else makes worlds differ, [K, ...] each.
+    """
+    shown = {e for e in worlds[0][0].effects if get(e).family == "measurement"}
+    found: dict[tuple, int] = {}
+    first, of = [], []
+    for k, (model, parameters) in enumerate(worlds):
+        felt = b"".join(parameters[p].tobytes() for p in parameters if p[0] not in shown)
+        key = (model.position.tobytes(), felt, *(m[k].tobytes() for m in more if m is not None))
+        if key not in found:
+            found[key] = len(first)
+            first.append(k)
+        of.append(found[key])
+    return first, np.array(of)
+
+
+def carried(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:
+    """Shifts and rates [L, W] a time `longer` (W,) [s] after the second of three frames `ends` [3, L, W].
+
+    Rates are a parabola through the three, and shifts its integral through theirs.
+    """
+    m = ends.shape[1] // 2
+    (q0, q1, q2), (v0, v1, v2) = ends[:, :m], ends[:, m:]
+    a, j = (v2 - v0) / (2 * step), (v2 - 2 * v1 + v0) / step**2
+    v = (q2 - q0) / (2 * step) - j * step**2 / 6
+    shift = q1 + longer * (v + longer * (a / 2 + longer * j / 6))
+    return np.concatenate([shift, v1 + longer * (a + longer * j / 2)])
+
+
+def film_step(times: np.ndarray) -> float:
+    """Time between simulated frames [s]: as recorded, or as close as the closest where frames do not lie on a grid.
+
+    At most FINER times as many as were recorded.
+    """
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    if np.all(np.abs(steps / usual - np.round(steps / usual)) < 0.1):
+        return usual
+    return max(float(steps.min()), float(times[-1] - times[0]) / (FINER * len(times)))
+
+
+def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):
+    """Channels of the next frames and what else is asked of markers (`pictured`), in parts [f, D + k, W].
+
+    With the present state as the first frame, if `first`.
+    """
+    model, out, left = batch.model, [], frames
+    lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
+    limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
+    if first:
+        batch.advance(0, step / substeps, limit)
+        x, angles = batch.motion()
+        out.append(pictured(model, recording, x[None], angles[None]))
+        left -= 1
+    most = max(1, int(FILMED / (24 * len(model.position) * batch.worlds)))
+    while left > 0:
+        part = min(left, most)
+        out.append(pictured(model, recording, *batch.film(part, substeps, step / substeps, limit)))
+        left -= part
+    return out
+
+
+def pictured(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+    """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W]."""
+    parts = [channel_values(model, recording, x, angles), depths(model, recording, x)]
+    if any(get(e).on_body for e in model.effects):
+        parts.append(turned_axes(model, recording, x))
+    return np.concatenate(parts, axis=1)
+
+
+def _begin(block: Block) -> np.ndarray:
+    return block.values[0] if block.begin is None else block.begin
+
+
+def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
+    """Blocks that share their frame times, and the time until the next."""
+    groups: list[list[int]] = []
+    for i in indices:
+        for g in groups:
+            a, b = blocks[g[0]], blocks[i]
+            alike = len(a.times) == len(b.times) and (a.reach is None) == (b.reach is None)
+            slack = 1e-7 * max(1.0, a.times[-1])
+            if alike and np.allclose(a.times, b.times, atol=slack) and abs(a.lasting - b.lasting) < slack:
+                g.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups

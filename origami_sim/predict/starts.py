@@ -1,0 +1,129 @@
+"""Where a segment of a recording starts: coordinates and rates read from its channels, and how well they are known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from origami_sim.articulation import Articulation, Pose
+from origami_sim.model import Model
+from origami_sim.predict.channels import angle_mask, channel_values
+from origami_sim.predict.track import placed
+from origami_sim.recording import Recording
+
+CAREFUL = 6.0
+"""A rate that was read from a recording is known within so many of its standard deviations.
+
+The reading only says where fits begin; the data themselves decide. Twice or half as much changes no fit.
+"""
+
+POSSIBLE = 2.0
+"""Standard deviations within which a rate that a window tells is possible."""
+
+NEAR = 4
+"""Frames from where a segment begins within which its start has to be seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a recording says about the state at one of its frames.
+
+    Attributes:
+        pose: coordinates. rates: (m,) of the coordinates. error: (m,) standard deviation of the rates; infinite where
+            no channel tells them. shown: (m,) the same of the coordinates, from one frame. tangent: [D, m] derivatives
+            of the channels by the coordinates.
+    """
+
+    pose: Pose
+    rates: np.ndarray
+    error: np.ndarray
+    shown: np.ndarray
+    tangent: np.ndarray
+
+
+def read_start(model: Model, arm: Articulation, recording: Recording, values, noise, first: int) -> Reading:
+    """The state at a frame, from a local polynomial of the channels and the pose of rigid panels that fits it best."""
+    level, slope, error = local_line(recording.times, values, noise, first)
+    pose = placed(model, arm, recording, level)
+    weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
+    sought = arm.sought(channel_tangent(model, arm, recording, pose, level)[1] * weight[:, None])
+    for _ in range(30):
+        now, tangent = channel_tangent(model, arm, recording, pose, level)
+        gap = np.where(np.isfinite(level), level - now, 0.0)
+        by = arm.inverse(tangent * weight[:, None], sought, 1e-8) @ (gap * weight)
+        size = np.abs(by[3 * arm.floating :]).max(initial=0.0)  # shifts are linear, however long
+        pose = arm.moved(pose, (by * min(1.0, 1.0 / (size + 1e-12)))[:, None])
+        if size < 1e-10:
+            break
+    _, tangent = channel_tangent(model, arm, recording, pose, level)
+    weight = np.where(np.isfinite(slope), 1.0 / noise, 0.0)
+    inverse = arm.inverse(tangent * weight[:, None], sought, 1e-8)
+    rates = inverse @ (np.nan_to_num(slope) * weight)
+    spread = np.linalg.norm(inverse * np.where(weight > 0.0, error * weight, 0.0), axis=1)
+    told = np.einsum("md,dm->m", inverse, tangent * weight[:, None]) > 0.9  # by the channels
+    shown = np.where(told, np.linalg.norm(inverse, axis=1), np.inf)
+    return Reading(pose, rates, np.where(told, spread, np.inf), shown, tangent)
+
+
+def channel_tangent(model: Model, arm: Articulation, recording: Recording, pose: Pose, near: np.ndarray):
+    """Channels (D,) of a pose, turned as in `near`, and their derivatives by the coordinates [D, m]."""
+    m, step = arm.size, 1e-6
+    by = np.concatenate([np.zeros((m, 1)), step * np.eye(m), -step * np.eye(m)], axis=1)
+    x = arm.positions(arm.moved(pose.select([0] * (2 * m + 1)), by))
+    values = channel_values(model, recording, x[None], None)[0]
+    plus, minus = values[:, 1 : m + 1], values[:, m + 1 :]
+    turning = angle_mask(recording)
+    jump = np.where(turning[:, None], 2 * np.pi * np.round((plus - minus) / (2 * np.pi)), 0.0)
+    now = values[:, 0]
+    now = now + np.where(turning, 2 * np.pi * np.round((np.nan_to_num(near) - now) / (2 * np.pi)), 0.0)
+    return now, (plus - minus - jump) / (2 * step)
+
+
+def seen_first(values: np.ndarray) -> np.ndarray:
+    """(D,) the first of the values (n, D) that is not missing; nan if all are."""
+    seen = np.isfinite(values)
+    return values[np.argmax(seen, axis=0), np.arange(values.shape[1])]
+
+
+def spans(arm: Articulation, model: Model) -> np.ndarray:
+    """(m,) how far coordinates may plausibly be off: a radian, or the size of the device [m]."""
+    size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
+    out = np.ones(arm.size)
+    if arm.floating:
+        out[:3] = size
+    return out
+
+
+def local_line(
+    times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window.
+
+    The window grows while its cubic fits, and its rate is within what each smaller one left possible: what a cubic
+    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997).
+    """
+    level, slope, error = np.full((3, values.shape[1]), np.nan)
+    for d in range(values.shape[1]):
+        half, low, high = 4, -np.inf, np.inf
+        while half <= 64 and half <= len(times):
+            lo, hi = max(0, first - half), min(len(times), first + half + 1)
+            if hi - lo < 2 * half and lo == 0:
+                hi = min(len(times), lo + 2 * half)
+            half *= 2
+            good = np.flatnonzero(np.isfinite(values[lo:hi, d])) + lo
+            if len(good) < 6:
+                continue
+            t = times[good] - times[first]
+            span = np.abs(t).max() or 1.0
+            design = np.vander(t / span, 4, increasing=True)
+            fit, *_ = np.linalg.lstsq(design, values[good, d], rcond=None)
+            scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
+            doubt = max(scatter, noise[d]) * np.linalg.norm(np.linalg.pinv(design)[1]) / span
+            rate = fit[1] / span
+            bent = scatter > 1.5 * noise[d]
+            low, high = max(low, rate - POSSIBLE * doubt), min(high, rate + POSSIBLE * doubt)
+            if np.isfinite(level[d]) and (bent or low > high):
+                break
+            level[d], slope[d], error[d] = fit[0], rate, doubt
+            if bent:
+                break
+    return level, slope, error

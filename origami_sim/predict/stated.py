@@ -1,0 +1,132 @@
+"""Starts that an experimenter states: released at rest, at equilibrium, or already moving."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.articulation import Articulation
+from origami_sim.errors import InputError
+from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.predictor import Block
+from origami_sim.model import State
+from origami_sim.predict.worlds import World, Worlds
+from origami_sim.solve.statics import equilibrium
+from origami_sim.weight import weighed
+
+AT_REST = 1e-3
+"""Standard deviation of rates that are stated to be zero, as a part of usual rates, where no other is stated.
+
+A hand that lets go moves by less than a thousandth of what follows; ten times as much frees the start again.
+"""
+
+RESTS = 0.01
+"""Standard deviation of an equilibrium [rad] where none is stated: how well a device is left at rest."""
+
+CONTRADICTED = 6.0
+"""Standard deviations by which a reading may differ from what is stated before it is refused."""
+
+
+def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, shown: np.ndarray) -> Block:
+    """The first block of a recording, with what is stated about its start.
+
+    Args:
+        usual: (m,) usual rates of the coordinates. read, shown: (m,) standard deviations with which the recording
+            itself tells rates and coordinates at its first frame; infinite where it does not.
+
+    Raises:
+        InputError: a crease that does not exist; a start that the data contradict; no equilibrium.
+    """
+    recording = forward.recordings[block.recording]
+    start = recording.start
+    if start is None or start.state == "moving":
+        return block
+    arm, m = forward.articulation, forward.articulation.size
+    sidecar = recording.metadata.get("sidecar")
+    pose, known = block.pose, block.known.copy()
+    still = AT_REST * np.maximum(usual, 1e-9)
+    if start.rate_sd is not None:
+        still = np.full(m, start.rate_sd)
+    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read)
+    if np.any(far):
+        worst = arm.names()[int(np.argmax(np.abs(block.rates) * far))]
+        raise InputError(
+            f"the data contradict a start at rest: {worst} moves at {np.abs(block.rates[far]).max():.3g} per second",
+            file=sidecar,
+            field="start",
+            value=start.state,
+            allowed="'moving', or the frames from the release on",
+        )
+    known[m:] = still
+    angles = pose.angles.copy()
+    first = m - len(arm.creases)
+    if start.state == "released":
+        names = [forward.model.name("crease", int(c)) for c in arm.creases]
+        for crease, value in start.angles.items():
+            joint = names.index(crease) if crease in names else int(crease) if crease.isdigit() else -1
+            if not 0 <= joint < len(names):
+                raise InputError(
+                    "the model has no such crease",
+                    file=sidecar,
+                    field=f"start.angles.{crease}",
+                    allowed=", ".join(names),
+                )
+            assert start.sd is not None
+            _agrees(angles[joint, 0], value, np.hypot(start.sd, shown[first + joint]), crease, sidecar)
+            angles[joint], known[first + joint] = value, start.sd
+    else:
+        world = forward.world(Hypothesis(), np.array([f.start for f in forward.subject.nominals]), ())
+        rest, doubt = equilibrium_of(forward, block.recording, world, angles[:, 0])
+        sd = np.hypot(RESTS if start.sd is None else start.sd, doubt)
+        for joint, value in enumerate(rest):
+            name = forward.model.name("crease", int(arm.creases[joint]))
+            _agrees(angles[joint, 0], value, np.hypot(sd[joint], shown[first + joint]), name, sidecar)
+        angles[:, 0], known[first : first + len(rest)] = rest, sd
+    return replace(block, pose=replace(pose, angles=angles), rates=np.zeros(m), known=known)
+
+
+def _agrees(read: float, value: float, sd: float, crease: str, sidecar: object) -> None:
+    if np.isfinite(sd) and abs(read - value) > CONTRADICTED * sd:
+        raise InputError(
+            f"the data contradict the stated start: {crease} is read as {read:.4g} rad",
+            file=sidecar,  # type: ignore[arg-type]
+            field=f"start.{crease}",
+            value=f"{value:.4g} rad +- {sd:.2g} rad",
+            allowed="what the first frame shows",
+        )
+
+
+def equilibrium_of(forward: Worlds, r: int, world: World, near: Sequence[float] | np.ndarray):
+    """Fold angles (J,) at which a world rests in the drive of a recording's first frame, and their doubts (J,).
+
+    The doubt is what the numbers of the model, within their priors, leave open.
+
+    Raises:
+        InputError: there is no equilibrium near the angles.
+    """
+    rest = _rest(forward, r, world, np.asarray(near, float))
+    doubt = np.zeros_like(rest)
+    theta = np.array([f.start for f in forward.subject.nominals])
+    for k, f in enumerate(forward.subject.nominals):
+        moved = theta.copy()
+        moved[k] += f.scale if theta[k] + f.scale <= f.upper else -f.scale
+        other = _rest(forward, r, forward.world(Hypothesis(), moved, ()), rest)
+        doubt = np.hypot(doubt, (other - rest) * f.spread / f.scale)
+    return rest, doubt
+
+
+def _rest(forward: Worlds, r: int, world: World, near: np.ndarray) -> np.ndarray:
+    model, parameters = weighed(*world, forward.recordings[r].gravity)
+    arm = Articulation(model)
+    pose = arm.reference()
+    x = arm.positions(replace(pose, angles=near[:, None]))
+    found = equilibrium(model, parameters, forward.drives[r].held(0.0), state=State.at_rest(model, position=x[:, 0]))
+    if not found.converged:
+        raise InputError(
+            "the model has no equilibrium near the first frame",
+            file=forward.recordings[r].metadata.get("sidecar"),
+            field="start",
+            value="equilibrium",
+            allowed="released, moving",
+        )
+    return np.asarray(found.angles, float)[arm.creases]

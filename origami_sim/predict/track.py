@@ -1,0 +1,128 @@
+"""A recorded motion as that of rigid panels: coordinates of the tree, frame by frame, also of what nothing holds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from origami_sim.articulation import Articulation, Pose
+from origami_sim.model import Model
+from origami_sim.observe import body_point
+from origami_sim.predict.channels import angle_mask, channel_values, stacked
+from origami_sim.recording import Recording
+
+ROUNDS = 25
+"""Newton steps from the pose that markers give to that which fits all channels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Coordinates of n frames.
+
+    Attributes:
+        times: (n,) [s]. pose: n poses. q: [m, n] shifts [m], turns [rad] and folds [rad]; of the turns, which have no
+            angle, the small ones from frame to frame, added up. noise: (m,). told: (m,) whether the channels tell it.
+    """
+
+    times: np.ndarray
+    pose: Pose
+    q: np.ndarray
+    noise: np.ndarray
+    told: np.ndarray
+
+    def at(self, times: np.ndarray, q: np.ndarray) -> Pose:
+        """Poses at times (k,) whose coordinates [m, k] are near those of the nearest frames."""
+        near = np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
+        pose = self.pose.select(near)
+        if len(q) == len(pose.angles):  # something holds it
+            return Pose(pose.rotation, pose.centre, q)
+        turn = Rotation.from_rotvec((q[3:6] - self.q[3:6, near]).T).as_matrix()
+        return Pose(turn @ pose.rotation, q[:3].T, q[6:])
+
+
+def track(forward, recording: Recording, values: np.ndarray | None = None) -> Track | None:
+    """The motion of a recording, or of other values [n, D] of its channels; None if too few frames are complete."""
+    arm = forward.articulation
+    recorded, noise = stacked(recording)
+    values = recorded if values is None else values
+    good = np.all(np.isfinite(values), axis=1)
+    if good.sum() < min(20, len(values)) or not arm.size:
+        return None
+    times = recording.times[: len(values)]
+    values = np.stack([np.interp(times, times[good], v[good]) for v in values.T], axis=1)
+    pose = arm.reference(len(values))
+    if arm.floating:
+        each = [placed(forward.model, arm, recording, v) for v in values]
+        rotation, centre = (np.concatenate([getattr(p, f) for p in each]) for f in ("rotation", "centre"))
+        pose = Pose(rotation, centre, pose.angles)
+    turning, weight = angle_mask(recording), 1.0 / noise
+
+    def wrapped(change: np.ndarray) -> np.ndarray:
+        change[turning] -= 2 * np.pi * np.round(change[turning] / (2 * np.pi))
+        return change
+
+    scaled = inverse = np.zeros((len(values), arm.size, len(noise)))
+    sought = None
+    for _ in range(ROUNDS):
+        now = channel_values(forward.model, recording, arm.positions(pose)[None], None)[0]
+        tangent = np.empty((len(noise), arm.size, len(values)))
+        for k in range(arm.size):
+            by = np.zeros((arm.size, len(values)))
+            by[k] = 1e-6
+            ahead = channel_values(forward.model, recording, arm.positions(arm.moved(pose, by))[None], None)[0]
+            tangent[:, k] = wrapped(ahead - now) / 1e-6
+        scaled = np.moveaxis(tangent * weight[:, None, None], 2, 0)  # [n, D, m]
+        sought = arm.sought(scaled) if sought is None else sought
+        inverse = arm.inverse(scaled, sought, 1e-6)
+        by = np.einsum("nkd,dn->kn", inverse, wrapped(values.T - now) * weight[:, None])
+        pose = arm.moved(pose, np.clip(by, -0.7, 0.7))
+        if np.abs(by).max() < 1e-9:
+            break
+    told = np.median(np.einsum("nkd,ndk->kn", inverse, scaled), axis=1) > 0.99
+    spread = np.sqrt(np.median(np.sum(inverse**2, axis=2), axis=0))
+    folds = np.unwrap(pose.angles, axis=1)
+    if not arm.floating:
+        return Track(times, pose, folds, spread, told)
+    steps = Rotation.from_matrix(pose.rotation[1:] @ np.swapaxes(pose.rotation[:-1], 1, 2)).as_rotvec()
+    turns = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return Track(times, pose, np.concatenate([pose.centre.T, turns.T, folds]), spread, told)
+
+
+def coordinates(forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Folds [m, n] of all frames of a recording and their noise (m,); None if channels do not give the whole pose."""
+    if forward.articulation.floating:
+        return None
+    found = track(forward, forward.recordings[index])
+    return (found.q, found.noise) if found is not None and np.all(found.told) else None
+
+
+LINE = 0.02
+"""Width over length below which markers lie on a line."""
+
+
+def placed(model: Model, arm: Articulation, recording: Recording, level: np.ndarray) -> Pose:
+    """The reference pose; of a device that nothing holds, turned and shifted as a whole onto three or more markers.
+
+    From there the pose is found in small turns, however far the device has turned.
+
+    Args:
+        level: (D,) what the channels show.
+    """
+    pose, row = arm.reference(), 0
+    points, places = [], []
+    for channel in recording.channels.values():
+        width = 1 if channel.values.ndim == 1 else channel.values.shape[1]
+        if channel.kind == "marker" and np.all(np.isfinite(level[row : row + width])):
+            points.append(body_point(model, model.position[None], channel)[0])
+            places.append(level[row : row + width])
+        row += width
+    if not arm.floating or len(points) < 3:
+        return pose
+    here, there = np.array(points), np.array(places)
+    a, b = there - there.mean(0), here - here.mean(0)
+    _, size, along = np.linalg.svd(b)
+    if size[1] < LINE * size[0]:  # about a line nothing is told: the least turn
+        a, b = (b @ along[0] @ a)[None], along[:1]
+    turn = Rotation.align_vectors(a, b)[0].as_matrix()
+    centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
+    return Pose(turn[None], centre[None], pose.angles)
