@@ -4,10 +4,12 @@ A model that lacks a strong effect follows it with numbers that are no fault of 
 effect: dry friction that holds a crease back is as a weaker magnet.
 """
 
+from collections.abc import Callable, Iterator, Sequence
+
 import numpy as np
 from scipy.stats import chi2
 
-from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -32,10 +34,12 @@ def strained(f: Fit) -> bool:
     return bool(known and chi2.sf(f.penalty, known) < DOUBTED)
 
 
-def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray | None:
+def scanned(
+    forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray
+) -> tuple[np.ndarray, float] | None:
     """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least.
 
-    None if the model goes unstable with all of them.
+    With the squares that are missed, over the weights; None if the model goes unstable with all of them.
     """
     first, *_ = hypothesis.free
     given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
@@ -49,4 +53,28 @@ def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local:
     for block, values in zip(forward.blocks, shot, strict=True):
         gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
         missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
-    return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None
+    best = int(np.argmin(missed))
+    return (thetas[best], float(missed[best])) if np.isfinite(missed[best]) else None
+
+
+def over_their_range(
+    forward: Predictor,
+    suspects: Sequence[Suspect],
+    weights: Weights,
+    base: Fit,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[tuple[np.ndarray, float] | None]:
+    """Of each suspect alone, the best of a few strengths, and the log likelihood that it gains over the refitted model.
+
+    Both in white noise as large as what they leave; None where it gains nothing.
+    """
+    line = base.reweighted(weights).linear
+    assert line is not None
+    before = sum(float(r[line.data(n)] @ r[line.data(n)]) for n, r in enumerate(line.residual))
+    count = sum(int(forward.blocks[b].seen().sum()) for b in base.blocks)
+    for n, s in enumerate(suspects):
+        if progress:
+            progress(n / len(suspects))
+        found = scanned(forward, Hypothesis((s,)), weights, base.local)
+        gain = 0.5 * count * np.log(before / max(found[1], 1e-12 * before)) if found else 0.0
+        yield (found[0], gain) if found and gain > 0.0 else None

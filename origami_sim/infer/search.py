@@ -16,17 +16,18 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import Group, Problem, Sets, Summed, problem, summed
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, usual
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, recast
+from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.infer.nominal import level
-from origami_sim.infer.scan import scanned, strained
+from origami_sim.infer.scan import over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature
 
 UNFITTED = 0.05
@@ -127,6 +128,7 @@ class Posterior:
     store: bool = False
     renewed: set[Key] = field(default_factory=set)
     polished: dict[Key, float] = field(default_factory=dict)
+    begun: dict[Key, np.ndarray] = field(default_factory=dict)
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
@@ -177,7 +179,38 @@ def search(
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward):
         extended(out, forward, progress=progress, most=most)
+    if reconsidered(out, forward, base, progress=progress):
+        extended(out, forward, progress=progress, most=most)
+        while polished(out, forward):
+            extended(out, forward, progress=progress, most=most)
     return out
+
+
+def reconsidered(
+    out: Posterior, forward: Predictor, base: Fit, *, progress: Callable[[float], None] | None = None
+) -> bool:
+    """Simulates every single effect at several strengths where nothing explains a motion; whether any promises more.
+
+    A model that snaps, and a device that does not, have no derivatives that tell why. So before nothing is said to
+    explain a recording, each effect is tried over its range. Segments with starts of their own follow what was recorded
+    closely enough to do without.
+    """
+    best = max(out.nodes, key=lambda k: out.total[k])
+    if forward.local or over_noise(forward, out.nodes[best].fit) < FAR:
+        return False
+    by, prior, none = level(forward, base), log_priors(out.signatures), frozenset()
+    alone = [k for k in out.estimates if len(k) == 1]
+    suspects = [out.suspect(n) for k in alone for n in k]
+    for key, found in zip(alone, over_their_range(forward, suspects, by, base, progress), strict=True):
+        if found is None:
+            continue
+        theta, gain = found
+        # as sharp as data of that many standard deviations make a strength
+        occam = float(log_slab(np.sqrt(2.0 * np.array(gain)), out.hyper)) + 0.5 * float(np.log(2.0 * np.pi))
+        odds = _log_prior(key, prior, out.hyper) - _log_prior(none, prior, out.hyper)
+        if out.total[none] + gain + occam + odds > _promise(out, key):
+            out.promise[key], out.begun[key] = out.total[none] + gain + occam + odds, theta
+    return bool(out.begun)
 
 
 def extended(
@@ -539,7 +572,9 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
-    given = scanned(forward, hypothesis, by, parent.local) if len(suspects) == 1 and strained(parent) else None
+    given = out.begun.get(key)
+    if given is None and len(suspects) == 1 and strained(parent):
+        given, _ = scanned(forward, hypothesis, by, parent.local) or (None, np.inf)
     if given is not None:
         return fit(forward, hypothesis, by, theta=given, local=parent.local)
     # derivatives by the numbers of the model and by starts hardly change with an effect

@@ -8,11 +8,10 @@ import numpy as np
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.recorder import recorder_noise
-from origami_sim.infer.budget import Budget, Share, budget
+from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.search import Key, Node, Posterior
-from origami_sim.infer.words import distinct, joined, pooled, said, say, title
+from origami_sim.infer.words import distinct, joined, said, say, title
 
 CREDIBLE = 0.95
 """Probability that the stated set of explanations holds."""
@@ -22,12 +21,6 @@ ALONE = 0.8
 
 LISTED = 3
 """Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time."""
-
-FAR = 2.0
-"""Error over the noise of the recorder from which something real is left, whatever is more probable.
-
-Of ten objects with nothing missing it is 0.96 to 1.14, also with trackers that average over frames.
-"""
 
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
@@ -168,7 +161,7 @@ def unnamed_verdict(
     Args:
         unknown: whether a discrepancy is real that the refitted model leaves.
     """
-    over = pooled(base.rms() / recorder_noise(forward, base))
+    over = over_noise(forward, base)
     if unknown:
         text = f"The refitted model misses the recordings by {over:.2f} times the noise"
         if over < FAR:
