@@ -251,6 +251,12 @@ def test_pressed_patches_push_by_the_slope_of_their_energy_and_without_torque():
     assert -(force * way).sum() == pytest.approx(slope, rel=1e-5)
     spinning = evaluated(x, np.cross([3.0, -2.0, 4.0], x)).forces["touch"][:, 0]
     np.testing.assert_allclose(spinning, force, atol=1e-9 * pressed)
+    closing = np.zeros_like(x)  # the second panel turns about the crease: the dashpot acts like so much more way
+    closing[turned] = np.cross(x[turned], x[model.creases[0, 2]]) / (12 * MM)
+    closing *= -np.sign((force * closing).sum())
+    damped = evaluated(x, closing).forces["touch"][:, 0] - force
+    further = evaluated(x + 1e-4 * closing).forces["touch"][:, 0] - force
+    assert np.abs(damped - further).max() < 0.05 * np.abs(further).max()
 
 
 def letter():
