@@ -227,7 +227,7 @@ def test_patches_inside_a_fold_close_to_their_stop(tmp_path):
 
 
 def test_pressed_patches_push_by_the_slope_of_their_energy_and_without_torque():
-    """Corners of patches lie off the panels that carry them: their forces turn these panels, and so does their speed."""
+    """Corners of patches lie off the panels that carry them: forces on them turn these panels, which move them."""
     model, parameters = patched()
     parameters.set("touch", "loss_time", 1e-4)
     x = model.position - model.position[model.creases[0, 1]]
