@@ -78,6 +78,12 @@ def test_a_fold_stops_where_geometry_says(at, gap, mitre, valley, mountain):
     np.testing.assert_allclose(found, [valley, valley if mountain is None else mountain], atol=1e-6)
 
 
+@pytest.mark.parametrize(("face", "valley", "mountain"), [("top", 60, 0), ("bottom", 0, 60)])
+def test_a_mitre_of_one_face_opens_the_fold_towards_it_alone(face, valley, mountain):
+    s = pair().hinge(at="middle").mitre(angle="30 deg", face=face)
+    np.testing.assert_allclose(np.degrees(s.stops(0)), [valley, mountain], atol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_stops_are_those_of_solid_sections(seed):
     rng = np.random.default_rng(seed)
@@ -89,7 +95,8 @@ def test_stops_are_those_of_solid_sections(seed):
             edges.append(e)
             heights = sorted({e.bottom, e.top, *([0.0] if e.bottom < 0 < e.top else [])})
             far = 3000.0
-            solids.append(shapely.Polygon([*((e.receded(z), z) for z in heights), (far, e.top), (far, e.bottom)]))
+            edge = [(e.gap + max(z * np.tan(e.above), -z * np.tan(e.below)), z) for z in heights]
+            solids.append(shapely.Polygon([*edge, (far, e.top), (far, e.bottom)]))
         mirrored = affinity.scale(solids[1], -1, 1, origin=(0, 0))
 
         def overlap(angle, one=solids[0], other=mirrored):  # the second panel, to the left, turns up and over
@@ -170,14 +177,16 @@ def test_panels_that_share_no_node_move_as_those_that_do():
     np.testing.assert_allclose(motion(1e-12), motion(0.0), atol=1e-8)
 
 
-def test_a_load_on_a_shared_node_acts_once_and_a_held_panel_is_held_alone():
-    s = pair(rest_angle=0.0).hinge(at="top").set("load", [2], force_z=1.0)
+@pytest.mark.parametrize("held_panel", [0, 1])
+def test_a_load_on_a_shared_node_acts_once_and_a_held_panel_is_held_alone(held_panel):
+    s = Sheet(strip([0.04, 0.04], 0.03), thickness=2 * MM, material="pdms", panels="rigid").fix(panels=[held_panel])
+    s.crease(stiffness=0.01, rest_angle=0.0).hinge(at="top").set("load", [2], force_z=1.0)
     model, parameters = s.build()
     assert parameters["load", "force_z"].sum() == 1.0
     mass = parameters["inertia", "mass"][:, 0]
     assert mass.sum() == pytest.approx(2 * 0.04 * 0.03 * 2 * MM * s.density[0])
     held = ~model.free.any(axis=1)
-    assert set(np.flatnonzero(held)) == set(np.unique(model.triangles[model.triangle_panel == 0]))
+    assert set(np.flatnonzero(held)) == set(np.unique(model.triangles[model.triangle_panel == held_panel]))
 
 
 # thick origami that folds ---------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from origami_sim import (
     uncreased,
 )
 from origami_sim.curvature import curvature
+from origami_sim.materials import material
 from origami_sim.model import dihedral_angles
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import tangent
@@ -277,6 +278,31 @@ def test_a_sheet_with_natural_curvature_rolls_up(kind):
     assert found.converged, found.message
     tip = found.x[end].mean(axis=0)
     assert [tip[0], tip[2]] == pytest.approx([np.sin(bend) / bend, (1 - np.cos(bend)) / bend], abs=0.002)
+
+
+def test_a_natural_twist_is_the_saddle_with_that_mixed_derivative():
+    """w = k x y has the twist d2w / dx dy = k: with natural_12 = k it lies there without any force."""
+    x, triangles = mesh("crossed", 4)
+    model, parameters = plate(x, triangles, poisson=0.3)
+    bent = x + np.column_stack([0 * x[:, :2], 1e-6 * x[:, 0] * x[:, 1]])
+
+    def force(k):
+        parameters.set("shell_bending", "natural_12", k)
+        report = Batch(model, parameters, Drive(), State.at_rest(model, 1, bent)).evaluate(0.0)
+        return np.abs(report.forces["shell_bending"]).max()
+
+    assert force(1e-6) < 1e-5 * force(0.0)
+
+
+def test_a_patch_stretches_beside_the_sheet_it_is_bonded_to():
+    s = Sheet(uncreased(grid(2, 1, 0.01, 0.01)), thickness=1e-3, modulus=2e6, material="pdms")
+    s.patch(1, thickness=0.5e-3, material="mae").shell(poisson=0.3)
+    model, parameters = s.build()
+    of = [parameters["shell_membrane", "stiffness_11"][model.triangle_panel == p, 0] for p in (0, 1)]
+    mae = material("mae")
+    bare = 2e6 * 1e-3 / (1 - 0.3**2)
+    assert of[0] == pytest.approx(bare)
+    assert of[1] == pytest.approx(bare + mae.modulus * 0.5e-3 / (1 - mae.poisson**2))
 
 
 def test_a_crease_in_a_shell_is_a_hinge_between_beams():

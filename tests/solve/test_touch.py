@@ -13,6 +13,7 @@ from origami_sim.errors import InputError
 from origami_sim.materials import G
 from origami_sim.model import State, node_mass
 from origami_sim.results import load_run, save_run
+from origami_sim.solve.batch import Batch
 
 MM = 1e-3
 SMALL = [(0, 0), (20, 0), (20, 16), (0, 16)]
@@ -223,6 +224,39 @@ def test_patches_inside_a_fold_close_to_their_stop(tmp_path):
     again = load_run(save_run(tmp_path / "run", run, scene="patches", replay=False).path).trajectory.model
     assert again.hash == model.hash
     assert np.array_equal(again.pad_weights, model.pad_weights)
+
+
+def test_pressed_patches_push_by_the_slope_of_their_energy_and_without_torque():
+    """Corners of patches lie off the panels that carry them: forces on them turn these panels, which move them."""
+    model, parameters = patched()
+    parameters.set("touch", "loss_time", 1e-4)
+    x = model.position - model.position[model.creases[0, 1]]
+    fold = closed_form(1.2 * MM, 1 * MM, 1.6 * MM) + 0.02
+    turned = np.setdiff1d(of_panel(model, 1), of_panel(model, 0))
+    x[turned] = np.stack([x[turned, 0] * math.cos(fold), x[turned, 1], x[turned, 0] * math.sin(fold)], axis=1)
+    x = x @ random_rotation(np.random.default_rng(5)).T
+
+    def evaluated(x, v=0.0):
+        state = State.at_rest(model, position=x)
+        state.v[:, 0] += v
+        return Batch(model, parameters, Drive(), state).evaluate(0.0)
+
+    force = evaluated(x).forces["touch"][:, 0]
+    pressed = np.abs(force).max()
+    assert pressed > 1e-4
+    assert np.abs(force.sum(axis=0)).max() < 1e-10 * pressed
+    assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-10 * pressed * np.abs(x).max()
+    way, h = np.random.default_rng(6).normal(size=x.shape), 1e-9
+    slope = (evaluated(x + h * way).energies["touch"] - evaluated(x - h * way).energies["touch"])[0] / (2 * h)
+    assert -(force * way).sum() == pytest.approx(slope, rel=1e-5)
+    spinning = evaluated(x, np.cross([3.0, -2.0, 4.0], x)).forces["touch"][:, 0]
+    np.testing.assert_allclose(spinning, force, atol=1e-9 * pressed)
+    closing = np.zeros_like(x)  # the second panel turns about the crease: the dashpot acts like so much more way
+    closing[turned] = np.cross(x[turned], x[model.creases[0, 2]]) / (12 * MM)
+    closing *= -np.sign((force * closing).sum())
+    damped = evaluated(x, closing).forces["touch"][:, 0] - force
+    further = evaluated(x + 1e-4 * closing).forces["touch"][:, 0] - force
+    assert np.abs(damped - further).max() < 0.05 * np.abs(further).max()
 
 
 def letter():
