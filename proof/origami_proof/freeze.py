@@ -15,6 +15,8 @@ from origami_sim.errors import InputError
 
 PACKAGE = Path(origami_sim.__file__).resolve().parent
 FROZEN = "frozen.json"
+HOUSES = ("fit", "predict", "infer", "locate", "report", "diagnose")
+"""Folders of the diagnosis."""
 
 
 def state(truth: Path) -> dict:
@@ -51,13 +53,11 @@ def _numbers(value) -> bool:
 
 def thresholds() -> dict[str, dict]:
     """The numbers in capitals of every module of the diagnosis, and its default options."""
-    import origami_sim.diagnose
-    import origami_sim.fit
     from origami_sim.diagnose import Options
     from origami_sim.fit.hyper import HYPER
 
     out: dict = {"options": asdict(Options()), "hyperparameters": asdict(HYPER)}
-    for package in (origami_sim.diagnose, origami_sim.fit):
+    for package in (importlib.import_module(f"origami_sim.{name}") for name in HOUSES):
         for info in pkgutil.iter_modules(package.__path__):
             module = importlib.import_module(f"{package.__name__}.{info.name}")
             mine = {n: v for n, v in vars(module).items() if n.isupper() and _numbers(v)}
