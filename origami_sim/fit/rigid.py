@@ -139,16 +139,12 @@ class RigidRollouts(Rollouts):
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        films, memory = [angles[:, :1]], {}
-        for n, block in enumerate(blocks):
-            memory[block.first] = batch.remembered()[:, 0]
-            batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
-            after = block.lasting if block.reach is not None else block.times[-1]
-            frames = round(after / step)
-            if frames:
-                filmed = batch.film(frames, 1, after / frames, np.inf)[1]
-                films.append(filmed[:, self.articulation.creases, 0].T)
-        q = np.concatenate(films, axis=1)
+        lasting = [b.lasting if b.reach is not None else b.times[-1] for b in blocks]
+        begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
+        starts = (np.moveaxis(a, 1, 0)[:, :, None] for a in (angles, rates))
+        filmed, kept = batch.film_anew(begins[-1], sum(lasting) / begins[-1], begins[:-1], *starts)
+        memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
+        q = np.concatenate([angles[:, :1], filmed[:, self.articulation.creases, 0].T], axis=1)
         if not np.all(np.isfinite(q)):  # a world that goes unstable
             return super()._motion(r, world, local)
         return Motion(self._placed(q), memory)
