@@ -117,11 +117,20 @@ def _read(file: Path, count: int) -> Prediction | None:
             shapes, tied, numbers = data["shapes"], data["tied"], data["numbers"]
             if len(tied) != count or np.any(shapes < 0) or np.sum(np.prod(shapes, axis=1)) != len(numbers):
                 return None
-            parts = np.split(numbers, np.cumsum(np.prod(shapes, axis=1))[:-1])
+            parts = np.split(numbers, np.cumsum(np.prod(shapes, axis=1)))[:-1]
             arrays = [a.reshape(shape) for a, shape in zip(parts, shapes, strict=True)]
             ends = iter(a[..., 0] for a in arrays[count:])
             return Prediction(arrays[:count], [next(ends) if some else None for some in tied])
-    except (OSError, ValueError, KeyError, EOFError, StopIteration, zipfile.BadZipFile, zlib.error):
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        StopIteration,
+        NotImplementedError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
         return None
 
 
@@ -131,8 +140,8 @@ def _write(file: Path, prediction: Prediction) -> None:
     # one after the other: an entry of the file for each took longer than what is in them
     arrays = [*prediction.values, *(e[..., None] for e in prediction.ends if e is not None)]
     whole = {
-        "numbers": np.concatenate([a.ravel() for a in arrays]),
-        "shapes": np.array([a.shape for a in arrays], np.int64),
+        "numbers": np.concatenate([np.zeros(0), *(a.ravel() for a in arrays)]),
+        "shapes": np.array([a.shape for a in arrays], np.int64).reshape(-1, 3),
         "tied": np.array([e is not None for e in prediction.ends]),
     }
     with suppress(OSError):
