@@ -296,7 +296,7 @@ class Diagnosis:
 
     def to_dict(self) -> dict:
         """Plain lists and numbers; what is not finite becomes None."""
-        return _plain(self)
+        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
     def save_json(self, path: str | Path) -> Path:
         """Writes everything as JSON."""
