@@ -1,8 +1,9 @@
 """What a diagnosis says: plain data that the report shows and that JSON holds whole."""
 
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -295,7 +296,7 @@ class Diagnosis:
 
     def to_dict(self) -> dict:
         """Plain lists and numbers; what is not finite becomes None."""
-        return {k: _plain(v) for k, v in asdict(self).items()}
+        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
     def save_json(self, path: str | Path) -> Path:
         """Writes everything as JSON."""
@@ -303,12 +304,16 @@ class Diagnosis:
 
 
 def _plain(value):
+    if type(value) is float:  # nearly all of it
+        return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
+    if is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (float, np.floating)):

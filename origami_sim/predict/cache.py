@@ -114,21 +114,40 @@ def _read(file: Path, count: int) -> Prediction | None:
     """Stored predictions; None if there are none, or if the file is damaged."""
     try:
         with np.load(file, allow_pickle=False) as data:
-            ends = [data[f"end{n}"] if f"end{n}" in data else None for n in range(count)]
-            return Prediction([data[str(n)] for n in range(count)], ends)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+            shapes, tied, numbers = data["shapes"], data["tied"], data["numbers"]
+            if len(tied) != count or np.any(shapes < 0) or np.sum(np.prod(shapes, axis=1)) != len(numbers):
+                return None
+            parts = np.split(numbers, np.cumsum(np.prod(shapes, axis=1)))[:-1]
+            arrays = [a.reshape(shape) for a, shape in zip(parts, shapes, strict=True)]
+            ends = iter(a[..., 0] for a in arrays[count:])
+            return Prediction(arrays[:count], [next(ends) if some else None for some in tied])
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        StopIteration,
+        NotImplementedError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
         return None
 
 
 def _write(file: Path, prediction: Prediction) -> None:
     """Stores predictions, if the disk takes them: without, only an interruption costs more."""
     part = file.with_name(f".{file.stem}.{os.getpid()}.part")
-    arrays = {str(n): v for n, v in enumerate(prediction.values)}
-    arrays |= {f"end{n}": e for n, e in enumerate(prediction.ends) if e is not None}
+    # one after the other: an entry of the file for each took longer than what is in them
+    arrays = [*prediction.values, *(e[..., None] for e in prediction.ends if e is not None)]
+    whole = {
+        "numbers": np.concatenate([np.zeros(0), *(a.ravel() for a in arrays)]),
+        "shapes": np.array([a.shape for a in arrays], np.int64).reshape(-1, 3),
+        "tied": np.array([e is not None for e in prediction.ends]),
+    }
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         with open(part, "wb") as f:
-            np.savez(f, allow_pickle=False, **arrays)
+            np.savez(f, allow_pickle=False, **whole)
         part.replace(file)
     with suppress(OSError):
         part.unlink(missing_ok=True)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from origami_sim.articulation import Pose
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
@@ -30,6 +31,10 @@ FINEST = 1e-4
 
 Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
 """
+
+
+POINTS = 8
+"""Motions that are kept: those of the last points that a fit tried."""
 
 
 class RigidRollouts(Rollouts):
@@ -57,6 +62,7 @@ class RigidRollouts(Rollouts):
     ):
         super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
         self._tree = Topology(self.model)
+        self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         check_tree(self._tree, self.articulation.floating)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
@@ -121,17 +127,34 @@ class RigidRollouts(Rollouts):
         return out, ends
 
     def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
-        """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other."""
+        """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other.
+
+        A point of a fit is asked for again where derivatives are taken there.
+        """
         numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
         blocks = [self.blocks[n] for n in numbers]
         if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
             return super()._motion(r, world, local)
-        (model, parameters), m = world, self.articulation.size
+        m, shifts = self.articulation.size, np.zeros((len(blocks), self.local)) if local is None else local[numbers]
+        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)])
+        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)])
+        begins = tuple((b.first, b.lasting, b.times[-1]) for b in blocks)
+        (model, parameters), drive = world, self.drives[r]
+        key = (r, id(drive), begins, model.hash, parameters.hash, angles.tobytes(), rates.tobytes())
+        if key not in self._moved:
+            if len(self._moved) >= POINTS:
+                del self._moved[next(iter(self._moved))]
+            found = self._followed(r, world, blocks, angles, rates)
+            self._moved[key] = drive, super()._motion(r, world, local) if found is None else found
+        return self._moved[key][1]
+
+    def _followed(
+        self, r: int, world: World, blocks: list[Block], angles: np.ndarray, rates: np.ndarray
+    ) -> Motion | None:
+        """The motion of a world from segment to segment, that start at angles and rates [B, m]; None: unstable."""
+        model, parameters = world
         step = float(np.median(np.diff(self.recordings[r].times)))
-        shifts = np.zeros((len(blocks), 2 * m)) if local is None else local[numbers]
-        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)], axis=1)
-        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)], axis=1)
-        x = np.moveaxis(self._placed(angles[:, :1]), 0, 1)
+        x = np.moveaxis(self._placed(angles[:1].T), 0, 1)
         begin = State.at_rest(model, position=x)
         begin.memory[:] = self._rested(r, [world], 0, x).remembered()
         shots = Shots(r, blocks[:1], [world], np.zeros((1, 1)), None, None, step, len(self.recordings[r].times), 0)
@@ -139,19 +162,13 @@ class RigidRollouts(Rollouts):
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        films, memory = [angles[:, :1]], {}
-        for n, block in enumerate(blocks):
-            memory[block.first] = batch.remembered()[:, 0]
-            batch.restart(angles[:, n : n + 1], rates[:, n : n + 1])
-            after = block.lasting if block.reach is not None else block.times[-1]
-            frames = round(after / step)
-            if frames:
-                filmed = batch.film(frames, 1, after / frames, np.inf)[1]
-                films.append(filmed[:, self.articulation.creases, 0].T)
-        q = np.concatenate(films, axis=1)
-        if not np.all(np.isfinite(q)):  # a world that goes unstable
-            return super()._motion(r, world, local)
-        return Motion(self._placed(q), memory)
+        lasting = [b.lasting if b.reach is not None else b.times[-1] for b in blocks]
+        begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
+        dt = sum(lasting) / begins[-1]
+        filmed, kept = batch.film_anew(begins[-1], dt, begins[:-1], angles[:, :, None], rates[:, :, None])
+        memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
+        q = np.concatenate([angles[:1].T, filmed[:, self.articulation.creases, 0].T], axis=1)
+        return Motion(self._placed(q), memory) if np.all(np.isfinite(q)) else None
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""

@@ -51,6 +51,10 @@ class Tree:
     stabilisation: scalar  # rate at which an open loop closes [1/s]
     softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
     tableau: wp.array2d(dtype=scalar)  # [STAGES + 1, STAGES + 1] time, then weights; the last row is the error's
+    # steps at whose begin a held tree moves on from elsewhere, R of them; what memory was before
+    restarts: wp.array(dtype=wp.int32)
+    starts: wp.array2d(dtype=scalar)  # [R 2 J, W] coordinates, then rates
+    kept: wp.array2d(dtype=scalar)  # [R M, W]
     # bodies
     reference: int  # [N, 3] nodes
     middle: int  # [3] the root's centre
@@ -200,9 +204,9 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         pivot = vec_at(s, o + tree.pivot + 3 * j)
         a = up * bare
         there = up * pivot + vec_at(s, o + tree.placed + 3 * p)
-        own = up * rotation(bare, at(s, o + tree.y + POSE + j))
-        put_mat(s, o + tree.turned + 9 * b, own)
-        put_vec(s, o + tree.placed + 3 * b, there - own * pivot)
+        mine = up * rotation(bare, at(s, o + tree.y + POSE + j))
+        put_mat(s, o + tree.turned + 9 * b, mine)
+        put_vec(s, o + tree.placed + 3 * b, there - mine * pivot)
         r = there - origin
         rate = at(s, o + tree.u + tree.roots + j)
         before = vec_at(s, o + tree.omega + 3 * p)
@@ -220,13 +224,21 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
         put_vec(s, o + tree.force + 3 * b, zero)
         put_vec(s, o + tree.moment + 3 * b, zero)
+    body = int(-1)
+    own = turn
+    place = zero
     for row in range(X.shape[0]):
         n = row & NATURAL
         b = tree.body_of[n]
-        x = mat_at(s, o + tree.turned + 9 * b) * vec_at(s, o + tree.reference + 3 * n)
-        x = x + vec_at(s, o + tree.placed + 3 * b)
+        if b != body:  # nodes of a body mostly follow each other
+            body = b
+            own = mat_at(s, o + tree.turned + 9 * b)
+            place = vec_at(s, o + tree.placed + 3 * b)
+            omega = vec_at(s, o + tree.omega + 3 * b)
+            speed = vec_at(s, o + tree.speed + 3 * b)
+        x = own * vec_at(s, o + tree.reference + 3 * n) + place
         X[n, w] = x
-        V[n, w] = vec_at(s, o + tree.speed + 3 * b) + wp.cross(vec_at(s, o + tree.omega + 3 * b), x - origin)
+        V[n, w] = speed + wp.cross(omega, x - origin)
         F[n, w] = zero
 
 
@@ -242,12 +254,23 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
     origin = vec_at(s, o + tree.y)
     for k in range(m * m):
         s[(factor + k) & NATURAL] = scalar(0.0)
+    body = int(0)
+    pull = vec_at(s, o + tree.force)
+    torque = vec_at(s, o + tree.moment)
     for row in range(X.shape[0]):
         n = row & NATURAL
-        b = 3 * tree.body_of[n]
+        b = tree.body_of[n]
+        if b != body:  # nodes of a body mostly follow each other
+            put_vec(s, o + tree.force + 3 * body, pull)
+            put_vec(s, o + tree.moment + 3 * body, torque)
+            body = b
+            pull = vec_at(s, o + tree.force + 3 * b)
+            torque = vec_at(s, o + tree.moment + 3 * b)
         f = F[n, w]
-        put_vec(s, o + tree.force + b, vec_at(s, o + tree.force + b) + f)
-        put_vec(s, o + tree.moment + b, vec_at(s, o + tree.moment + b) + wp.cross(X[n, w] - origin, f))
+        pull = pull + f
+        torque = torque + wp.cross(X[n, w] - origin, f)
+    put_vec(s, o + tree.force + 3 * body, pull)
+    put_vec(s, o + tree.moment + 3 * body, torque)
     for b in range(tree.bodies):
         turn = mat_at(s, o + tree.turned + 9 * b)
         c = turn * vec_at(s, o + tree.centre + 3 * b) + vec_at(s, o + tree.placed + 3 * b) - origin

@@ -71,6 +71,9 @@ class RigidBatch(Batch):
         tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
         tree.tableau = constant(TABLEAU, wp.float64)
+        tree.restarts = constant(np.zeros(0), wp.int32)
+        tree.starts = tree.kept = constant(np.zeros((0, 1)), wp.float64)
+        self._begun = state.angles[[c for c, _ in t.joints]]
         centre, mass, inertia = self._bodies(x, np.broadcast_to(self._mass, (len(x), w)))
         check_inertia(model, t, x[:, 0], np.broadcast_to(self._mass, (len(x), w))[:, 0])
         origin = x[t.root_nodes].mean(axis=0)
@@ -154,8 +157,15 @@ class RigidBatch(Batch):
             out[len(t.turns) + j, mine] = np.cross(axis[j], x[mine] - pivot[j])
         return out
 
-    def restart(self, angles: np.ndarray, rates: np.ndarray):
-        """Moves on from other angles [J, W] of the joints and their rates [J, W], with what laws remember.
+    def film_anew(
+        self, frames: int, dt: float, when: Sequence[int], angles: np.ndarray, rates: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Films steps of dt [s], and moves on from elsewhere at the begin of some, with what laws remember.
+
+        Args:
+            when: (R,) of which, counted from 0. angles, rates: [R, J, W] of the joints then.
+
+        Returns: hinge angles [F, C + Q, W] [rad], and memory [R, M, W] there.
 
         Raises:
             InputError: panels that nothing holds.
@@ -164,18 +174,15 @@ class RigidBatch(Batch):
             raise InputError(
                 "only a sheet that is held can start anew", field="restart", allowed="a panel that is held"
             )
-        tree, creases = self._tree, [c for c, _ in self.tree_of.joints]
-        data = self._tree.data.numpy().reshape(-1, tree.width)[: self.worlds]
-        begin = data[:, [tree.start + c for c in creases]]
-        first = tree.y + articulated.POSE
-        data[:, first : first + len(creases)] = angles.T - begin
-        data[:, tree.u : tree.u + len(creases)] = rates.T
-        now = self._download(self._angles, len(self.model.creases) + len(self.model.bends))
-        now[creases] = angles
-        if not self.device.is_cpu:
-            tree.data.assign(self._tree.data.numpy())
-        self._overwrite(self._angles, now)
-        self._fresh = 1
+        tree, count = self._tree, len(when)
+        starts = np.concatenate([angles - self._begun, rates], axis=1)
+        tree.restarts = wp.array(np.asarray(when, np.int32), dtype=wp.int32, device=self.device)
+        tree.starts = self._upload(starts.reshape(-1, self.worlds), wp.float64)
+        tree.kept = self._room(max(count * tree.memories, 1), dtype=wp.float64)
+        filmed = self.film(frames, 1, dt, np.inf)[1]
+        kept = tree.kept.numpy()[: count * tree.memories, : self.worlds].reshape(count, tree.memories, self.worlds)
+        tree.restarts = wp.zeros(0, dtype=wp.int32, device=self.device)
+        return filmed, kept
 
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
         fixed = self.tolerance == 0.0

@@ -132,6 +132,23 @@ def carry_over(tree: Tree, work: wp.array2d(dtype=scalar), step: scalar, w: int)
 
 
 @wp.func
+def restart(tree: Tree, angles: wp.array2d(dtype=scalar), memory: wp.array2d(dtype=scalar), n: int, w: int):
+    """Moves on from the n-th of other starts, with what laws remember, which is kept as well."""
+    s = tree.data
+    o = w * tree.width
+    joints = tree.bodies - 1
+    for i in range(joints):
+        s[(o + tree.y + POSE + i) & NATURAL] = tree.starts[(2 * n * joints + i) & NATURAL, w]
+        s[(o + tree.u + i) & NATURAL] = tree.starts[((2 * n + 1) * joints + i) & NATURAL, w]
+    for r in range(tree.joint_of.shape[0]):
+        j = tree.joint_of[r]
+        if j >= 0:
+            angles[r, w] = at(s, o + tree.start + r) + at(s, o + tree.y + POSE + j)
+    for i in range(tree.memories):
+        tree.kept[(n * tree.memories + i) & NATURAL, w] = memory[i, w]
+
+
+@wp.func
 def weighted(tree: Tree, first: int, count: int, row: int, stages: int):
     """Sum of a number's derivatives over the stages, by a row of the tableau."""
     x = scalar(0.0)

@@ -141,6 +141,7 @@ def rigid({arguments}
     wait = every
 {hoist}
     final = int(articulated.STAGES - 1)
+    anew = int(0)
     # one pass more than steps: at first only the accelerations are found
     begin = int(0)
     if fresh == 1:
@@ -148,18 +149,26 @@ def rigid({arguments}
     for s in range(begin, steps):
         clock = scalar(0.0)
         going = int(1)
+        still = int(0)  # a pass that finds accelerations and takes no time
+        if s < 0:
+            still = int(1)
+        elif anew < tree.restarts.shape[0]:
+            if s == tree.restarts[anew]:
+                runge_kutta.restart(tree, angles, memory, anew, w)
+                anew += 1
+                still = int(1)
         while going == 1:
             step = runge_kutta.step_of(tree, clock, dt, tolerance, w)
             ends = int(0)
             if step == dt - clock:
                 ends = int(1)
             first_stage = int(1)
-            if s < 0:
+            if still == 1:
                 step = scalar(0.0)
                 first_stage = final
             runge_kutta.begin(tree, angles, memory, power, w)
             for stage in range(first_stage, final + 1):
-                if s >= 0:
+                if still == 0:
                     runge_kutta.go(tree, stage, step, w)
                 h = tree.tableau[stage, 0] * step
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
@@ -173,17 +182,18 @@ def rigid({arguments}
                 allowed = scalar(1.0)  # a step as given only may not turn anything by radians more than it should
             error = scalar(0.0)
             longer = dt
-            if s >= 0:
+            if still == 0:
                 error = runge_kutta.error_of(tree, step, size, w)
                 if tolerance > scalar(0.0) and tree.memories > 0:
                     error = runge_kutta.larger(error, runge_kutta.reversal_of(tree, step, tolerance, w))
             if error <= allowed:
                 runge_kutta.carry_over(tree, work, step, w)
                 clock += step
-                if s < 0 or ends == 1:
+                if s < 0 or (still == 0 and ends == 1):
                     going = int(0)
-                if s >= 0 and tolerance > scalar(0.0):
+                if still == 0 and tolerance > scalar(0.0):
                     longer = runge_kutta.lengthen(tree, step, error / allowed, ends, w)
+                still = int(0)
             else:
                 runge_kutta.go_back(tree, angles, memory, power, w)
                 longer = scalar(0.0)

@@ -477,21 +477,53 @@ def test_a_step_hides_no_reversal_from_a_law_with_memory():
     assert errors[0] < 1e-4 and errors[1] < 1e-5
 
 
-def test_a_held_sheet_starts_anew_with_what_its_laws_remember():
-    """A swing that is put back where it just was goes on as if nothing had been done."""
+def rubbing_swing():
     sheet = hanging((0.03, 0.03, 0.03)).crease(stiffness=2e-4)
     sheet.set("crease_friction", friction_moment=2e-4, yield_angle=3e-3)
     model, parameters = sheet.build()
-    whole, cut = (RigidBatch(model, parameters, Drive(), folded(model, [0.9, -0.7])) for _ in range(2))
+    return model, parameters, Drive(), folded(model, [0.9, -0.7])
+
+
+def test_a_held_sheet_starts_anew_with_what_its_laws_remember():
+    """A swing that is put back where it just was goes on as if nothing had been done."""
+    given = model, *_ = rubbing_swing()
+    whole, cut = (RigidBatch(*given) for _ in range(2))
     for batch in (whole, cut):
         batch.film(20, 1, 0.01, np.inf)
     arm, state = Articulation(model), cut.state()
     pose = arm.poses_of(state.x, state.angles)
-    cut.restart(pose.angles, arm.rates_of(pose, state.x, state.v))
-    one, other = (batch.film(30, 1, 0.01, np.inf)[1] for batch in (whole, cut))
+    rates = arm.rates_of(pose, state.x, state.v)
+    other, kept = cut.film_anew(30, 0.01, [0], pose.angles[None], rates[None])
+    one = whole.film(30, 1, 0.01, np.inf)[1]
     assert np.ptp(one, axis=0).max() > 0.5
     assert np.abs(one - other).max() < 1e-6
+    assert np.abs(kept[0] - state.memory).max() < 1e-12 < np.abs(kept[0]).max()
     floating = Sheet(strip([0.03, 0.03], 0.03), thickness=2e-3, panels="rigid").crease(stiffness=2e-3)
     free = RigidBatch(*(made := floating.build()), Drive(), State.at_rest(made[0]))
     with pytest.raises(InputError, match=r"only a sheet that is held.*restart"):
-        free.restart(np.zeros((1, 1)), np.zeros((1, 1)))
+        free.film_anew(1, 0.01, [0], np.zeros((1, 1, 1)), np.zeros((1, 1, 1)))
+
+
+def again_and_again(device: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Films and memories of two swings that start anew twice, in one launch and in one for each start."""
+    model, parameters, drive, state = rubbing_swing()
+    state, moved = State.join([state, folded(model, [0.4, 0.2])]), np.array([[0.3, -0.2], [0.1, 0.5]])
+    when, angles, rates = [7, 19], np.stack([moved, -moved]), np.stack([4.0 * moved, moved])
+    one, other = (RigidBatch(model, parameters, drive, state, device=device, tolerance=1e-8) for _ in range(2))
+    film, kept = one.film_anew(30, 0.01, when, angles, rates)
+    parts, memories = [other.film(7, 1, 0.01, np.inf)[1]], []
+    for n, frames in enumerate((12, 11)):
+        memories.append(other.remembered())
+        parts.append(other.film_anew(frames, 0.01, [0], angles[n : n + 1], rates[n : n + 1])[0])
+    return [film, np.concatenate(parts)], [kept, np.stack(memories)]
+
+
+def test_starts_anew_in_one_launch():
+    for one, other in again_and_again("cpu"):
+        assert np.ptp(one) > 0.0 and np.array_equal(one, other)
+
+
+def test_starts_anew_on_a_gpu(cuda):
+    for here, there in zip(again_and_again("cpu"), again_and_again(cuda), strict=True):
+        assert np.array_equal(*there)
+        assert np.abs(here[0] - there[0]).max() < 1e-6 * np.abs(here[0]).max()
