@@ -25,6 +25,9 @@ from origami_sim.recording import Recording, read_recording
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import cube_toss, falling_ball
 
+WHOLE = 10.0
+"""Longer than any of these recordings [s]: each is one segment."""
+
 SHORT = -0.021
 """Relative error of the cube's lengths, as its flights show."""
 
@@ -50,7 +53,8 @@ def tested(
     subject: Subject, train: Sequence[Recording], test: Sequence[Recording], weights: Weights, effect: str = ""
 ) -> tuple[Fit, Fit]:
     """A fit to some recordings, and its numbers on others, of which only the starts are adapted."""
-    one, other = (arranged(subject, list(r), Options(start="fit"))[0] for r in (train, test))
+    whole = Options(start="fit", segment=WHOLE)
+    one, other = (arranged(subject, list(r), whole)[0] for r in (train, test))
     every = suspects(one.model, one.recordings, one.drive, one.parameters)
     added = tuple(s for s in every if s.effect == effect and not (s.kind == "measurement" and s.entities))
     fitted = fit(one, Hypothesis(added), weights, most=12)
@@ -81,7 +85,7 @@ def balls(source: Path, folder: Path) -> None:
             each = [tested(s, [drops[a]], [drops[b]], weights, effect) for a, b in ((0, 1), (1, 0))]
             values = ", ".join(number(f, shown) for f, _ in each)
             print(f"  {title:14s} {shown} {values}; on the other drop {np.mean([rms(g) for _, g in each]):.2f} m")
-        told(subject, drops, segment=10.0)
+        told(subject, drops, segment=WHOLE)
 
 
 def flights(source: Path, folder: Path) -> None:
