@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.fit.least_squares import Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 
@@ -21,10 +21,11 @@ It only decides where fits begin: half, double and fifty times as much change no
 crease friction holds, numbers were 10 and 21 deviations off.
 """
 
-GRID = np.geomspace(1.0, 1e3, 7)
-"""Strengths of an effect that are tried, in the unit in which it is screened: what first shows, up to what blocks.
+GRID = np.geomspace(0.01, 1e3, 11)
+"""Strengths of an effect that are tried, in the unit in which it is screened: from far below what first shows (which may
+be too strong already) up to what blocks.
 
-The friction of that crawler is found alike with 13; with 4, ten times apart, it is not.
+With steps ten times apart the friction of that crawler is not found.
 """
 
 
@@ -34,18 +35,14 @@ def strained(f: Fit) -> bool:
     return bool(known and chi2.sf(f.penalty, known) < DOUBTED)
 
 
-def scanned(
-    forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray
-) -> tuple[np.ndarray, float] | None:
+def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray | None:
     """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least.
 
-    With the squares that are missed, over the weights; None if the model goes unstable with all of them.
+    None if the model goes unstable with all of them.
     """
     first, *_ = hypothesis.free
     given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
-    tried = first.start + first.scale * np.concatenate([GRID, -GRID])
-    strengths = np.unique(np.clip(tried, first.lower, first.upper))
-    strengths = strengths[strengths != first.start]
+    strengths = over_range(first)
     thetas = np.repeat(given[None], len(strengths), axis=0)
     thetas[:, len(forward.subject.nominals)] = strengths
     shot = forward.predict(hypothesis, thetas, np.repeat(local[None], len(thetas), axis=0))
@@ -53,28 +50,53 @@ def scanned(
     for block, values in zip(forward.blocks, shot, strict=True):
         gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
         missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
-    best = int(np.argmin(missed))
-    return (thetas[best], float(missed[best])) if np.isfinite(missed[best]) else None
+    return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None
 
 
 def over_their_range(
     forward: Predictor,
     suspects: Sequence[Suspect],
-    weights: Weights,
     base: Fit,
+    weights: Weights,
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[tuple[np.ndarray, float] | None]:
-    """Of each suspect alone, the best of a few strengths, and the log likelihood that it gains over the refitted model.
+    """Of each suspect beside a fit, the best of a few strengths, and the log likelihood that it gains.
 
-    Both in white noise as large as what they leave; None where it gains nothing.
+    What a strength changes is simulated; starts and the fit's numbers follow linearly. Both fits are judged in white
+    noise as large as what they leave. None where none of the strengths gains anything.
     """
     line = base.reweighted(weights).linear
     assert line is not None
-    before = sum(float(r[line.data(n)] @ r[line.data(n)]) for n, r in enumerate(line.residual))
+    scale = np.array([n.scale for n in base.free])
+    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in base.free])
+    away = prior * (np.array([n.start for n in base.free]) - base.theta) / scale
+    numbers = np.linalg.qr(np.concatenate([*line.cleared(line.tangent), np.diag(prior)]))[0]
     count = sum(int(forward.blocks[b].seen().sum()) for b in base.blocks)
+
+    def missed(residual: list[np.ndarray]) -> np.ndarray:
+        """Squares (K,) of residuals [r, K] that no starts and numbers explain."""
+        columns = np.concatenate([*line.cleared(residual), np.repeat(away[:, None], residual[0].shape[1], axis=1)])
+        return np.sum((columns - numbers @ (numbers.T @ columns)) ** 2, axis=0)
+
+    before = float(missed([r[:, None] for r in line.residual])[0])
     for n, s in enumerate(suspects):
         if progress:
             progress(n / len(suspects))
-        found = scanned(forward, Hypothesis((s,)), weights, base.local)
-        gain = 0.5 * count * np.log(before / max(found[1], 1e-12 * before)) if found else 0.0
-        yield (found[0], gain) if found and gain > 0.0 else None
+        strengths = over_range(s.free[0])
+        rest = np.array([f.start for f in s.free[1:]])
+        thetas = [base.theta, *(np.concatenate([base.theta, [z], rest]) for z in strengths)]
+        hypotheses = [base.hypothesis, *[base.hypothesis.plus(s)] * len(strengths)]
+        shot = forward.shoot(hypotheses, thetas, np.repeat(base.local[None], len(thetas), axis=0), base.blocks)
+        parts = changed(forward, shot, weights, base.blocks)
+        left = missed([r[:, None] - c.T for r, c in zip(line.residual, parts, strict=True)])
+        left = np.where(np.isfinite(left), left, np.inf)
+        best = int(np.argmin(left))
+        gain = 0.5 * count * float(np.log(before / max(left[best], 1e-12 * before)))
+        yield (thetas[1 + best], gain) if gain > 0.0 else None
+
+
+def over_range(strength: Free) -> np.ndarray:
+    """Strengths of an effect that are tried, of either sign where it may have both."""
+    tried = strength.start + strength.scale * np.concatenate([GRID, -GRID])
+    out = np.unique(np.clip(tried, strength.lower, strength.upper))
+    return out[out != strength.start]

@@ -189,19 +189,19 @@ def search(
 def reconsidered(
     out: Posterior, forward: Predictor, base: Fit, *, progress: Callable[[float], None] | None = None
 ) -> bool:
-    """Simulates every single effect at several strengths where nothing explains a motion; whether any promises more.
+    """Simulates every single effect at several strengths where nothing explains a recording; whether any promises more.
 
-    A model that snaps, and a device that does not, have no derivatives that tell why. So before nothing is said to
-    explain a recording, each effect is tried over its range. Segments with starts of their own follow what was recorded
-    closely enough to do without.
+    A model that snaps, or a crease that sticks, has no derivatives that tell why. So before nothing is said to explain
+    a recording, each effect is tried over its range.
     """
     best = max(out.nodes, key=lambda k: out.total[k])
-    if forward.local or over_noise(forward, out.nodes[best].fit) < FAR:
+    if over_noise(forward, out.nodes[best].fit) < FAR:
         return False
-    by, prior, none = level(forward, base), log_priors(out.signatures), frozenset()
+    prior, none = log_priors(out.signatures), frozenset()
     alone = [k for k in out.estimates if len(k) == 1]
     suspects = [out.suspect(n) for k in alone for n in k]
-    for key, found in zip(alone, over_their_range(forward, suspects, by, base, progress), strict=True):
+    tried = over_their_range(forward, suspects, base, level(forward, base), progress)
+    for key, found in zip(alone, tried, strict=True):
         if found is None:
             continue
         theta, gain = found
@@ -574,7 +574,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
     given = out.begun.get(key)
     if given is None and len(suspects) == 1 and strained(parent):
-        given, _ = scanned(forward, hypothesis, by, parent.local) or (None, np.inf)
+        given = scanned(forward, hypothesis, by, parent.local)
     if given is not None:
         return fit(forward, hypothesis, by, theta=given, local=parent.local)
     # derivatives by the numbers of the model and by starts hardly change with an effect

@@ -25,6 +25,18 @@ def test_friction_is_found_with_its_strength_and_the_fit_improves():
     assert found.exit_code >= 10 and found.candidates[0].odds > 0
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_crease_that_sticks_is_found_though_no_derivative_promises_it(seed):
+    """From the model without friction a stiffening crease promises more, and leaves seventeen times the noise."""
+    also = ("crease_stiffening", "crease_quadratic_damping", "crease_relaxation", "air_drag", "tracker_lag")
+    swing = record(FRICTION, panels=3, duration=2.5, rate=80, size=0.6, seed=seed)
+    others = ("crease_friction", "angle_offset", "clock_delay")
+    found = diagnose(subject(3), [swing], catalogue=(*others, *also))
+    assert found.chosen == ["crease_friction at crease 1"] and found.verdict == "MECHANISM"
+    moment = next(n for n in found.candidates[0].numbers if n.label == "crease_friction.friction_moment")
+    assert moment.value == pytest.approx(2e-5, rel=0.05)
+
+
 def test_nothing_is_found_where_nothing_is_missing():
     found = diagnose(subject(3), [record(seed=4, **SMALL)], catalogue=LOOPS)
     assert found.verdict == "ADEQUATE"
