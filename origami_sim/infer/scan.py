@@ -22,8 +22,8 @@ crease friction holds, numbers were 10 and 21 deviations off.
 """
 
 GRID = np.geomspace(0.01, 1e3, 11)
-"""Strengths of an effect that are tried, in the unit in which it is screened: from far below what first shows (which may
-be too strong already) up to what blocks.
+"""Strengths of an effect that are tried, in the unit in which it is screened: from far below what first shows (which
+may be too strong already) up to what blocks.
 
 With steps ten times apart the friction of that crawler is not found.
 """
