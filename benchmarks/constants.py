@@ -12,6 +12,7 @@ the four verdicts changed, and by how much any probability of an effect did. Pri
 
 import ast
 import importlib
+import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -66,7 +67,7 @@ def numbers() -> Iterator[tuple[str, str, Any, str]]:
                 for name in names:
                     value = getattr(importlib.import_module(f"origami_sim.{module}"), name)
                     if name.isupper() and isinstance(value, (int, float)) and not isinstance(value, bool):
-                        yield module, name, value, (said or "").partition(".")[0].replace("\n", " ")
+                        yield module, name, value, re.split(r"\.(?:\s|$)", said or "")[0].replace("\n", " ")
 
 
 def put(name: str, old: Any, new: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.fit.least_squares import Fit, changed
+from origami_sim.fit.least_squares import UTMOST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 
@@ -63,7 +63,8 @@ def over_their_range(
     """Of each suspect beside a fit, the best of a few strengths, and the log likelihood that it gains.
 
     What a strength changes is simulated; starts and the fit's numbers follow linearly. Both fits are judged in white
-    noise as large as what they leave. None where none of the strengths gains anything.
+    noise as large as what they leave. None where none of the strengths gains anything. Strengths that would slow the
+    solver down are left out, as in a fit.
     """
     line = base.reweighted(weights).linear
     assert line is not None
@@ -78,14 +79,18 @@ def over_their_range(
         columns = np.concatenate([*line.cleared(residual), np.repeat(away[:, None], residual[0].shape[1], axis=1)])
         return np.sum((columns - numbers @ (numbers.T @ columns)) ** 2, axis=0)
 
+    least = forward.step(base.hypothesis, base.theta) / UTMOST
     before = float(missed([r[:, None] for r in line.residual])[0])
     for n, s in enumerate(suspects):
         if progress:
             progress(n / len(suspects))
-        strengths = over_range(s.free[0])
-        rest = np.array([f.start for f in s.free[1:]])
-        thetas = [base.theta, *(np.concatenate([base.theta, [z], rest]) for z in strengths)]
-        hypotheses = [base.hypothesis, *[base.hypothesis.plus(s)] * len(strengths)]
+        rest, richer = [f.start for f in s.free[1:]], base.hypothesis.plus(s)
+        tried = [np.array([*base.theta, z, *rest]) for z in over_range(s.free[0])]
+        thetas = [base.theta, *(t for t in tried if forward.step(richer, t) >= least)]
+        if len(thetas) == 1:
+            yield None
+            continue
+        hypotheses = [base.hypothesis, *[richer] * (len(thetas) - 1)]
         shot = forward.shoot(hypotheses, thetas, np.repeat(base.local[None], len(thetas), axis=0), base.blocks)
         parts = changed(forward, shot, weights, base.blocks)
         left = missed([r[:, None] - c.T for r, c in zip(line.residual, parts, strict=True)])
