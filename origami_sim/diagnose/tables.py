@@ -79,10 +79,9 @@ def _distrust(f: Fit) -> str:
 
 def numbers(f: Fit) -> list[Number]:
     """Fitted numbers with 95 % intervals."""
-    deviation = f.deviations()
     return [
-        Number(n.label, n.unit, float(t), float(t - 1.96 * d), float(t + 1.96 * d), n.start, n.spread, bool(b))
-        for n, t, d, b in zip(f.free, f.theta, deviation, f.at_bound, strict=True)
+        Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b))
+        for n, t, low, high, b in zip(f.free, f.theta, *f.intervals(), f.at_bound, strict=True)
     ]
 
 

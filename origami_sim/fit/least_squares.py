@@ -96,6 +96,12 @@ class Fit:
         """(P,) standard deviations of theta."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)
 
+    def intervals(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (P,) of the 95 % intervals of theta, within the bounds."""
+        reach = 1.96 * self.deviations()
+        lower, upper = (np.array([getattr(f, n) for f in self.free]) for n in ("lower", "upper"))
+        return np.maximum(self.theta - reach, lower), np.minimum(self.theta + reach, upper)
+
     def reweighted(self, new: Weights) -> "Fit":
         """The same numbers, judged with other weights."""
         assert self.linear is not None and self.weights is not None

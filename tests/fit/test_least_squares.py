@@ -91,6 +91,8 @@ def test_a_curved_valley_is_followed_past_what_cannot_be_simulated():
 def test_a_curved_valley_is_followed_to_a_bound():
     found = fit(Valley(30.0, most=0.5), Hypothesis(), Weights(np.ones(1)), most=8)
     assert found.theta == pytest.approx([0.5, 0.25], abs=1e-9) and found.at_bound.tolist() == [True, False]
+    low, high = found.intervals()
+    assert low[0] < found.theta[0] and high[0] == 0.5 < high[1], "no interval goes beyond a bound"
 
 
 class Film:
