@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import origami_sim
+from origami_sim.predict import cache
 
 ROOT = Path(origami_sim.__file__).parent
 ORDER = ("recording", "fit", "predict", "infer", "locate", "report", "diagnose")
@@ -32,3 +33,10 @@ def test_no_file_is_long():
     files = [f for folder in ("", "scenes", "studies") for f in (ROOT / folder).glob("**/*.py")]
     assert len(files) > 200
     assert not [f for f in files if len(f.read_text().splitlines()) > FILE]
+
+
+def test_stored_predictions_are_of_the_sources_that_predict():
+    """A changed predictor must not read what another one stored."""
+    digested = {f for pattern in cache._SOURCES for f in ROOT.glob(pattern)}
+    for folder in ("predict", "fit", "solve", "effects", "recording"):
+        assert set((ROOT / folder).glob("*.py")) <= digested, folder

@@ -177,12 +177,8 @@ def search(
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     extended(out, forward, progress=progress, most=most)
-    while polished(out, forward):
+    while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
         extended(out, forward, progress=progress, most=most)
-    if reconsidered(out, forward, base, progress=progress):
-        extended(out, forward, progress=progress, most=most)
-        while polished(out, forward):
-            extended(out, forward, progress=progress, most=most)
     return out
 
 
@@ -192,10 +188,10 @@ def reconsidered(
     """Simulates every single effect at several strengths where nothing explains a recording; whether any promises more.
 
     A model that snaps, or a crease that sticks, has no derivatives that tell why. So before nothing is said to explain
-    a recording, each effect is tried over its range.
+    a recording, each effect is tried over its range, once.
     """
     best = max(out.nodes, key=lambda k: out.total[k])
-    if over_noise(forward, out.nodes[best].fit) < FAR:
+    if out.begun or over_noise(forward, out.nodes[best].fit) < FAR:
         return False
     prior, none = log_priors(out.signatures), frozenset()
     alone = [k for k in out.estimates if len(k) == 1]
@@ -208,8 +204,9 @@ def reconsidered(
         # as sharp as data of that many standard deviations make a strength
         occam = float(log_slab(np.sqrt(2.0 * np.array(gain)), out.hyper)) + 0.5 * float(np.log(2.0 * np.pi))
         odds = _log_prior(key, prior, out.hyper) - _log_prior(none, prior, out.hyper)
-        if out.total[none] + gain + occam + odds > _promise(out, key):
-            out.promise[key], out.begun[key] = out.total[none] + gain + occam + odds, theta
+        promise = out.total[none] + gain + occam + odds
+        if promise > _promise(out, key):
+            out.promise[key], out.begun[key] = promise, theta
     return bool(out.begun)
 
 

@@ -34,13 +34,14 @@ def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> s
     out = []
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    ends = dict(zip((id(n) for n in f.free), zip(*f.intervals(), strict=True), strict=True))
     for s in f.hypothesis.suspects:
         if only is not None and s.effect not in only:
             continue
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
         t, d = value[id(n)], deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
-        low, high = (said(v, n.unit, digits) for v in (max(t - 1.96 * d, n.lower), min(t + 1.96 * d, n.upper)))
+        low, high = (said(v, n.unit, digits) for v in ends[id(n)])
         what = title(s.effect)
         if s.more:
             what = f"{'more' if t > 0 else 'less'} {what} than stated"

@@ -342,14 +342,11 @@ def _curves(motions: Sequence[Motion], k: int) -> list[Curve]:
     for (name, unit), each in against(motions, k).items():
         x, y = np.concatenate(each), along if name == REVERSAL else missing
         parts = bins(x)
-        out.append(
-            Curve(
-                name,
-                unit,
-                [float(x[p].mean()) for p in parts],
-                [float(y[p].mean()) for p in parts],
-                [float(y[p].std() / np.sqrt(max(len(p) / width, 1.0))) for p in parts],
-                [len(p) for p in parts],
-            )
-        )
+        out.append(binned(name, unit, x, y, parts, [y[p].std() / np.sqrt(max(len(p) / width, 1.0)) for p in parts]))
     return out
+
+
+def binned(name: str, unit: str, x: np.ndarray, y: np.ndarray, parts: Sequence[np.ndarray], errors) -> Curve:
+    """Means of y against means of x in parts (indices), with the errors of the means."""
+    middle, mean = ([float(v[p].mean()) for p in parts] for v in (x, y))
+    return Curve(name, unit, middle, mean, [float(e) for e in errors], [len(p) for p in parts])

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from origami_sim.infer.diagnosis import Curve, Place
-from origami_sim.locate.locate import BINS
+from origami_sim.locate.locate import BINS, binned
 from origami_sim.predict.curves import Balance
 
 
@@ -54,16 +54,7 @@ def _curves(found, k: int) -> list[Curve]:
     out = []
     for (name, unit), x in against.items():
         parts = [p for p in np.array_split(np.argsort(x, kind="stable"), BINS) if len(p)]
-        out.append(
-            Curve(
-                name,
-                unit,
-                [float(x[p].mean()) for p in parts],
-                [float(y[p].mean()) for p in parts],
-                [float(np.sqrt(np.mean(error[p] ** 2) / len(p))) for p in parts],
-                [len(p) for p in parts],
-            )
-        )
+        out.append(binned(name, unit, x, y, parts, [np.sqrt(np.mean(error[p] ** 2) / len(p)) for p in parts]))
     return out
 
 

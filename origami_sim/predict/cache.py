@@ -25,7 +25,7 @@ from origami_sim.predict.worlds import Worlds
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
 
-_SOURCES = ("*.py", "effects/*.py", "solve/*.py", "recording/*.py", "fit/*.py")
+_SOURCES = ("*.py", "effects/*.py", "solve/*.py", "recording/*.py", "fit/*.py", "predict/*.py")
 
 
 class Cache:
@@ -121,16 +121,9 @@ def _read(file: Path, count: int) -> Prediction | None:
             arrays = [a.reshape(shape) for a, shape in zip(parts, shapes, strict=True)]
             ends = iter(a[..., 0] for a in arrays[count:])
             return Prediction(arrays[:count], [next(ends) if some else None for some in tied])
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        StopIteration,
-        NotImplementedError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ):
+    except (OSError, ValueError, KeyError, EOFError, StopIteration, zipfile.BadZipFile, zlib.error):
+        return None
+    except RuntimeError:  # flags of an archive that asks for a password, or for what zipfile cannot do
         return None
 
 

@@ -75,9 +75,9 @@ def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
     model, parameters = hanging(3)
     every = suspects(model, [record(panels=3, duration=1.0)], Drive(), parameters)
     lower = next(s for s in every if s.effect == "crease_viscosity" and s.entities == (1,))
-    f = SimpleNamespace(
-        hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], deviations=lambda: np.array([1e-9])
-    )
+    ends = np.array([change - 2e-9]), np.array([change + 2e-9])
+    known = {"deviations": lambda: np.array([1e-9]), "intervals": lambda: ends}
+    f = SimpleNamespace(hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], **known)
     said = say(f)  # type: ignore[arg-type]
     assert said.startswith(words) and "than stated at crease 1" in said
     low, high = said.partition("95 %: ")[2].rstrip(")").split(" to ")
