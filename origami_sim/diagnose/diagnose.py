@@ -107,7 +107,7 @@ def diagnose(
     lap("screen")
     tell("search", 0.0)
     store, lead = keep is not None and keep.store, lambda part: tell("search", part)
-    posterior = search(forward, base, signatures, weights, progress=lead, most=o.fits // 2, store=store)
+    posterior = search(forward, base, signatures, weights, given=given, progress=lead, most=o.fits // 2, store=store)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:

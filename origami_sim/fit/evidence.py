@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import erfcx, log_ndtr, logsumexp
 
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
@@ -37,7 +37,7 @@ class Group:
         side: 1 or -1 where physics allows one sign of the first strength, else 0.
         spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
         low, high: (k,) bounds from where they begin, over the scale; None: there are none.
-        usual: the first strength as it usually is, over the scale; infinite if that depends on the device.
+        usual: (k,) strengths as they usually are, over the scale; infinite where that depends on the device.
     """
 
     columns: tuple[int, ...]
@@ -47,12 +47,16 @@ class Group:
     spread: np.ndarray
     low: np.ndarray | None = None
     high: np.ndarray | None = None
-    usual: float = np.inf
+    usual: np.ndarray | None = None
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest values (k,) of the columns."""
         none = np.full(len(self.columns), np.inf)
         return -none if self.low is None else self.low, none if self.high is None else self.high
+
+    def sizes(self) -> np.ndarray:
+        """Usual values (k,) of the columns, infinite where there are none."""
+        return np.full(len(self.columns), np.inf) if self.usual is None else self.usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +165,7 @@ class Sets:
             each(lambda g: [n < g.strengths for n in range(len(g.columns))], bool),
             each(lambda g: g.bounds()[0]),
             each(lambda g: g.bounds()[1]),
-            each(lambda g: [g.usual] + [np.inf] * (len(g.columns) - 1)),
+            each(lambda g: g.sizes()),
             back,
         )
 
@@ -198,7 +202,8 @@ class Summed:
         full, inverse, value, move = a, a, sets.at, sets.at
         for turn in range(ROUNDS):
             if turn:  # as narrow as the normals are that a strength of this size may come from
-                tight = np.where(sets.strength, norm * _narrow(value * norm, hyper), tight)
+                slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
+                tight = np.where(sets.strength, slab, tight)
             full = a + np.eye(k) * (tight**2)[:, None, :]
             inverse = np.linalg.inv(full)
             move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
@@ -213,9 +218,9 @@ class Summed:
         slab = log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
         out += np.sum(np.where(sets.strength, slab, shape), axis=1)
-        # what is far beyond the usual is less probable: a Cauchy prior beside the one on the scale of detectability
-        out += np.sum(sided, axis=1) - np.sum(np.log1p((value / sets.usual) ** 2), axis=1)
-        return out, value
+        # what is far beyond the usual is less probable: a Cauchy density times the one on the scale of detectability
+        far = np.log1p((value / sets.usual) ** 2) + log_usual(sets.usual * norm, hyper)
+        return out + np.sum(sided - far, axis=1), value
 
 
 def summed(p: Problem, smooth: float, flaws: float) -> Summed:
@@ -235,15 +240,23 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
 
 
 def log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:
-    """Log densities [..., s] of a strength at detectability d' under each of the normals, equally likely."""
+    """Log densities [..., s] of a strength at detectability d' under each of the normals, times their shares."""
     widths = np.array(hyper.slabs)
     log = -0.5 * (d[..., None] / widths) ** 2 - np.log(widths) - 0.5 * np.log(2 * np.pi)
-    return log - np.log(len(widths))
+    return log + np.log(hyper.shares)
 
 
 def log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
     """Log density of a strength at detectability d': a mixture of normals."""
     return logsumexp(log_slabs(d, hyper), axis=-1)
+
+
+def log_usual(c: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """Log of the mean of 1 / (1 + (d/c)^2) over strengths d: the part of them that is usual, if that is d' = c."""
+    widths = np.array(hyper.slabs)
+    ratio = np.where(np.isfinite(c), c, 1.0)[..., None] / widths
+    share = (ratio * np.sqrt(np.pi / 2) * erfcx(ratio / np.sqrt(2.0))) @ hyper.shares
+    return np.where(np.isfinite(c), np.log(share), 0.0)
 
 
 def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:

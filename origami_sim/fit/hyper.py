@@ -12,7 +12,8 @@ class Hyper:
     """Hyperparameters of the diagnosis.
 
     Attributes:
-        slabs: standard deviations of strengths on the scale of detectability d', equally likely.
+        slabs: standard deviations of strengths on the scale of detectability d'.
+        steep: probability of each of them, as a power of one over it: large effects are rarer than small ones.
         effects: probability of one more effect, given those that are there: most objects that are diagnosed lack one.
         most: effects in a set, at most.
         gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
@@ -20,15 +21,26 @@ class Hyper:
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
             Where each is as large as an effect that stands out by itself, nothing would be named.
         fewer: probability of each size over that of the next smaller one: of gaps, of smooth, and of flaws.
+        unlisted: odds that what one effect of the catalogue explains is done by a law that the catalogue lacks.
+        imitated: times as large for each further effect that it takes: several laws together can look like most others.
     """
 
     slabs: tuple[float, ...] = (4.0, 12.0, 40.0, 120.0, 400.0, 1200.0)
+    steep: float = 0.0
     effects: float = 0.6
     most: int = 5
     gaps: tuple[float, ...] = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
     smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)
     flaws: tuple[float, ...] = (2.0, 8.0)
     fewer: float = 0.3
+    unlisted: float = 0.07
+    imitated: float = 4.0
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """Prior of each of the slabs."""
+        share = np.array(self.slabs) ** -self.steep
+        return share / share.sum()
 
     @cached_property
     def cells(self) -> list[tuple[float, float, float]]:
@@ -46,6 +58,11 @@ class Hyper:
     def clean(self) -> np.ndarray:
         """Whether a cell has next to no discrepancy, of forces or of channels."""
         return np.array([gap <= self.gaps[0] and smooth == 0.0 for gap, smooth, _ in self.cells])
+
+    def foreign(self, effects: int) -> float:
+        """Probability that what so many effects explain together is done by a law that the catalogue lacks."""
+        odds = self.unlisted * self.imitated ** (effects - 1) if effects else 0.0
+        return odds / (1.0 + odds)
 
 
 HYPER = Hyper()

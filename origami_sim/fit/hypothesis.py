@@ -81,16 +81,22 @@ class Suspect:
         return first, *(f for f in rest if f.unit == first.unit and not f.start)
 
 
-def usual(suspect: Suspect) -> float:
-    """The strength that an effect of recorder or supply usually has, over its scale; infinite for the device's own.
+def usual(suspect: Suspect, numbers: Sequence["Free"]) -> np.ndarray:
+    """Strengths that an effect usually has, over their scales; infinite where that depends on the device.
 
-    What devices do depends on how large and stiff they are; clocks, scales, cameras and amplifiers are alike.
+    Moments and forces depend on how large and stiff a device is. Ratios and angles do not, nor do recorders and
+    supplies; numbers that are no strengths have priors of their own.
     """
-    effect, first = get(suspect.effect), suspect.free[0]
-    typical = effect.parameter(first.name).typical
-    if effect.family not in ("measurement", "drive") or not typical:
-        return np.inf
-    return abs(typical) / first.scale
+    effect, strong = get(suspect.effect), suspect.strengths
+    common = effect.family in ("measurement", "drive")
+    first = effect.parameter(suspect.free[0].name).typical or 0.0
+
+    def size(f: Free) -> float:
+        typical = abs(effect.parameter(f.name).typical or first)
+        known = f in strong and typical and (common or f.unit in ("-", "rad"))
+        return typical / f.scale if known else np.inf
+
+    return np.array([size(f) for f in numbers])
 
 
 def distinct_sites(a: Suspect, b: Suspect) -> bool:

@@ -100,7 +100,8 @@ class OwnColumns:
                 for name in ("lower", "upper")
             )
             columns = tuple(range(begin, begin + len(inner)))
-            self.groups.append(Group(columns, len(strong), at, side, spread, low, high, usual(s)))
+            sizes = usual(s, [inner[k] for k in arranged])
+            self.groups.append(Group(columns, len(strong), at, side, spread, low, high, sizes))
             place += len(inner)
 
     def sets(self, count: int) -> Sets:

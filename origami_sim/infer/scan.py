@@ -5,6 +5,7 @@ effect: dry friction that holds a crease back is as a weaker magnet.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import chi2
@@ -13,6 +14,7 @@ from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import UTMOST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.screen import Signature
 
 DOUBTED = 0.01
 """Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed.
@@ -35,22 +37,96 @@ def strained(f: Fit) -> bool:
     return bool(known and chi2.sf(f.penalty, known) < DOUBTED)
 
 
-def scanned(forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray) -> np.ndarray | None:
+def scanned(
+    forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray, also: np.ndarray | None
+) -> np.ndarray | None:
     """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least.
 
     None if the model goes unstable with all of them.
+
+    Args:
+        also: (P,) numbers to try besides.
     """
     first, *_ = hypothesis.free
     given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
     strengths = over_range(first)
     thetas = np.repeat(given[None], len(strengths), axis=0)
     thetas[:, len(forward.subject.nominals)] = strengths
+    if also is not None:
+        thetas = np.concatenate([thetas, also[None]])
     shot = forward.predict(hypothesis, thetas, np.repeat(local[None], len(thetas), axis=0))
     missed = np.zeros(len(thetas))
     for block, values in zip(forward.blocks, shot, strict=True):
         gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
         missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
     return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None
+
+
+class Cleared:
+    """Whitened residuals of a fit, and changes of them, without what its starts and numbers explain."""
+
+    def __init__(self, f: Fit, weights: Weights):
+        line = f.reweighted(weights).linear
+        assert line is not None
+        self.line, self.scale = line, np.array([n.scale for n in f.free])
+        prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+        self.away = prior * (np.array([n.start for n in f.free]) - f.theta) / self.scale
+        self.q, self.r = np.linalg.qr(np.concatenate([*line.cleared(line.tangent), np.diag(prior)]))
+
+    def whole(self, columns: list[np.ndarray], *, away: bool) -> np.ndarray:
+        """[rows, K] of columns [r, K] per segment, with what is known of the numbers below if they are residuals."""
+        below = np.repeat((self.away if away else 0.0 * self.away)[:, None], columns[0].shape[1], axis=1)
+        return np.concatenate([*self.line.cleared(columns), below])
+
+    def rest(self, whole: np.ndarray) -> np.ndarray:
+        """[rows, K] without what numbers explain."""
+        return whole - self.q @ (self.q.T @ whole)
+
+    def squares(self, residual: list[np.ndarray]) -> np.ndarray:
+        """Squares (K,) of residuals [r, K] that no starts and numbers explain."""
+        return np.sum(self.rest(self.whole(residual, away=True)) ** 2, axis=0)
+
+    @cached_property
+    def missed(self) -> float:
+        """The squares that the fit itself leaves."""
+        return float(self.squares([r[:, None] for r in self.line.residual])[0])
+
+
+def gained(forward: Predictor, base: Fit, before: float, left: float) -> float:
+    """Log likelihood that is gained if squares of a fit fall, both judged in white noise as large as what is left."""
+    count = sum(int(forward.blocks[b].seen().sum()) for b in base.blocks)
+    return 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
+
+
+def from_given_numbers(
+    forward: Predictor, signatures: Sequence[Signature], given: Fit, base: Fit, weights: Weights
+) -> Iterator[tuple[np.ndarray, float] | None]:
+    """Of each suspect, its best strength and numbers about the model as given, and what that gains over a refitted one.
+
+    All is linear about the given numbers: where a refit left them, it took up what the suspect does, which then shows
+    no more about the refit.
+
+    Args:
+        signatures: about the model as given.
+    """
+    about, before = Cleared(given, weights), Cleared(base, weights).missed
+    residual = about.whole([r[:, None] for r in about.line.residual], away=True)[:, 0]
+    rest = about.rest(residual[:, None])[:, 0]
+    low, high = np.array([(n.lower, n.upper) for n in given.free]).T
+    for s in signatures:
+        if not s.parts or s.status:
+            yield None
+            continue
+        change = about.whole([p[:, None] for p in s.parts], away=False)[:, 0]
+        mine = about.rest(change[:, None])[:, 0]
+        strength = np.clip(mine @ rest / max(mine @ mine, 1e-300), *np.concatenate(s.bounds))
+        left = float(np.sum((rest - strength * mine) ** 2))
+        moved = np.linalg.lstsq(about.r, about.q.T @ (residual - strength * change), rcond=1e-10)[0]
+        numbers = np.clip(given.theta + moved * about.scale, low, high)
+        first, *others = s.suspect.free
+        theta = np.array([*numbers, first.start + strength * s.size, *(f.start for f in others)])
+        gain = gained(forward, base, before, left)
+        yield (theta, gain) if gain > 0.0 else None
 
 
 def over_their_range(
@@ -62,25 +138,11 @@ def over_their_range(
 ) -> Iterator[tuple[np.ndarray, float] | None]:
     """Of each suspect beside a fit, the best of a few strengths, and the log likelihood that it gains.
 
-    What a strength changes is simulated; starts and the fit's numbers follow linearly. Both fits are judged in white
-    noise as large as what they leave. None where none of the strengths gains anything. Strengths that would slow the
-    solver down are left out, as in a fit.
+    What a strength changes is simulated; starts and the fit's numbers follow linearly. None where none of the strengths
+    gains anything. Strengths that would slow the solver down are left out, as in a fit.
     """
-    line = base.reweighted(weights).linear
-    assert line is not None
-    scale = np.array([n.scale for n in base.free])
-    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in base.free])
-    away = prior * (np.array([n.start for n in base.free]) - base.theta) / scale
-    numbers = np.linalg.qr(np.concatenate([*line.cleared(line.tangent), np.diag(prior)]))[0]
-    count = sum(int(forward.blocks[b].seen().sum()) for b in base.blocks)
-
-    def missed(residual: list[np.ndarray]) -> np.ndarray:
-        """Squares (K,) of residuals [r, K] that no starts and numbers explain."""
-        columns = np.concatenate([*line.cleared(residual), np.repeat(away[:, None], residual[0].shape[1], axis=1)])
-        return np.sum((columns - numbers @ (numbers.T @ columns)) ** 2, axis=0)
-
+    about = Cleared(base, weights)
     least = forward.step(base.hypothesis, base.theta) / UTMOST
-    before = float(missed([r[:, None] for r in line.residual])[0])
     for n, s in enumerate(suspects):
         if progress:
             progress(n / len(suspects))
@@ -93,10 +155,10 @@ def over_their_range(
         hypotheses = [base.hypothesis, *[richer] * (len(thetas) - 1)]
         shot = forward.shoot(hypotheses, thetas, np.repeat(base.local[None], len(thetas), axis=0), base.blocks)
         parts = changed(forward, shot, weights, base.blocks)
-        left = missed([r[:, None] - c.T for r, c in zip(line.residual, parts, strict=True)])
+        left = about.squares([r[:, None] - c.T for r, c in zip(about.line.residual, parts, strict=True)])
         left = np.where(np.isfinite(left), left, np.inf)
         best = int(np.argmin(left))
-        gain = 0.5 * count * float(np.log(before / max(left[best], 1e-12 * before)))
+        gain = gained(forward, base, about.missed, left[best])
         yield (thetas[1 + best], gain) if gain > 0.0 else None
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect, scaled
+from origami_sim.fit.hypothesis import Suspect, scaled, usual
 from origami_sim.fit.least_squares import SLOWEST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -56,6 +56,11 @@ class Signature:
         f = self.suspect.free[0]
         low, high = sorted(((f.lower - f.start) / self.size, (f.upper - f.start) / self.size))
         return np.array([low]), np.array([high])
+
+    @property
+    def usual(self) -> np.ndarray:
+        """The change (1,) as it usually is, over `size`."""
+        return usual(self.suspect, self.suspect.free[:1])
 
 
 def screen(

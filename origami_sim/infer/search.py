@@ -8,7 +8,7 @@ Half and double of UNFITTED, LEADING and OWED change no word on four swings (two
 and no probability by more than 0.011.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -18,17 +18,17 @@ from scipy.stats import t as student
 
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, usual
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
-from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, recast
 from origami_sim.infer.budget import FAR, over_noise
+from origami_sim.infer.discrepancy import cosines
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.infer.nominal import level
-from origami_sim.infer.scan import over_their_range, scanned, strained
-from origami_sim.infer.screen import Signature
+from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
+from origami_sim.infer.screen import Signature, screen
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -50,9 +50,6 @@ CELLS = 8
 
 MANY = 200
 """Sets beyond which only these cells are looked at."""
-
-SMOOTH = 40
-"""Cosines of a channel's discrepancy in one recording, at most: slower than noise, faster than an offset."""
 
 TIGHT = 1e-3
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
@@ -105,12 +102,14 @@ class Posterior:
         signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
             posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
             was not possible.
-        ranked: what single effects promise the model without any, best first. hoped: what sets that were fitted had
-            promised, by their labels. gains: by how much they were better, by the fit that the promise is about.
+        ranked: single effects, those first that promise most to the model without any. hoped: what sets that were
+            fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
+            about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`).
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
-            were fitted on.
+            were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
+            refitted model. reconsidered: whether all were tried over their ranges.
     """
 
     signatures: list[Signature]
@@ -129,6 +128,7 @@ class Posterior:
     renewed: set[Key] = field(default_factory=set)
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
+    reconsidered: bool = False
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
@@ -169,13 +169,29 @@ def search(
     signatures: list[Signature],
     weights: Weights,
     *,
+    given: Fit | None = None,
     progress: Callable[[float], None] | None = None,
     most: int = FITS,
     store: bool = False,
 ) -> Posterior:
-    """The posterior over sets of effects, from the refitted model without any."""
+    """The posterior over sets of effects, from the refitted model without any.
+
+    Args:
+        given: the model with its numbers as they were given, about which single effects are judged too if the refit
+            took them further than chance would.
+    """
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
+    if given is not None and strained(base):
+        by = level(forward, base)
+        given = fit(forward, Hypothesis(), by, local=given.local, most=0)  # with derivatives by its numbers
+        suspects = [s.suspect for s in signatures]
+        about = {(s.suspect.label, s.suspect.free[1:]): s for s in screen(forward, suspects, given, by)}
+        alone = [k for k in out.estimates if len(k) == 1]
+        names = [(s.label, s.free[1:]) for s in (out.suspect(n) for k in alone for n in k)]
+        known = [(k, about[name]) for k, name in zip(alone, names, strict=True) if name in about]
+        found = from_given_numbers(forward, [s for _, s in known], given, base, by)
+        _promised(out, [k for k, _ in known], found)
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
         extended(out, forward, progress=progress, most=most)
@@ -191,23 +207,32 @@ def reconsidered(
     a recording, each effect is tried over its range, once.
     """
     best = max(out.nodes, key=lambda k: out.total[k])
-    if out.begun or over_noise(forward, out.nodes[best].fit) < FAR:
+    if out.reconsidered or over_noise(forward, out.nodes[best].fit) < FAR:
         return False
-    prior, none = log_priors(out.signatures), frozenset()
+    out.reconsidered = True
     alone = [k for k in out.estimates if len(k) == 1]
     suspects = [out.suspect(n) for k in alone for n in k]
-    tried = over_their_range(forward, suspects, base, level(forward, base), progress)
-    for key, found in zip(alone, tried, strict=True):
-        if found is None:
+    return _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), progress))
+
+
+def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.ndarray, float] | None]) -> bool:
+    """Enters where single effects may begin, and what they then gain over the model without any; whether any gain more.
+
+    The gain is charged as for strengths that are as sharp as data of that many standard deviations make them.
+    """
+    prior, none, some = log_priors(out.signatures), frozenset(), False
+    for key, one in zip(alone, found, strict=True):
+        if one is None:
             continue
-        theta, gain = found
-        # as sharp as data of that many standard deviations make a strength
+        theta, gain = one
         occam = float(log_slab(np.sqrt(2.0 * np.array(gain)), out.hyper)) + 0.5 * float(np.log(2.0 * np.pi))
         odds = _log_prior(key, prior, out.hyper) - _log_prior(none, prior, out.hyper)
         promise = out.total[none] + gain + occam + odds
         if promise > _promise(out, key):
-            out.promise[key], out.begun[key] = promise, theta
-    return bool(out.begun)
+            out.promise[key], out.begun[key], some = promise, theta, True
+            out.ranked[key] = promise
+    out.ranked = dict(sorted(out.ranked.items(), key=lambda item: -item[1]))
+    return some
 
 
 def extended(
@@ -488,9 +513,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
     count, groups = len(own.columns), list(own.groups)
     for n, o in enumerate(others):
         one = out.signatures[o]
-        groups.append(
-            Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, usual(one.suspect))
-        )
+        groups.append(Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, one.usual))
     added = [np.zeros((len(t), len(others))) for t in line.tangent]
     for k, o in enumerate(others):
         for columns, part in zip(added, out.signatures[o].parts, strict=True):
@@ -517,36 +540,6 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
     return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
 
-def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]:
-    """Per block [r, K]: smooth curves in each channel over each recording, of unit root mean square times 1/order."""
-    dims = len(forward.components)
-    chains: list[list[int]] = []
-    for n, b in enumerate(f.blocks):
-        tied = n > 0 and line.tie[n - 1] is not None
-        same = n > 0 and forward.blocks[b].recording == forward.blocks[f.blocks[n - 1]].recording
-        if tied or (same and not forward.separate):
-            chains[-1].append(n)
-        else:
-            chains.append([n])
-    most = max(2, min(SMOOTH, 240 // max(1, dims * len(chains))))
-    kinds = [max(2, min(sum(line.rows[n].data for n in chain) // dims // 10, most)) for chain in chains]
-    total = sum(kinds) * dims
-    out = [np.zeros((r.count, total)) for r in line.rows]
-    column = 0
-    for chain, count in zip(chains, kinds, strict=True):
-        frames = [line.rows[n].data // dims for n in chain]
-        first = np.cumsum([0, *frames])
-        for n, a in zip(chain, first[:-1], strict=True):
-            t = (a + np.arange(line.rows[n].data // dims) + 0.5) / first[-1]
-            seen = forward.blocks[f.blocks[n]].seen()
-            for d in range(dims):
-                for k in range(count):
-                    shape = np.cos(np.pi * k * t) / (1.0 + k / 4.0)
-                    out[n][d : line.rows[n].data : dims, column + d * count + k] = np.where(seen[:, d], shape, 0.0)
-        column += count * dims
-    return out
-
-
 def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     """Fits a set, from where the linear estimate of the nearest fitted one puts it."""
     estimate = out.estimates[key]
@@ -570,8 +563,8 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     assert parent.linear is not None and parent.weights is not None
     by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
     given = out.begun.get(key)
-    if given is None and len(suspects) == 1 and strained(parent):
-        given = scanned(forward, hypothesis, by, parent.local)
+    if len(suspects) == 1 and strained(parent):
+        given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
         return fit(forward, hypothesis, by, theta=given, local=parent.local)
     # derivatives by the numbers of the model and by starts hardly change with an effect

@@ -175,7 +175,7 @@ class Stored:
             shares = [[s.name, s.kind, s.share] for s in mismatch.shares]
             told = [
                 [list(g.columns), g.strengths, g.at.tolist(), g.side]
-                + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), [g.usual])]
+                + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), g.sizes())]
                 for g in groups
             ]
             nodes.append(
@@ -229,7 +229,7 @@ class Stored:
                     _wide(spread),
                     _wide(low, -np.inf),
                     _wide(high),
-                    *_wide(typical),
+                    _wide(typical),
                 )
                 for c, s, at, side, spread, low, high, typical in node["groups"]
             ]

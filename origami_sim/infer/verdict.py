@@ -1,6 +1,6 @@
 """The verdict: sums over the posterior, put into words."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,7 +53,7 @@ class Decision:
     Attributes:
         word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
         credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
-            named, or of them.
+            named, or of them. foreign: that a law which the catalogue lacks is imitated by them.
     """
 
     word: str
@@ -62,6 +62,7 @@ class Decision:
     credible: list[frozenset[str]]
     tie: bool
     probability: float
+    foreign: float = 0.0
 
 
 def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
@@ -77,21 +78,26 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     best = best_of(p, chance, lead or top)
     may_be, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
 
+    named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
+    foreign = imitated(p, chance, named)
+
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
-        return Decision(word, best, lead or top, may_be, tie, probability)
+        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), foreign)
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
     left = budgets(best)
     if left.rest > left.named and (left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE):
         return as_("UNKNOWN", np.nan)
+    if foreign > 0.5:  # what is named is less probable than a law that has no name
+        return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])
     if not lead or beside:
         return as_("MEASUREMENT" if all(map(_of_recorder, may_be)) else "TIE", total, tie=True)
-    named = [n for n in best if p.suspect(n).effect in lead]
-    word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if len(named) > 1 else "MECHANISM"
-    return as_(word, sum(v for c, v in classes.items() if c >= lead))
+    several = sum(p.suspect(n).effect in lead for n in best) > 1
+    word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if several else "MECHANISM"
+    return as_(word, sum(classes[c] for c in named))
 
 
 def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
@@ -126,6 +132,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
     if d.word == "UNKNOWN":
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
+        if d.foreign > 0.5:
+            text += f" So many laws rather imitate one that is not in the catalogue (p = {d.foreign:.2f})."
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
     if d.tie:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
@@ -134,7 +142,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4]]
         more = f" and {len(d.credible) - 4} more" if len(d.credible) > 4 else ""
         text = f"These recordings do not decide between {joined(each)}{more}. "
-        return Judgement(d.word, f"{text}The best is {say(shown)}, which {explained}.", d.probability, names, **common)
+        text += f"The best is {say(shown)}, which {explained}."
+        return Judgement(d.word, text + _unlisted(d), d.probability, names, **common)
     # the shown set may hold more than what surely acts: of that, each effect by its own probability
     named = [s for s in suspects if s.effect in d.lead]
     chosen = [s.label for s in named]
@@ -145,7 +154,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
     text += f", p = {d.probability:.2f}; {who} {explained}."
-    more = 1.0 - classes.get(d.lead, 0.0) / d.probability
+    text += _unlisted(d)
+    more = 1.0 - classes.get(d.lead, 0.0) * (1.0 - d.foreign) / d.probability
     if more > ALONE:
         each = _besides(classes, d.lead)
         likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""
@@ -209,6 +219,13 @@ def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], f
 
 def class_of(p: Posterior, key: Key) -> frozenset[str]:
     return frozenset(p.suspect(n).effect for n in key)
+
+
+def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
+    """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
+    mine = [(value, p.hyper.foreign(len(key))) for key, value in chance.items() if class_of(p, key) in classes]
+    total = sum(value for value, _ in mine)
+    return sum(value * part for value, part in mine) / total if total else 0.0
 
 
 def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
@@ -303,6 +320,12 @@ def _explained(b: Budget) -> str:
     if b.numbers >= 0.005:
         text += f", numbers of the model {b.numbers:.0%}"
     return text + (f"; {b.rest:.0%} is real and not named" if b.rest >= 0.005 else "")
+
+
+def _unlisted(d: Decision) -> str:
+    """How probable it is that a law is imitated which the catalogue lacks, in words."""
+    small = d.foreign < 1.0 - CREDIBLE
+    return "" if small else f" A law that the catalogue lacks may look the same (p = {d.foreign:.2f})."
 
 
 def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:

@@ -99,7 +99,7 @@ def draw(structure: str, rng: np.random.Generator) -> dict:
     o: dict = {
         "structure": structure,
         "scene": structure,
-        "creases": [{"name": "crease 0"}],
+        "creases": [{"name": "hinge"}],
         "faces": [0, 1],
         "held": 0,
     }

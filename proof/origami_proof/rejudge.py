@@ -92,18 +92,25 @@ def _row(stored: Stored, answer: dict, hyper: Hyper) -> dict:
     decided = stored.decided(p)
     blank = {"noise": [1.0], "error_refitted": [1.0], "error_after": [1.0], "candidates": [], "screening": []}
     row = judge(answer, {**blank, **decided})
-    return {**row, "score": log_score(by_effects(p, p.probabilities()), answer)}
+    chance = p.probabilities()
+    listed = {key: value * (1.0 - hyper.foreign(len(key))) for key, value in chance.items()}
+    missing = chance[frozenset()] * float(np.sum(p.cells(frozenset())[~hyper.clean]))
+    classes = by_effects(p, listed)
+    return {**row, "score": log_score(classes, 1.0 - sum(listed.values()) + missing, answer)}
 
 
-def log_score(classes: dict[frozenset[str], float], answer: dict) -> float | None:
-    """Logarithm of the probability of the truth; None where the catalogue has no such truth, as outside of it.
+def log_score(classes: dict[frozenset[str], float], unlisted: float, answer: dict) -> float:
+    """Logarithm of the probability of the truth.
 
     A number that is off is no effect; a wrong camera is one, or a number, whichever it was drawn as.
+
+    Args:
+        classes: probability of each set of effects. unlisted: that something acts which the catalogue lacks.
     """
     kind, names = answer["kind"], set(answer["names"])
     if kind == "outside":
-        return None
-    if kind == "double":
+        right = unlisted
+    elif kind == "double":
         second = set(answer["second"]["names"])
         right = sum(p for c, p in classes.items() if len(c) == 2 and c & names and c & second and len(c & names) < 2)
     elif kind == "null":
@@ -116,7 +123,7 @@ def log_score(classes: dict[frozenset[str], float], answer: dict) -> float | Non
 
 def summary(rows: Sequence[dict]) -> dict:
     """Log score with its standard error, and shares, of rows of one setting."""
-    told = np.array([r["score"] for r in rows if r["score"] is not None])
+    told = np.array([r["score"] for r in rows])
     stated = [r for r in rows if r["correct"] is not None]
     probability, correct = [r["probability"] for r in stated], [bool(r["correct"]) for r in stated]
     clear = [r for r in rows if r["kind"] == "single" and r["d"] >= CLEAR]
@@ -181,7 +188,7 @@ def rejudge(
             column.append(row)
     board: dict = {"cases": len(cases), "hyperparameters": asdict(hyper), "settings": {}, "rows": columns[0]}
     for name, rows in zip(named, columns, strict=True):
-        pairs = [a["score"] - b["score"] for a, b in zip(rows, columns[0], strict=True) if a["score"] is not None]
+        pairs = [a["score"] - b["score"] for a, b in zip(rows, columns[0], strict=True)]
         change = {"change": float(np.mean(pairs)) if pairs else None}
         change["change_error"] = float(np.std(pairs, ddof=1) / np.sqrt(len(pairs))) if len(pairs) > 1 else None
         board["settings"][name] = summary(rows) | change

@@ -84,8 +84,9 @@ def test_cases_are_judged_anew_with_half_and_double_of_everything(run):
     base = found(board, "as it is")
     assert base["top1"] == [1, 1] and base["alarms"] == [0, 1] and base["unknown"] == [0, 1]
     null, single, outside = board["rows"]
-    assert null["verdict"] == "ADEQUATE" and single["top"] == "crease_friction" and outside["score"] is None
-    assert -0.2 < single["score"] <= 0.0 and base["score"] == pytest.approx((null["score"] + single["score"]) / 2)
+    assert null["verdict"] == "ADEQUATE" and single["top"] == "crease_friction" and outside["score"] < -2.0
+    assert -0.3 < single["score"] <= 0.0
+    assert base["score"] == pytest.approx((null["score"] + single["score"] + outside["score"]) / 3)
     names = [f"{n} {way}" for n in HYPER.__dataclass_fields__ for way in ("halved", "doubled")]
     assert list(board["settings"]) == ["as it is", *names]
     # the prior odds of one effect more are what they are, and the null is surer
@@ -122,12 +123,12 @@ def test_half_and_double_are_hyperparameters_that_can_be():
         ("double", ["a"], {"second": {"names": ["b"]}}, 0.2),
         ("confounded", ["b"], {"rival": {"names": ["a"]}}, 0.1),
         ("single", ["c"], {}, rejudge.LEAST),
+        ("outside", [], {}, 0.25),
     ],
 )
 def test_the_log_score_is_that_of_the_truth(kind, names, more, right):
     classes = {frozenset(): 0.4, frozenset("a"): 0.3, frozenset("b"): 0.1, frozenset("ab"): 0.2}
-    assert rejudge.log_score(classes, answer(kind, names, **more)) == pytest.approx(np.log(right))
-    assert rejudge.log_score(classes, answer("outside", [])) is None
+    assert rejudge.log_score(classes, 0.25, answer(kind, names, **more)) == pytest.approx(np.log(right))
 
 
 def test_answers_that_are_still_sealed_are_not_opened(run, capsys):

@@ -12,11 +12,14 @@ from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows
 
-HYPER = Hyper(slabs=(3.0, 10.0, 40.0), effects=0.4)
+HYPER = Hyper(slabs=(3.0, 10.0, 40.0), steep=0.2, effects=0.4)
 COUNT, SMOOTH, FLAWS = 24, 0.7, 2.0
 PRECISION, AWAY = np.array([0.8, 0.0]), np.array([0.3, 0.0])
 LAPLACE = 0.05
 """Error of the log evidence where strengths are told."""
+
+USUAL = 0.12
+"""The same where data tell less of a strength than what is usual: the tails of a Cauchy density are not normal."""
 
 FOLD = 1.3
 """What it is too small by where only the sum of two strengths is told: the prior has a fold at none."""
@@ -62,7 +65,8 @@ class Toy:
 
 def slab(d: np.ndarray) -> np.ndarray:
     w = np.array(HYPER.slabs)
-    return logsumexp(-0.5 * (d[..., None] / w) ** 2 - np.log(w * np.sqrt(2 * np.pi)), axis=-1) - np.log(len(w))
+    log = -0.5 * (d[..., None] / w) ** 2 - np.log(w * np.sqrt(2 * np.pi)) - HYPER.steep * np.log(w)
+    return logsumexp(log, axis=-1) - np.log(np.sum(w**-HYPER.steep))
 
 
 def groups(sides, at=None) -> list[Group]:
@@ -120,6 +124,21 @@ def test_what_lies_beyond_a_bound_explains_nothing():
     (unbound,), (found,) = (gained(toy, residual, [(0,)], made) for made in (free, bound))
     assert unbound > 150.0 > 100.0 > found
     assert found == pytest.approx(exact, abs=3.7)  # the tail is 1/15 wide, and not sqrt(2 pi): 3.6 in log evidence
+
+
+@pytest.mark.parametrize("d", [0.0, 5.0, 20.0])
+@pytest.mark.parametrize("usual", [0.1, 3.0, 30.0, 1000.0])
+def test_what_is_far_beyond_the_usual_is_less_probable(d, usual):
+    """A strength of which d' = `usual` is usual, against the integral over its prior: slab times Cauchy, normalised."""
+    toy = Toy([1.0])
+    residual = toy.drawn(np.random.default_rng(1), np.array([d / toy.norms[0]]))
+    made = [replace(groups([0])[0], usual=np.array([usual / toy.norms[0]]))]
+    (found,) = gained(toy, residual, [(0,)], made)
+    s = np.sinh(np.linspace(-12.0, 12.0, 20001)) * 1e-3  # fine about none, wide enough for the widest slab
+    prior = slab(s) - np.log1p((s / usual) ** 2) + np.log(np.gradient(s))
+    left = residual - np.outer(s / toy.norms[0], toy.effects[:, 0])
+    exact = logsumexp(toy.log_density(left) + prior) - logsumexp(prior) - toy.log_density(residual)
+    assert found == pytest.approx(exact, abs=USUAL)
 
 
 @pytest.mark.parametrize("sides", [(0, 0), (1, 0)])
@@ -197,7 +216,7 @@ def test_stated_probabilities_are_frequencies():
         truth = rng.choice(len(sets), p=prior)
         a = np.zeros(5)
         for c in sets[truth]:
-            d = rng.choice(HYPER.slabs) * rng.normal()
+            d = rng.choice(HYPER.slabs, p=HYPER.shares) * rng.normal()
             a[c] = (sides[c] * abs(d) if sides[c] else d) / toy.norms[c]
         log = np.concatenate([[0.0], gained(toy, toy.drawn(rng, a), sets[1:], groups(sides))]) + np.log(prior)
         stated.append(np.exp(log - logsumexp(log)))
