@@ -109,7 +109,8 @@ class Posterior:
         store: whether nodes keep their problems, to be judged anew (`stored`).
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
-            refitted model. reconsidered: whether all were tried over their ranges.
+            refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
+            were better than they promised in the place of the best set.
     """
 
     signatures: list[Signature]
@@ -129,6 +130,7 @@ class Posterior:
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
+    swapped: list[float] = field(default_factory=list)
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Key, float]:
@@ -250,6 +252,7 @@ def extended(
             break
         labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
         out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
+        swapped = _in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
         fitted = _fitted(out, forward, key)
         if fitted.failed:
             out.failed[key] = fitted.failed
@@ -257,6 +260,8 @@ def extended(
             continue
         _add(out, forward, key, fitted, prior)
         out.gains.setdefault(parent, []).append(out.total[key] - promise)
+        if swapped is not None:
+            out.swapped.append(out.total[key] - swapped)
     return out
 
 
@@ -293,13 +298,22 @@ def _alone(out: Posterior) -> Key | None:
     """
     best = max(out.total, key=lambda k: out.total[k])
     near, bonus = out.total[best] + np.log(UNFITTED), _most(out.gains.get(frozenset(), []))
-    leader = out.nodes.get(best)
-    white = leader is not None and leader.fit.weights is not None and not leader.fit.weights.colour
-    instead = leader.alone if leader is not None and white else {}
+    instead = _in_place_of(out, best)
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
     singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise + bonus >= near][:LEADING]
-    likely = (k for k in singles if instead.get(k, np.inf) >= near)
-    return next((k for k in likely if not known & {out.suspect(n).effect for n in k}), None)
+    unknown = [k for k in singles if not known & {out.suspect(n).effect for n in k}]
+    if not instead or not unknown:
+        return next(iter(unknown), None)
+    # to leave a strong effect out is not quite linear: the first one tells by how much others are underestimated
+    key = max(unknown, key=lambda k: instead.get(k, np.inf))
+    return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
+
+
+def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
+    """Log posterior of single effects in the place of the best set, as its fit judges them if it leaves white noise."""
+    leader = out.nodes.get(best)
+    white = leader is not None and leader.fit.weights is not None and not leader.fit.weights.colour
+    return leader.alone if leader is not None and white else {}
 
 
 def polished(out: Posterior, forward: Predictor) -> bool:

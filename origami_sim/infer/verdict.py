@@ -139,8 +139,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []
         )
-        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4]]
-        more = f" and {len(d.credible) - 4} more" if len(d.credible) > 4 else ""
+        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4] if classes[c] > 1.0 - CREDIBLE]
+        rest = len(d.credible) - len(each)
+        more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
         text = f"These recordings do not decide between {joined(each)}{more}. "
         text += f"The best is {say(shown)}, which {explained}."
         return Judgement(d.word, text + _unlisted(d), d.probability, names, **common)
