@@ -95,7 +95,7 @@ def test_cases_are_judged_anew_with_half_and_double_of_everything(run):
     each = [(p.log[frozenset([0])], p.log[frozenset()]) for p in (one.judged(), one.judged(rare))]
     known = np.isfinite(each[0][0])
     odds = [fitted[known] - none[known] for fitted, none in each]
-    np.testing.assert_allclose(odds[1] - odds[0], np.log(0.2 / 0.6), atol=1e-9)
+    np.testing.assert_allclose(odds[1] - odds[0], np.log(0.2 / HYPER.effects), atol=1e-9)
     before, after = rejudge.rejudged(rejudge.cases_of([run])[0], [HYPER, rare])
     assert after["score"] > before["score"]
     assert text[0].count("\n") >= len(names) and "slabs doubled" in text[0]

