@@ -224,9 +224,15 @@ def class_of(p: Posterior, key: Key) -> frozenset[str]:
 
 def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
     """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
-    mine = [(value, p.hyper.foreign(len(key))) for key, value in chance.items() if class_of(p, key) in classes]
+    mine = [(value, p.hyper.foreign(laws(p, key))) for key, value in chance.items() if class_of(p, key) in classes]
     total = sum(value for value, _ in mine)
     return sum(value * part for value, part in mine) / total if total else 0.0
+
+
+def laws(p: Posterior, key: Key) -> int:
+    """How many laws a set is: its effects on the device, wherever they act; a recorder's errors imitate none."""
+    device = {e for e in class_of(p, key) if get(e).family != "measurement"}
+    return len(device) or min(len(key), 1)
 
 
 def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """What a verdict is made of: sets of explanations, and words for what is left."""
 
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -96,3 +97,27 @@ def test_unknown_is_what_leaves_more_than_it_names_and_leaves_something_real(nam
     parts = ("numbers", 1.0 - named - rest), ("effect", named), ("rest", rest)
     budget = Budget([Share(kind, kind, share) for kind, share in parts], over)
     assert decide(p, lambda key: budget).word == word
+
+
+@pytest.mark.parametrize(
+    ("effects", "word", "foreign"),
+    [
+        (("air_drag",), "MECHANISM", 0.07 / 1.07),
+        (("air_drag", "crease_friction"), "SEVERAL", 0.28 / 1.28),
+        (("air_drag", "crease_friction", "crease_softness"), "UNKNOWN", 1.12 / 2.12),
+        (("air_drag", "angle_offset", "clock_rate"), "SEVERAL", 0.07 / 1.07),  # what a recorder does imitates no law
+        (("angle_offset",), "MEASUREMENT", 0.07 / 1.07),
+    ],
+)
+def test_many_laws_rather_imitate_one_that_is_not_in_the_catalogue(effects, word, foreign):
+    made = [Suspect(e, "the body", "panel", (Free(e, "strength", "-", 0.0, 1.0),)) for e in effects]
+    hyper = replace(HYPER, unlisted=0.07, imitated=4.0)
+    p = Posterior([Signature(s, [np.zeros(0)], 1.0) for s in made], Weights(np.ones(1)), hyper)
+    every = frozenset(range(len(effects)))
+    p.log = {key: np.where(HYPER.clean, log, -np.inf) for key, log in ((frozenset(), -50.0), (every, 0.0))}
+    p.total = {frozenset(): -50.0, every: 0.0}
+    p.nodes = cast(dict, dict.fromkeys(p.total))
+    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert (decided.word, decided.foreign) == (word, pytest.approx(foreign))
+    if word != "UNKNOWN":
+        assert decided.probability == pytest.approx(1.0 - foreign)
