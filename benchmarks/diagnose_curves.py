@@ -102,7 +102,7 @@ def show(d: Diagnosis):
             print(f"    residual moment against {curve.against}: {np.array(curve.mean).round(8).tolist()}")
             print(f"    at {np.array(curve.x).round(4).tolist()} {curve.unit}; sign changes at {changes}")
     for e in d.experiments:
-        print(f"  next: {e.what}: {e.bits:.1f} bits")
+        print(f"  next: {e.what}: {e.information:.1f} bits")
     for n in d.notes:
         print("  note:", n)
 

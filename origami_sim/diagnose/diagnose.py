@@ -25,8 +25,9 @@ from origami_sim.fit.subject import Source, subject_of
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
-from origami_sim.infer.search import Posterior, marginals, search
+from origami_sim.infer.search import search
 from origami_sim.infer.stored import Stored
 from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed

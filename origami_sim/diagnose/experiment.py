@@ -24,7 +24,7 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.diagnosis import Experiment
-from origami_sim.infer.search import Key, Posterior
+from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.verdict import widened
 from origami_sim.possible import Possible
 

@@ -5,8 +5,8 @@ import numpy as np
 from origami_sim.fit.least_squares import LITTLE, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Candidate, Correlation, Number, Suspected, Trace
+from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.search import Key, Posterior
 from origami_sim.infer.verdict import Judgement, log_odds, widened
 from origami_sim.infer.words import kind
 from origami_sim.predict.channels import units_of

@@ -47,7 +47,7 @@ EFFECT = Effect(
     conservative=True,
     parameters=(
         Parameter("mass", "m", "kg", 0.0, (0.0, 1e3), "mass of the patch on this triangle", typical=1e-3),
-        Parameter("offset", "d", "m", 0.0, (-1.0, 1.0), "its centre of mass above the mid-plane", typical=1e-3),
+        Parameter("offset", "d", "m", 0.0, (-0.05, 0.05), "its centre of mass above the mid-plane", typical=1e-3),
         Parameter("gravity_x", "gx", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along x"),
         Parameter("gravity_y", "gy", "m/s^2", 0.0, (-100.0, 100.0), "acceleration of gravity along y"),
         Parameter("gravity_z", "gz", "m/s^2", -9.80665, (-100.0, 100.0), "acceleration of gravity along z"),

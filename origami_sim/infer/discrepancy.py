@@ -1,7 +1,10 @@
-"""The discrepancy of the channels: smooth curves that no law explains."""
+"""What the catalogue lacks: smooth curves in the channels, and laws that others imitate."""
+
+from collections.abc import Collection
 
 import numpy as np
 
+from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
@@ -38,3 +41,12 @@ def cosines(forward: Predictor, f: Fit, line: Linearisation) -> list[np.ndarray]
                     out[n][d : line.rows[n].data : dims, column + d * count + k] = np.where(seen[:, d], shape, 0.0)
         column += count * dims
     return out
+
+
+def laws(effects: Collection[str]) -> int:
+    """How many laws these effects are: errors of a recorder imitate none, unless there is nothing else."""
+    return sum(not of_recorder(e) for e in effects) or min(len(effects), 1)
+
+
+def of_recorder(effect: str) -> bool:
+    return get(effect).family == "measurement"

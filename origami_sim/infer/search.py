@@ -9,14 +9,14 @@ and no probability by more than 0.011.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
+from origami_sim.fit.evidence import Group, Sets, Summed, log_slab, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
@@ -27,6 +27,7 @@ from origami_sim.infer.discrepancy import cosines
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.infer.nominal import level
+from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 
@@ -53,116 +54,6 @@ MANY = 200
 
 TIGHT = 1e-3
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
-
-Key = frozenset[int]
-
-
-@dataclass(eq=False)
-class Node:
-    """A fitted set.
-
-    Attributes:
-        key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
-        groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
-            problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
-        alone: log posterior of single effects in its place, as it judges them.
-    """
-
-    key: Key
-    fit: Fit
-    evidence: np.ndarray
-    groups: list[Group]
-    others: list[int]
-    grid: list[Summed | None]
-    foresight: Foresight | None = None
-    problems: dict[float, Problem] = field(default_factory=dict)
-    wide: bool = False
-    alone: dict[Key, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
-
-    `near`: how many effects that one has more or less, and its evidence, the better the smaller.
-    """
-
-    parent: Key
-    groups: tuple[int, ...]
-    values: np.ndarray
-    near: tuple[int, float]
-
-
-@dataclass(eq=False)
-class Posterior:
-    """Over sets of effects, and sizes of discrepancy.
-
-    Attributes:
-        signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
-            posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
-            was not possible.
-        ranked: single effects, those first that promise most to the model without any. hoped: what sets that were
-            fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
-            about.
-        promise: log posterior that sets which were not fitted may have. weights: of the signatures.
-        store: whether nodes keep their problems, to be judged anew (`stored`).
-        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
-            were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
-            refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
-            were better than they promised in the place of the best set.
-    """
-
-    signatures: list[Signature]
-    weights: Weights
-    hyper: Hyper = HYPER
-    nodes: dict[Key, Node] = field(default_factory=dict)
-    log: dict[Key, np.ndarray] = field(default_factory=dict)
-    total: dict[Key, float] = field(default_factory=dict)
-    estimates: dict[Key, Estimate] = field(default_factory=dict)
-    failed: dict[Key, str] = field(default_factory=dict)
-    ranked: dict[Key, float] = field(default_factory=dict)
-    gains: dict[Key, list[float]] = field(default_factory=dict)
-    hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
-    promise: dict[Key, float] = field(default_factory=dict)
-    store: bool = False
-    renewed: set[Key] = field(default_factory=set)
-    polished: dict[Key, float] = field(default_factory=dict)
-    begun: dict[Key, np.ndarray] = field(default_factory=dict)
-    reconsidered: bool = False
-    swapped: list[float] = field(default_factory=list)
-    _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
-
-    def probabilities(self) -> dict[Key, float]:
-        """Of each set, over all sizes of discrepancy; of those that differ in where their shapes begin, the best."""
-        log = self.total
-        best: dict[tuple[str, ...], Key] = {}
-        for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
-            best[self.labels(key)] = key
-        p = np.array([log[k] for k in best.values()])
-        total = logsumexp(p)
-        return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
-
-    def labels(self, key: Key) -> tuple[str, ...]:
-        """Effects of a set and their sites."""
-        if key not in self._labels:
-            self._labels[key] = tuple(sorted(self.suspect(n).label for n in key))
-        return self._labels[key]
-
-    def drop(self, key: Key) -> None:
-        """Leaves out what is known of a set that was not fitted."""
-        del self.log[key], self.total[key], self.promise[key], self.estimates[key]
-
-    def cells(self, key: Key | None = None) -> np.ndarray:
-        """(cells,) posterior of sizes of discrepancy and flaws, given a set or over all."""
-        log = self.log[key] if key is not None else logsumexp(np.stack(list(self.log.values())), axis=0)
-        return np.exp(log - logsumexp(log))
-
-    def suspect(self, n: int) -> Suspect:
-        return self.signatures[n].suspect
-
-    def label(self, key: Key) -> str:
-        return " + ".join(self.labels(key)) or "nominal"
 
 
 def search(
@@ -251,6 +142,7 @@ def extended(
         if key is None:
             break
         labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
+        estimate = out.total[key]
         out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
         swapped = _in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
         fitted = _fitted(out, forward, key)
@@ -260,16 +152,29 @@ def extended(
             continue
         _add(out, forward, key, fitted, prior)
         out.gains.setdefault(parent, []).append(out.total[key] - promise)
+        out.missed.setdefault(parent, []).append(out.total[key] - estimate)
         if swapped is not None:
             out.swapped.append(out.total[key] - swapped)
     return out
 
 
 def _likely(out: Posterior) -> Key | None:
-    """The set to fit next: that which promises most, if it may hold much of the posterior."""
-    least = max(out.total[k] for k in out.nodes) + np.log(UNFITTED)
+    """The set to fit next: that which promises most, if it may hold much of the posterior.
+
+    Where the best set is of so many laws that they rather imitate another, few are to be named: then also of these.
+    """
+    key = _likely_among(out, list(out.nodes), list(out.estimates))
+    if key is None and out.imitates(max(out.nodes, key=lambda k: out.total[k])):
+        few = ([k for k in keys if not out.imitates(k)] for keys in (out.nodes, out.estimates))
+        key = _likely_among(out, *few)
+    return key
+
+
+def _likely_among(out: Posterior, fitted: list[Key], others: list[Key]) -> Key | None:
+    """Of sets that were not fitted, that which promises most, if it may be as probable as the best of the fitted."""
+    least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
     doubts = {k: min(0.0, _most(gains)) for k, gains in out.gains.items() if len(gains) > 1}
-    unfitted = {k: _promise(out, k) + doubts.get(e.parent, 0.0) for k, e in out.estimates.items()}
+    unfitted = {k: _promise(out, k) + doubts.get(out.estimates[k].parent, 0.0) for k in others}
     # another start of the shape of a set that was fitted has to promise more than that did
     better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
     return max(better, key=lambda k: unfitted[k], default=None)
@@ -319,14 +224,15 @@ def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
 def polished(out: Posterior, forward: Predictor) -> bool:
     """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
 
-    Leaders are those that hold part of the posterior, or would if they gained as much as others did.
+    Leaders are those that hold part of the posterior, or would if they gained as much as others did; and the same of
+    sets of few laws, where more of them rather imitate one that the catalogue lacks.
     """
     prior, some = log_priors(out.signatures), False
     while True:
-        best = max(out.total[k] for k in out.nodes)
-        gains = list(out.polished.values())
-        least = best + np.log(UNFITTED) - max(0.0, _most(gains))
-        leaders = [k for k in out.nodes if out.total[k] >= least and k not in out.polished]
+        near = np.log(UNFITTED) - max(0.0, _most(list(out.polished.values())))
+        few = [k for k in out.nodes if not out.imitates(k)]
+        least = {k: max(out.total[k] for k in among) + near for among in (out.nodes, few) for k in among}
+        leaders = [k for k in out.nodes if out.total[k] >= least[k] and k not in out.polished]
         if not leaders:
             return some
         key, some = max(leaders, key=lambda k: out.total[k]), True
@@ -584,12 +490,3 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     # derivatives by the numbers of the model and by starts hardly change with an effect
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
     return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
-
-
-def marginals(p: Posterior) -> dict[str, float]:
-    """Posterior of each effect at each site, over all sets."""
-    out: dict[str, float] = {}
-    for key, value in p.probabilities().items():
-        for label in {p.suspect(n).label for n in key}:
-            out[label] = out.get(label, 0.0) + value
-    return dict(sorted(out.items(), key=lambda item: -item[1]))

@@ -9,8 +9,9 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
+from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
-from origami_sim.infer.search import Key, Node, Posterior
+from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.infer.words import distinct, joined, said, say, title
 
 CREDIBLE = 0.95
@@ -24,6 +25,10 @@ LISTED = 3
 
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
+
+
+MORE_LAWS = " More laws at once would follow the recordings more closely, as they do where the catalogue lacks one."
+"""What is said where the best set is not named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,25 +76,22 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     Args:
         budgets: the budget of a fitted set.
     """
-    chance = p.probabilities()
+    chance = considered(p)
     classes = by_effects(p, chance)
-    lead, beside = surely(classes)
     top = max(classes, key=lambda c: classes[c])
+    lead, beside = surely(classes)
     best = best_of(p, chance, lead or top)
     may_be, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
-
+    left = budgets(best)
     named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
-    foreign = imitated(p, chance, named)
+    foreign = p.hyper.foreign(laws(lead)) if lead else imitated(p, chance, named)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
         return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), foreign)
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    left = budgets(best)
     if left.rest > left.named and (left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE):
-        return as_("UNKNOWN", np.nan)
-    if foreign > 0.5:  # what is named is less probable than a law that has no name
         return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])
@@ -98,6 +100,19 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     several = sum(p.suspect(n).effect in lead for n in best) > 1
     word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if several else "MECHANISM"
     return as_(word, sum(classes[c] for c in named))
+
+
+def considered(p: Posterior) -> dict[Key, float]:
+    """Posterior of the sets that may be named.
+
+    So many laws that they rather imitate one which the catalogue lacks are not: then it is asked which of fewer explain
+    most, of the fitted sets, and what those leave is real and not named.
+    """
+    chance = p.probabilities()
+    best = max(chance, key=lambda k: chance[k])
+    if not p.imitates(best):
+        return chance
+    return p.probabilities(among=[k for k in p.nodes if not p.imitates(k)])
 
 
 def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
@@ -114,7 +129,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return budgets[key]
 
     d = decide(p, budgeted)
-    chance = p.probabilities()
+    chance = considered(p)
+    more_laws = len(chance) < len(p.total)
     classes = by_effects(p, chance)
     shown, explained = widened(p, d.best), _explained(budgeted(d.best))
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
@@ -132,14 +148,14 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
     if d.word == "UNKNOWN":
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
-        if d.foreign > 0.5:
-            text += f" So many laws rather imitate one that is not in the catalogue (p = {d.foreign:.2f})."
+        text += MORE_LAWS if more_laws else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
     if d.tie:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []
         )
-        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in d.credible[:4] if classes[c] > 1.0 - CREDIBLE]
+        likely = [c for c in d.credible[:4] if classes[c] > 1.0 - CREDIBLE] or d.credible[:1]
+        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in likely]
         rest = len(d.credible) - len(each)
         more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
         text = f"These recordings do not decide between {joined(each)}{more}. "
@@ -155,7 +171,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
     text += f", p = {d.probability:.2f}; {who} {explained}."
-    text += _unlisted(d)
+    text += MORE_LAWS if more_laws else _unlisted(d)
     more = 1.0 - classes.get(d.lead, 0.0) * (1.0 - d.foreign) / d.probability
     if more > ALONE:
         each = _besides(classes, d.lead)
@@ -224,15 +240,9 @@ def class_of(p: Posterior, key: Key) -> frozenset[str]:
 
 def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
     """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
-    mine = [(value, p.hyper.foreign(laws(p, key))) for key, value in chance.items() if class_of(p, key) in classes]
+    mine = [(value, c) for key, value in chance.items() if (c := class_of(p, key)) in classes]
     total = sum(value for value, _ in mine)
-    return sum(value * part for value, part in mine) / total if total else 0.0
-
-
-def laws(p: Posterior, key: Key) -> int:
-    """How many laws a set is: its effects on the device, wherever they act; a recorder's errors imitate none."""
-    device = {e for e in class_of(p, key) if get(e).family != "measurement"}
-    return len(device) or min(len(key), 1)
+    return sum(value * p.hyper.foreign(laws(c)) for value, c in mine) / total if total else 0.0
 
 
 def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
@@ -353,7 +363,7 @@ def _name(effects: frozenset[str]) -> str:
 
 
 def _of_recorder(effects: frozenset[str]) -> bool:
-    return bool(effects) and all(get(e).family == "measurement" for e in effects)
+    return bool(effects) and all(map(of_recorder, effects))
 
 
 def log_odds(p: Posterior, key: Key) -> float:

@@ -18,8 +18,9 @@ from origami_proof.case import STORED
 from origami_proof.score import BOARD, calibration_error, judge, wilson
 from origami_sim.errors import InputError
 from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.infer.discrepancy import laws
 from origami_sim.infer.stored import Stored
-from origami_sim.infer.verdict import by_effects, laws
+from origami_sim.infer.verdict import by_effects, class_of
 
 REJUDGED = "rejudged.json"
 """What comes out, in the folder of the run."""
@@ -93,7 +94,7 @@ def _row(stored: Stored, answer: dict, hyper: Hyper) -> dict:
     blank = {"noise": [1.0], "error_refitted": [1.0], "error_after": [1.0], "candidates": [], "screening": []}
     row = judge(answer, {**blank, **decided})
     chance = p.probabilities()
-    listed = {key: value * (1.0 - hyper.foreign(laws(p, key))) for key, value in chance.items()}
+    listed = {key: value * (1.0 - hyper.foreign(laws(class_of(p, key)))) for key, value in chance.items()}
     missing = chance[frozenset()] * float(np.sum(p.cells(frozenset())[~hyper.clean]))
     classes = by_effects(p, listed)
     return {**row, "score": log_score(classes, 1.0 - sum(listed.values()) + missing, answer)}

@@ -18,8 +18,9 @@ from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.fit.least_squares import fit
 from origami_sim.infer.held_out import folds, held_out
 from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.posterior import marginals
 from origami_sim.infer.screen import screen
-from origami_sim.infer.search import marginals, search
+from origami_sim.infer.search import search
 from origami_sim.recording import DriveChannel, Recording
 from tests.diagnose.strips import record, subject
 

@@ -14,8 +14,9 @@ from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.linear import Linearisation, Rows
 from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import screen
-from origami_sim.infer.search import Posterior, _node, enter, log_priors, place, search
+from origami_sim.infer.search import _node, enter, log_priors, place, search
 from origami_sim.infer.stored import Reduced, Stored
 from origami_sim.infer.verdict import judge
 from tests.diagnose.strips import record, subject

@@ -11,8 +11,8 @@ from origami_sim.fit.hypothesis import Free, Suspect
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
+from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.search import Posterior
 from origami_sim.infer.verdict import credible, decide
 from origami_sim.infer.words import joined, said, title
 from origami_sim.locate.describe import described
@@ -104,20 +104,36 @@ def test_unknown_is_what_leaves_more_than_it_names_and_leaves_something_real(nam
     [
         (("air_drag",), "MECHANISM", 0.07 / 1.07),
         (("air_drag", "crease_friction"), "SEVERAL", 0.28 / 1.28),
-        (("air_drag", "crease_friction", "crease_softness"), "UNKNOWN", 1.12 / 2.12),
         (("air_drag", "angle_offset", "clock_rate"), "SEVERAL", 0.07 / 1.07),  # what a recorder does imitates no law
         (("angle_offset",), "MEASUREMENT", 0.07 / 1.07),
     ],
 )
-def test_many_laws_rather_imitate_one_that_is_not_in_the_catalogue(effects, word, foreign):
-    made = [Suspect(e, "the body", "panel", (Free(e, "strength", "-", 0.0, 1.0),)) for e in effects]
+def test_a_law_that_the_catalogue_lacks_may_be_imitated(effects, word, foreign):
+    decided = decide(posterior({effects: 0.0, (): -50.0}), lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert (decided.word, decided.foreign) == (word, pytest.approx(foreign))
+    assert decided.lead == set(effects) and decided.probability == pytest.approx(1.0 - foreign)
+
+
+@pytest.mark.parametrize(("left", "word"), [(0.1, "SEVERAL"), (0.6, "UNKNOWN")])
+def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
+    """Three laws are 1500 more probable (in the logarithm) than two of them; those are named if they explain most."""
+    three = ("air_drag", "crease_friction", "crease_softness")
+    p = posterior({three: 0.0, three[:2]: -1500.0, three[1:]: -1520.0, three[:1]: -1600.0, (): -2000.0})
+    p.missed = {frozenset(): [-3.0]}
+    shares = [Share("", "effect", 1.0 - left), Share("", "rest", left)]
+    decided = decide(p, lambda key: Budget(shares, 1.0 + 10.0 * left))
+    assert decided.word == word and decided.lead == set(three[:2])
+    if word == "SEVERAL":
+        assert decided.probability == pytest.approx(1.0 / 1.28)
+
+
+def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
+    """Fitted sets of effects with these log posteriors, without a discrepancy."""
+    names = sorted({e for effects in logs for e in effects})
+    made = [Suspect(e, "the body", "panel", (Free(e, "strength", "-", 0.0, 1.0),)) for e in names]
     hyper = replace(HYPER, unlisted=0.07, imitated=4.0)
     p = Posterior([Signature(s, [np.zeros(0)], 1.0) for s in made], Weights(np.ones(1)), hyper)
-    every = frozenset(range(len(effects)))
-    p.log = {key: np.where(HYPER.clean, log, -np.inf) for key, log in ((frozenset(), -50.0), (every, 0.0))}
-    p.total = {frozenset(): -50.0, every: 0.0}
+    p.total = {frozenset(map(names.index, effects)): log for effects, log in logs.items()}
+    p.log = {key: np.where(HYPER.clean, log, -np.inf) for key, log in p.total.items()}
     p.nodes = cast(dict, dict.fromkeys(p.total))
-    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
-    assert (decided.word, decided.foreign) == (word, pytest.approx(foreign))
-    if word != "UNKNOWN":
-        assert decided.probability == pytest.approx(1.0 - foreign)
+    return p

@@ -1,0 +1,146 @@
+"""The posterior over sets of effects: those that were fitted, and what was estimated about them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from origami_sim.fit.evidence import Group, Problem, Summed
+from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.fit.hypothesis import Suspect
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.weights import Weights
+from origami_sim.infer.discrepancy import laws
+from origami_sim.infer.foresight import Foresight
+from origami_sim.infer.screen import Signature
+
+Key = frozenset[int]
+
+
+@dataclass(eq=False)
+class Node:
+    """A fitted set.
+
+    Attributes:
+        key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
+        groups: columns of the fit's own effects, then of the others'. others: indices of these.
+        grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
+            problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
+        alone: log posterior of single effects in its place, as it judges them.
+    """
+
+    key: Key
+    fit: Fit
+    evidence: np.ndarray
+    groups: list[Group]
+    others: list[int]
+    grid: list[Summed | None]
+    foresight: Foresight | None = None
+    problems: dict[float, Problem] = field(default_factory=dict)
+    wide: bool = False
+    alone: dict[Key, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
+
+    `near`: how many effects that one has more or less, and its evidence, the better the smaller.
+    """
+
+    parent: Key
+    groups: tuple[int, ...]
+    values: np.ndarray
+    near: tuple[int, float]
+
+
+@dataclass(eq=False)
+class Posterior:
+    """Over sets of effects, and sizes of discrepancy.
+
+    Attributes:
+        signatures: of all suspects, about the refitted model. nodes: fitted sets. log: by set, (cells,) log
+            posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
+            was not possible.
+        ranked: single effects, those first that promise most to the model without any. hoped: what sets that were
+            fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
+            about.
+        promise: log posterior that sets which were not fitted may have. weights: of the signatures.
+        store: whether nodes keep their problems, to be judged anew (`stored`).
+        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
+            were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
+            refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
+            were better than they promised in the place of the best set. missed: by how much sets were better than their
+            estimates, by the fit that these are about.
+    """
+
+    signatures: list[Signature]
+    weights: Weights
+    hyper: Hyper = HYPER
+    nodes: dict[Key, Node] = field(default_factory=dict)
+    log: dict[Key, np.ndarray] = field(default_factory=dict)
+    total: dict[Key, float] = field(default_factory=dict)
+    estimates: dict[Key, Estimate] = field(default_factory=dict)
+    failed: dict[Key, str] = field(default_factory=dict)
+    ranked: dict[Key, float] = field(default_factory=dict)
+    gains: dict[Key, list[float]] = field(default_factory=dict)
+    hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
+    promise: dict[Key, float] = field(default_factory=dict)
+    store: bool = False
+    renewed: set[Key] = field(default_factory=set)
+    polished: dict[Key, float] = field(default_factory=dict)
+    begun: dict[Key, np.ndarray] = field(default_factory=dict)
+    reconsidered: bool = False
+    swapped: list[float] = field(default_factory=list)
+    missed: dict[Key, list[float]] = field(default_factory=dict)
+    _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
+
+    def probabilities(self, among: Iterable[Key] | None = None) -> dict[Key, float]:
+        """Of each set (or of some), over all sizes of discrepancy; of those whose shapes begin elsewhere, the best.
+
+        A set that was not fitted is as probable as its estimate, less what estimates by that fit were too high.
+        """
+        wrong = {k: min(0.0, float(np.mean(m))) for k, m in self.missed.items()}
+        log = {k: self.total[k] for k in (self.total if among is None else among)}
+        log |= {k: log[k] + wrong.get(e.parent, 0.0) for k, e in self.estimates.items() if k in log}
+        best: dict[tuple[str, ...], Key] = {}
+        for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
+            best[self.labels(key)] = key
+        p = np.array([log[k] for k in best.values()])
+        total = logsumexp(p)
+        return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
+
+    def labels(self, key: Key) -> tuple[str, ...]:
+        """Effects of a set and their sites."""
+        if key not in self._labels:
+            self._labels[key] = tuple(sorted(self.suspect(n).label for n in key))
+        return self._labels[key]
+
+    def drop(self, key: Key) -> None:
+        """Leaves out what is known of a set that was not fitted."""
+        del self.log[key], self.total[key], self.promise[key], self.estimates[key]
+
+    def cells(self, key: Key | None = None) -> np.ndarray:
+        """(cells,) posterior of sizes of discrepancy and flaws, given a set or over all."""
+        log = self.log[key] if key is not None else logsumexp(np.stack(list(self.log.values())), axis=0)
+        return np.exp(log - logsumexp(log))
+
+    def imitates(self, key: Key) -> bool:
+        """Whether a set is of so many laws that they rather imitate one which the catalogue lacks."""
+        return self.hyper.foreign(laws({self.suspect(n).effect for n in key})) > 0.5
+
+    def suspect(self, n: int) -> Suspect:
+        return self.signatures[n].suspect
+
+    def label(self, key: Key) -> str:
+        return " + ".join(self.labels(key)) or "nominal"
+
+
+def marginals(p: Posterior) -> dict[str, float]:
+    """Posterior of each effect at each site, over all sets."""
+    out: dict[str, float] = {}
+    for key, value in p.probabilities().items():
+        for label in {p.suspect(n).label for n in key}:
+            out[label] = out.get(label, 0.0) + value
+    return dict(sorted(out.items(), key=lambda item: -item[1]))
