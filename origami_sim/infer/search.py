@@ -10,7 +10,8 @@ and no probability by more than 0.011.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from functools import partial
+from itertools import combinations, product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -29,6 +30,7 @@ from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.infer.nominal import level
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
+from origami_sim.threads import side_by_side
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -106,7 +108,7 @@ class Posterior:
             fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
-        store: whether nodes keep their problems, to be judged anew (`stored`).
+        store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
@@ -126,6 +128,7 @@ class Posterior:
     hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
+    smooth: list[np.ndarray] = field(default_factory=list)
     renewed: set[Key] = field(default_factory=set)
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
@@ -486,8 +489,9 @@ def _judge(
             log, value = node.foresight.white.of(rows, out.hyper)
             rank[mine] = log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
-        for n in np.argsort(-rank)[:LEADING]:
-            promise[n] = total + log_prior[n] + node.foresight.gain([node.groups[g] for g in sets[n]], out.hyper)
+        leading = np.argsort(-rank)[:LEADING].tolist()
+        gains = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
+        promise[leading] = total + log_prior[leading] + gains
     for n, key in enumerate(keys):
         if len(key) == 1:
             node.alone[key] = totals[n]
@@ -534,23 +538,26 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
             columns[:, k] = part
     added = recast(added, line.rows, out.weights, f.weights)
     effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
-    smooth = cosines(forward, f, line)
     tied = any(t is not None for t in line.tie)
     laid = own.sets(count + len(others))
-    volume = f.weights.log_prior - log_volume(f.weights, line.rows)
-    grid: list[Summed | None] = []
-    evidence, problems = np.full(len(hyper.cells), -np.inf), {}
-    for c, (gap, size, flaws) in enumerate(hyper.cells):
-        if not tied and gap != hyper.gaps[0]:
-            grid.append(None)
-            continue
-        if gap not in problems:
-            now, theirs = regapped(line, effects, f.weights, gap)
-            made = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
-            problems[gap] = replace(made, constant=made.constant + volume)
-        cell = summed(problems[gap], size, flaws)
-        grid.append(cell)
-        evidence[c] = cell.of(laid, hyper)[0][0]
+    volume, weights = f.weights.log_prior - log_volume(f.weights, line.rows), f.weights
+    smooth = out.smooth = out.smooth or cosines(forward, f, line)
+    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, smooth, strict=True)])
+
+    def judged(gap: float) -> tuple[Problem, list[Summed]]:
+        now, columns = regapped(small, both, weights, gap)
+        theirs, waves = zip(*(np.split(c, [count + len(others)], axis=1) for c in columns), strict=True)
+        made = problem(now, own.nominal, own.precision, own.away, list(theirs), list(waves))
+        made = replace(made, constant=made.constant + volume)
+        return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
+
+    gaps = hyper.gaps if tied else hyper.gaps[:1]
+    found = side_by_side([partial(judged, gap) for gap in gaps], forward.threads)
+    grid: list[Summed | None] = [cell for _, cells in found for cell in cells]
+    evidence = np.full(len(hyper.cells), -np.inf)
+    evidence[: len(grid)] = [cell.of(laid, hyper)[0][0] for _, cells in found for cell in cells]
+    grid += [None] * (len(hyper.cells) - len(grid))
+    problems = {gap: made for gap, (made, _) in zip(gaps, found, strict=True)}
     return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
 
