@@ -414,7 +414,7 @@ def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
     change, moves, _ = _proposed(forward, f.free, f.theta, f.local, f.blocks, line)
     left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
     out = []
-    for n, rest in enumerate(line.smoothed(left, moves[list(f.blocks)])):
+    for n, rest in enumerate(line.smoothed(left, list(moves[list(f.blocks)]))):
         r = weights.restored(rest[line.data(n)], line.rows[n])
         out.append(np.where(forward.blocks[f.blocks[n]].seen(), r, np.nan))
     return out

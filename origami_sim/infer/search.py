@@ -538,26 +538,24 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
             columns[:, k] = part
     added = recast(added, line.rows, out.weights, f.weights)
     effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
-    tied = any(t is not None for t in line.tie)
-    laid = own.sets(count + len(others))
-    volume, weights = f.weights.log_prior - log_volume(f.weights, line.rows), f.weights
-    smooth = out.smooth = out.smooth or cosines(forward, f, line)
-    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, smooth, strict=True)])
+    width, weights = count + len(others), f.weights
+    laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
+    out.smooth = out.smooth or cosines(forward, f, line)
+    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)])
 
     def judged(gap: float) -> tuple[Problem, list[Summed]]:
         now, columns = regapped(small, both, weights, gap)
-        theirs, waves = zip(*(np.split(c, [count + len(others)], axis=1) for c in columns), strict=True)
-        made = problem(now, own.nominal, own.precision, own.away, list(theirs), list(waves))
+        theirs, waves = [c[:, :width] for c in columns], [c[:, width:] for c in columns]
+        made = problem(now, own.nominal, own.precision, own.away, theirs, waves)
         made = replace(made, constant=made.constant + volume)
         return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
 
-    gaps = hyper.gaps if tied else hyper.gaps[:1]
-    found = side_by_side([partial(judged, gap) for gap in gaps], forward.threads)
-    grid: list[Summed | None] = [cell for _, cells in found for cell in cells]
-    evidence = np.full(len(hyper.cells), -np.inf)
-    evidence[: len(grid)] = [cell.of(laid, hyper)[0][0] for _, cells in found for cell in cells]
+    gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
+    found = dict(zip(gaps, side_by_side([partial(judged, gap) for gap in gaps], forward.threads), strict=True))
+    grid: list[Summed | None] = [cell for _, cells in found.values() for cell in cells]
     grid += [None] * (len(hyper.cells) - len(grid))
-    problems = {gap: made for gap, (made, _) in zip(gaps, found, strict=True)}
+    evidence = np.array([-np.inf if cell is None else cell.of(laid, hyper)[0][0] for cell in grid])
+    problems = {gap: made for gap, (made, _) in found.items()}
     return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
 
