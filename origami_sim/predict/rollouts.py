@@ -168,6 +168,7 @@ class Rollouts(Worlds, ABC):
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
         values: dict[int, np.ndarray] = {}
         ends: dict[int, np.ndarray | None] = {}
+        jobs, parts = [], []
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             if not mine:
@@ -175,15 +176,17 @@ class Rollouts(Worlds, ABC):
             worlds, impossible = self.worlds_of(each, theta, effects, r)
             first = None if local is None else local[0]
             memories = self._memories(r, worlds, [self.blocks[b] for b in mine], first)
-            for group in _by_length(self.blocks, mine):
-                most = max(1, TOGETHER // len(worlds))
-                parts = [group[k : k + most] for k in range(0, len(group), most)]  # on any number of threads the same
-                cores = -(-(self.threads or default_threads()) // len(parts))
-                jobs = [partial(self._roll, r, part, worlds, local, memories, cores) for part in parts]
-                for part, (made, arrived) in zip(parts, side_by_side(jobs, self.threads), strict=True):
-                    for n, b in enumerate(part):
-                        values[b], ends[b] = made[n], None if arrived is None else arrived[n]
-                        values[b][impossible] = np.nan
+            most = max(1, TOGETHER // len(worlds))
+            for group in _by_length(self.blocks, mine):  # into parts, the same on any number of threads
+                for part in (group[k : k + most] for k in range(0, len(group), most)):
+                    parts.append((part, impossible))
+                    jobs.append(partial(self._roll, r, part, worlds, local, memories))
+        cores = -(-(self.threads or default_threads()) // max(len(jobs), 1))
+        rolled = side_by_side([partial(job, cores) for job in jobs], self.threads)
+        for (part, impossible), (made, arrived) in zip(parts, rolled, strict=True):
+            for n, b in enumerate(part):
+                values[b], ends[b] = made[n], None if arrived is None else arrived[n]
+                values[b][impossible] = np.nan
         return Prediction([values[b] for b in wanted], [ends[b] for b in wanted])
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
