@@ -185,7 +185,8 @@ class Rollouts(Worlds, ABC):
         rolled = side_by_side([partial(job, cores) for job in jobs], self.threads)
         for (part, impossible), (made, arrived) in zip(parts, rolled, strict=True):
             for n, b in enumerate(part):
-                values[b], ends[b] = made[n], None if arrived is None else arrived[n]
+                values[b] = np.ascontiguousarray(made[n])  # as stored ones are: sums depend on it in their last digit
+                ends[b] = None if arrived is None else np.ascontiguousarray(arrived[n])
                 values[b][impossible] = np.nan
         return Prediction([values[b] for b in wanted], [ends[b] for b in wanted])
 
