@@ -410,13 +410,11 @@ def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
     """Residuals (n, D) [SI] of a fit's segments with the starts and numbers that suit other weights, linearly."""
     assert f.linear is not None and f.weights is not None
     line = f.linear.reweighted(f.weights, weights)
-    left = line.residual
     width = line.tangent[0].shape[1]
-    if width:
-        change, *_ = _proposed(forward, f.free, f.theta, f.local, f.blocks, line)
-        left = [r - t @ change[:width] for r, t in zip(left, line.tangent, strict=True)]
+    change, moves, _ = _proposed(forward, f.free, f.theta, f.local, f.blocks, line)
+    left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
     out = []
-    for n, rest in enumerate(line.smoothed(left)):
+    for n, rest in enumerate(line.smoothed(left, list(moves[list(f.blocks)]))):
         r = weights.restored(rest[line.data(n)], line.rows[n])
         out.append(np.where(forward.blocks[f.blocks[n]].seen(), r, np.nan))
     return out
@@ -433,23 +431,24 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = line.tangent[0].shape[1]
     change = np.zeros(len(free))
+    cleared, starts = line.explained([np.column_stack(p) for p in zip(line.tangent, line.residual, strict=True)])
+    whole = np.concatenate(cleared)
     if width:
         prior = _precision(free)
-        a = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])
+        a = np.concatenate([whole[:, :-1], np.diag(prior)])
         right = prior * (np.array([f.start for f in free]) - theta) / scale
-        y = np.concatenate([*line.cleared(line.residual), right])
+        y = np.concatenate([whole[:, -1], right])
         norms = np.linalg.norm(a, axis=0)
         a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
         y = np.concatenate([y, np.zeros(len(free))])
         q, r = np.linalg.qr(a)  # a small system with the same least squares
         low, high = (lower - theta) / scale, (upper - theta) / scale
         change = np.asarray(lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, float)
-    left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
-    moves, promised = np.zeros_like(local), penalty(free, theta + change * scale)
+    left = np.append(-change[:width], 1.0)  # what columns and residual add up to after the step
+    moves = np.zeros_like(local)
     if forward.local:
-        for b, move in zip(blocks, line.starts(left), strict=True):
-            moves[b] = move
-    promised += sum(float(rest @ rest) for rest in line.cleared(left))
+        moves[list(blocks)] = np.stack(starts) @ left
+    promised = penalty(free, theta + change * scale) + float(np.sum((whole @ left) ** 2))
     return change, moves, promised
 
 

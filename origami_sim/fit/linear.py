@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
 
 from origami_sim.fit.weights import Rows, Weights, recast
 
@@ -55,7 +55,7 @@ class Linearisation:
                 above = np.zeros((len(carry), both.shape[1]))
                 above[:, :size] = carry
                 both = np.concatenate([above, both])
-            q, r = np.linalg.qr(both) if size else (np.zeros((len(both), 0)), np.zeros((0, 0)))
+            q, r = _orthogonal(both)
             out.append((q, r))
             carry = r[size:, size:] if tie is not None else None
         return out
@@ -81,7 +81,11 @@ class Linearisation:
 
     def starts(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
         """The changes of the starts [L, ...] that explain columns [r, ...] best."""
-        _, coefficients = self._swept(parts)
+        return self.explained(parts)[1]
+
+    def explained(self, parts: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Columns as innovations (`cleared`), and the changes of the starts that explain the rest (`starts`)."""
+        left, coefficients = self._swept(parts)
         out: list[np.ndarray] = []
         for (_, r), c, slopes, tie in zip(
             reversed(self._factors), reversed(coefficients), reversed(self.slopes), reversed(self.tie), strict=True
@@ -93,12 +97,13 @@ class Linearisation:
             own = np.where(np.isinf(safe)[:, None], 0.0, r[:size, :size])
             own[np.diag_indices(size)] = np.where(np.isinf(safe), 1.0, np.diag(r)[:size])
             right = np.where(np.isinf(safe).reshape(-1, *[1] * (right.ndim - 1)), 0.0, right)
-            out.append(solve_triangular(own, right) if size else np.zeros((0, *right.shape[1:])))
-        return out[::-1]
+            solved = dtrtrs(own, right.reshape(size, -1))[0] if right.size else right
+            out.append(solved.reshape(right.shape))
+        return left, out[::-1]
 
-    def smoothed(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Columns [r, ...] of each segment, in its own rows, without what the best starts explain."""
-        found, out = self.starts(parts), []
+    def smoothed(self, parts: Sequence[np.ndarray], found: Sequence[np.ndarray] | None = None) -> list[np.ndarray]:
+        """Columns [r, ...] of each segment, in its own rows, without what the best starts explain (`found`)."""
+        found, out = self.starts(parts) if found is None else found, []
         for n, (part, slopes, tie) in enumerate(zip(parts, self.slopes, self.tie, strict=True)):
             rest = part - slopes @ found[n]
             if tie is not None:
@@ -116,6 +121,30 @@ class Linearisation:
             if tie is not None:
                 total -= float(np.sum(np.log(tie)))
         return total
+
+    def condensed(self, columns: Sequence[np.ndarray]) -> tuple["Linearisation", list[np.ndarray]]:
+        """The same least squares, also of further columns [r, k], in few rows, for all sizes of the gaps.
+
+        A start reaches as many combinations of a segment's data as it has numbers, and other segments only through
+        them. All else is the same whatever the gaps: what it says together is a last segment without a start.
+        """
+        width, count = self.tangent[0].shape[1], columns[0].shape[1]
+        rows, slopes, kept, beyond = [], [], [], []
+        for own, slope, *x in zip(self.rows, self.slopes, self.tangent, columns, self.residual, strict=True):
+            whole, ends = np.column_stack(x), own.count - own.tie
+            known = slope if np.all(np.isfinite(slope)) else np.zeros_like(slope)
+            q, r = _orthogonal(known[:ends])
+            reached = q.T @ whole[:ends]
+            beyond.append(whole[:ends] - q @ reached)
+            rows.append(Rows(len(r), 0, own.tie))
+            slopes.append(np.concatenate([r, known[ends:]]))
+            kept.append(np.concatenate([reached, whole[ends:]]))
+        kept.append(np.asarray(np.linalg.qr(np.concatenate(beyond), mode="r")))
+        rows.append(Rows(len(kept[-1])))
+        slopes.append(np.zeros((len(kept[-1]), 0)))
+        tangent, more, residual = zip(*(np.split(x, [width, width + count], axis=1) for x in kept), strict=True)
+        line = Linearisation(rows, [r[:, 0] for r in residual], list(tangent), slopes, [*self.tie, None])
+        return line, list(more)
 
     def padded(self, n: int, columns: np.ndarray) -> np.ndarray:
         """Columns of the rows of a segment's data, with zeros for all other rows."""
@@ -148,3 +177,12 @@ class Linearisation:
             [None if t is None else t * (old.gap / new.gap) for t in self.tie],
             self.steps,
         )
+
+
+def _orthogonal(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Factors Q, R of a matrix, as numpy finds them, which takes thrice as long over a small one."""
+    if not a.size:
+        return np.zeros((len(a), 0)), np.zeros((0, a.shape[1]))
+    count = min(a.shape)
+    packed, tau, _, _ = dgeqrf(a)
+    return dorgqr(packed[:, :count], tau)[0], np.triu(packed[:count])

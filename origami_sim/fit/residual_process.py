@@ -56,6 +56,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
 def autocovariance(columns: Sequence[np.ndarray], lags: int) -> np.ndarray:
     """Products (lags + 1,) of residuals that many frames apart, over all segments, per frame that was seen."""
     apart = np.zeros(lags)
-    filled = np.concatenate([part for c in columns for part in (np.nan_to_num(c), apart)])
-    seen = sum(int(np.isfinite(c).sum()) for c in columns)
+    joined = np.concatenate([part for c in columns for part in (c, apart)])
+    known = np.isfinite(joined)
+    seen, filled = np.count_nonzero(known) - lags * len(columns), np.where(known, joined, 0.0)
     return np.array([filled[: len(filled) - k] @ filled[k:] for k in range(lags + 1)]) / max(seen, 1)

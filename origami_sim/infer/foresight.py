@@ -6,7 +6,7 @@ it would leave itself: all is linear, the residuals that follow are looked at as
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -17,6 +17,7 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, patterns, recast
 from origami_sim.infer.implied import OwnColumns, left_by
+from origami_sim.threads import side_by_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +48,20 @@ class Foresight:
         line = f.linear.reweighted(f.weights, plain)
         theirs = recast(effects, line.rows, f.weights, plain)
         columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
-        whole = with_priors(line.cleared(columns), own.precision[own.nominal], own.away[own.nominal])
+        cleared, starts = line.explained(columns)
+        whole = with_priors(cleared, own.precision[own.nominal], own.away[own.nominal])
         root = np.asarray(np.linalg.qr(whole, mode="r"))
         white = summed(without_numbers(whole, count, theirs[0].shape[1], -line.spread), 0.0, hyper.flaws[0])
-        parts = np.concatenate([s[: r.data] for s, r in zip(line.smoothed(columns), line.rows, strict=True)])
+        parts = np.concatenate([s[: r.data] for s, r in zip(line.smoothed(columns, starts), line.rows, strict=True)])
         return cls(forward, f, plain, own.groups, count, white, root, parts)
 
-    def gain(self, groups: Sequence[Group], hyper: Hyper) -> float:
-        """Log evidence that effects gain over the fit, each in noise of its own."""
-        new = sum(g.strengths for g in groups if g not in self.own)
-        gain = self._likely(groups) - self._before
-        d = np.sqrt(2.0 * max(gain, 1.0) / max(new, 1))
-        return gain + new * (float(log_slab(np.array(d), hyper)) + 0.5 * float(np.log(2.0 * np.pi)))
+    def gains(self, sets: Sequence[Sequence[Group]], hyper: Hyper) -> np.ndarray:
+        """Log evidence that sets of effects gain over the fit, each in noise of its own."""
+        likely = side_by_side([partial(self._likely, groups) for groups in sets], self.forward.threads)
+        new = np.array([sum(g.strengths for g in groups if g not in self.own) for groups in sets])
+        gain = np.array(likely) - self._before
+        d = np.sqrt(2.0 * np.maximum(gain, 1.0) / np.maximum(new, 1))
+        return gain + new * (log_slab(d, hyper) + 0.5 * np.log(2.0 * np.pi))
 
     @cached_property
     def _before(self) -> float:

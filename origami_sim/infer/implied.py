@@ -58,8 +58,8 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     if not any(t is not None for t in line.tie):
         return f.weights.gap
     own = OwnColumns(f)
+    line, none = line.condensed([np.zeros((r.count, 0)) for r in line.rows])
     effects = [t[:, own.columns] for t in line.tangent]
-    none = [np.zeros((r.count, 0)) for r in line.rows]
     laid = own.sets(len(own.columns))
     log = []
     for k, gap in enumerate(hyper.gaps):

@@ -67,7 +67,7 @@ class Posterior:
             fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
-        store: whether nodes keep their problems, to be judged anew (`stored`).
+        store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
@@ -88,6 +88,7 @@ class Posterior:
     hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
+    smooth: list[np.ndarray] = field(default_factory=list)
     renewed: set[Key] = field(default_factory=set)
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)

@@ -10,13 +10,14 @@ and no probability by more than 0.011.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from itertools import combinations
+from functools import partial
+from itertools import combinations, product
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import Group, Sets, Summed, log_slab, problem, summed
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
@@ -30,6 +31,7 @@ from origami_sim.infer.nominal import level
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
+from origami_sim.threads import side_by_side
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -392,8 +394,9 @@ def _judge(
             log, value = node.foresight.white.of(rows, out.hyper)
             rank[mine] = log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
-        for n in np.argsort(-rank)[:LEADING]:
-            promise[n] = total + log_prior[n] + node.foresight.gain([node.groups[g] for g in sets[n]], out.hyper)
+        leading = np.argsort(-rank)[:LEADING].tolist()
+        gains = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
+        promise[leading] = total + log_prior[leading] + gains
     for n, key in enumerate(keys):
         if len(key) == 1:
             node.alone[key] = totals[n]
@@ -440,23 +443,24 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
             columns[:, k] = part
     added = recast(added, line.rows, out.weights, f.weights)
     effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
-    smooth = cosines(forward, f, line)
-    tied = any(t is not None for t in line.tie)
-    laid = own.sets(count + len(others))
-    volume = f.weights.log_prior - log_volume(f.weights, line.rows)
-    grid: list[Summed | None] = []
-    evidence, problems = np.full(len(hyper.cells), -np.inf), {}
-    for c, (gap, size, flaws) in enumerate(hyper.cells):
-        if not tied and gap != hyper.gaps[0]:
-            grid.append(None)
-            continue
-        if gap not in problems:
-            now, theirs = regapped(line, effects, f.weights, gap)
-            made = problem(now, own.nominal, own.precision, own.away, theirs, smooth)
-            problems[gap] = replace(made, constant=made.constant + volume)
-        cell = summed(problems[gap], size, flaws)
-        grid.append(cell)
-        evidence[c] = cell.of(laid, hyper)[0][0]
+    width, weights = count + len(others), f.weights
+    laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
+    out.smooth = out.smooth or cosines(forward, f, line)
+    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)])
+
+    def judged(gap: float) -> tuple[Problem, list[Summed]]:
+        now, columns = regapped(small, both, weights, gap)
+        theirs, waves = [c[:, :width] for c in columns], [c[:, width:] for c in columns]
+        made = problem(now, own.nominal, own.precision, own.away, theirs, waves)
+        made = replace(made, constant=made.constant + volume)
+        return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
+
+    gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
+    found = dict(zip(gaps, side_by_side([partial(judged, gap) for gap in gaps], forward.threads), strict=True))
+    grid: list[Summed | None] = [cell for _, cells in found.values() for cell in cells]
+    grid += [None] * (len(hyper.cells) - len(grid))
+    evidence = np.array([-np.inf if cell is None else cell.of(laid, hyper)[0][0] for cell in grid])
+    problems = {gap: made for gap, (made, _) in found.items()}
     return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
 

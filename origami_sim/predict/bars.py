@@ -99,10 +99,10 @@ class BarRollouts(Rollouts):
         if calm:
             quiet, damped = calmed(model, parameters)
             finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
-            batch = self._batch(quiet, damped, drive, _with_effects(state, quiet))
+            batch = self._batch(quiet, damped, drive, _with_effects(state, quiet), threads=shots.threads)
             raw += film(batch, recording, calm + 1, finer, step)
             state = _with_effects(batch.state(), model, step=calm * substeps)
-        batch = self._batch(model, parameters, drive, state)
+        batch = self._batch(model, parameters, drive, state, threads=shots.threads)
         raw += film(batch, recording, shots.frames - sum(map(len, raw)), substeps, step, first=not calm)
         out = np.concatenate(raw)
         out[:, :, batch.status() >= 0] = np.nan

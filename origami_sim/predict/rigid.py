@@ -107,7 +107,7 @@ class RigidRollouts(Rollouts):
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         state = self._state(shots)
         drive = self._driven(shots, model, parameters)
-        batch = self._batch(model, parameters, drive, state, tolerance=TOLERANCE)
+        batch = self._batch(model, parameters, drive, state, tolerance=TOLERANCE, threads=shots.threads)
         if isinstance(batch, RigidBatch):
             batch.finest = FINEST
         begun, arrived, raw = 0, [], []

@@ -1,10 +1,10 @@
 """A batch of worlds on a device: the arrays behind the kernels, and the three things asked of them."""
 
 import math
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,17 @@ from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import plates, skin, sources
 from origami_sim.solve.compose import BITS, compose
 from origami_sim.solve.compose_sheets import asks_change
+from origami_sim.threads import default_threads
 
 APART = 128
 """Bytes between the worlds' stretches of memory on the CPU: two cache lines, because processors fetch them in pairs.
 
 With half of it a thread's last world and the next thread's first may share a pair; twice as much gains nothing.
 """
+
+
+COMPILING = Lock()
+"""Held while kernels are written and compiled, which threads must not do at once."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +47,6 @@ class Evaluation:
     kinetic: np.ndarray
     angles: np.ndarray
     gaps: np.ndarray
-
-
-def default_threads() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Batch:
@@ -82,7 +82,9 @@ class Batch:
             known = ", ".join(d.alias for d in wp.get_devices())
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
         every = [*(n for n in among if get(n).strengths or n in model.effects), *model.effects]
-        self.model, self.program = model, compose(tuple(dict.fromkeys(every)), bool(among))
+        self.model = model
+        with COMPILING:
+            self.program = compose(tuple(dict.fromkeys(every)), bool(among))
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         self._pool: ThreadPoolExecutor | None = None
@@ -267,7 +269,7 @@ class Batch:
     def _download(self, a: wp.array, rows: int) -> np.ndarray:
         return self._view(a)[:rows, : self.worlds].copy()
 
-    def _launch(self, kernel: wp.Kernel, outputs: list):
+    def _launch(self, name: str, outputs: list):
         """Runs a kernel over all worlds, split over threads on the CPU (a launch releases the interpreter lock)."""
         inputs = [*self._constants, self._x, self._v, self._angles, self._memory]
 
@@ -276,10 +278,12 @@ class Batch:
                 kernel, dim=hi - lo, inputs=[*inputs, *(lo if o is _FIRST else o for o in outputs)], device=self.device
             )
 
+        with COMPILING:
+            kernel = getattr(self.program, name)
+            wp.load_module(kernel.module, device=self.device)
         if self.threads == 1:
             run(0, self.worlds)
         else:
-            wp.load_module(kernel.module, device=self.device)  # compile before the threads meet
             cuts = np.linspace(0, self.worlds, self.threads + 1).astype(int)
             if self._pool is None:
                 self._pool = ThreadPoolExecutor(self.threads)
@@ -336,7 +340,7 @@ class Batch:
 
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
         self._launch(
-            self.program.rollout,
+            "rollout",
             [
                 self._a,
                 self._f,
@@ -359,7 +363,7 @@ class Batch:
     def total_force(self, time: float) -> np.ndarray:
         """Sum of all effects on every node, [N, W, 3] [N], at the state's positions and velocities."""
         if self.threads > 1:
-            self._launch(self.program.total, [self._f, _FIRST, wp.float64(time)])
+            self._launch("total", [self._f, _FIRST, wp.float64(time)])
         else:  # asked many times over, and a recorded launch costs a tenth
             if self._total is None:
                 inputs = [*self._constants, self._x, self._v, self._angles, self._memory, self._f, 0, wp.float64(time)]
@@ -378,7 +382,7 @@ class Batch:
         forces = self._room(len(effects), n, dtype=wp.vec3d)
         energies = self._room(len(effects), dtype=wp.float64)
         gaps = self._room(max(k, 1), dtype=wp.float64, fill=np.inf)
-        self._launch(self.program.evaluate, [forces, energies, gaps, _FIRST, wp.float64(time)])
+        self._launch("evaluate", [forces, energies, gaps, _FIRST, wp.float64(time)])
         f, v = forces.numpy()[:, :, : self.worlds], self._download(self._v, n)
         e = self._download(energies, len(effects))
         return Evaluation(

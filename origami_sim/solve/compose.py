@@ -220,6 +220,10 @@ class _Composer(Sheets, Touching):
         word, bit = divmod(self.number(effect), BITS)
         return t.block(f"if (on{word} & wp.int64({1 << bit})) != wp.int64(0):")
 
+    def alike(self, effects: list[Effect]) -> list[list[Effect]]:
+        """Effects that share a loop; each has its own where a world is to pass over at once what does not act in it."""
+        return [[e] for e in effects] if self.shared else [effects]
+
     def apply_law(self, t: Text, effect: Effect, entity: str, mode: str, result: str):
         """Calls a force law with its memory read before and, in a rollout, written after."""
         outputs = [result]
@@ -302,20 +306,18 @@ class _Composer(Sheets, Touching):
         effects = self.family("node")
         if not effects:
             return
-        t("for row in range(mask.shape[0]):")
-        t.depth += 1
-        t("n = row & NATURAL")
-        t(f"mass = {self.value('inertia', 'mass', 'n')}")
-        t("x = X[n, w]")
-        t("v = V[n, w]")
-        for e in effects:
-            i = self.number(e)
-            with self.acting(t, e):
-                self.apply_law(t, e, "n", mode, f"F{i}")
-                self.add_energy(t, e, "n", mode)
-                self.scatter(t, e, "n", f"F{i}", mode)
-                self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
-        t.depth -= 1
+        for group in self.alike(effects):
+            with self.acting(t, group[0]), t.block("for row in range(mask.shape[0]):"):
+                t("n = row & NATURAL")
+                t(f"mass = {self.value('inertia', 'mass', 'n')}")
+                t("x = X[n, w]")
+                t("v = V[n, w]")
+                for e in group:
+                    i = self.number(e)
+                    self.apply_law(t, e, "n", mode, f"F{i}")
+                    self.add_energy(t, e, "n", mode)
+                    self.scatter(t, e, "n", f"F{i}", mode)
+                    self.add_work(t, e, f"wp.dot(F{i}, v)", mode)
 
     def _bars(self, t: Text, mode: str):
         effects = self.family("bar")
@@ -432,28 +434,26 @@ class _Composer(Sheets, Touching):
         effects = self.family("triangle")
         if not effects:
             return
-        t("for row in range(triangles.shape[0]):")
-        t.depth += 1
-        t("c = row & NATURAL")
-        for i in (1, 2, 3):
-            t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
-            t(f"x{i} = X[n{i}, w]")
-            t(f"v{i} = V[n{i}, w]")
-        if {"field", "gradient"} & self.drives:
-            self._field(t, "(x1 + x2 + x3) / scalar(3.0)")
-        for e in effects:
-            i = self.number(e)
-            with self.acting(t, e):
-                if e.interacts:
-                    self._stray(t, e)
-                self.apply_law(t, e, "c", mode, f"R{i}")
-                self.add_energy(t, e, "c", mode)
-                for k in (1, 2, 3):
-                    self.scatter(t, e, f"n{k}", f"kinematics.corner(R{i}, {k - 1})", mode)
-                if e.exchanges_work:
-                    corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
-                    self.add_work(t, e, " + ".join(corners), mode)
-        t.depth -= 1
+        for group in self.alike(effects):
+            with self.acting(t, group[0]), t.block("for row in range(triangles.shape[0]):"):
+                t("c = row & NATURAL")
+                for i in (1, 2, 3):
+                    t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
+                    t(f"x{i} = X[n{i}, w]")
+                    t(f"v{i} = V[n{i}, w]")
+                if any({"field", "gradient"} & set(e.drives) for e in group):
+                    self._field(t, "(x1 + x2 + x3) / scalar(3.0)")
+                for e in group:
+                    i = self.number(e)
+                    if e.interacts:
+                        self._stray(t, e)
+                    self.apply_law(t, e, "c", mode, f"R{i}")
+                    self.add_energy(t, e, "c", mode)
+                    for k in (1, 2, 3):
+                        self.scatter(t, e, f"n{k}", f"kinematics.corner(R{i}, {k - 1})", mode)
+                    if e.exchanges_work:
+                        corners = [f"wp.dot(kinematics.corner(R{i}, {k - 1}), v{k})" for k in (1, 2, 3)]
+                        self.add_work(t, e, " + ".join(corners), mode)
 
     def _stray(self, t: Text, effect: Effect):
         """Field of all magnets but its own, at a triangle's magnet."""

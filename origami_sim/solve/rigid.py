@@ -187,7 +187,7 @@ class RigidBatch(Batch):
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
         fixed = self.tolerance == 0.0
         self._launch(
-            self.program.rigid,
+            "rigid",
             [
                 self._tree,
                 self._f,

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import diagnose
+from origami_sim.diagnose import Options, diagnose
 from origami_sim.fit.subject import alignments
+from origami_sim.predict import rollouts
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
@@ -36,6 +37,18 @@ def test_a_crease_that_sticks_is_found_though_no_derivative_promises_it(seed):
     assert found.chosen == ["crease_friction at crease 1"] and found.verdict == "MECHANISM"
     moment = next(n for n in found.candidates[0].numbers if n.label == "crease_friction.friction_moment")
     assert moment.value == pytest.approx(2e-5, rel=0.05)
+
+
+def test_words_and_numbers_are_the_same_on_any_number_of_threads(tmp_path, monkeypatch):
+    """To the last byte, though segments are simulated in several parts."""
+    monkeypatch.setattr(rollouts, "TOGETHER", 32)
+    swing, said = record(FRICTION, **SMALL), set()
+    for threads in (1, 2):
+        found = diagnose(subject(3), [swing], Options(threads=threads), catalogue=("crease_friction", "angle_offset"))
+        found.seconds, found.settings["threads"] = {}, None
+        found.save_json(tmp_path / "found.json")
+        said.add((tmp_path / "found.json").read_bytes())
+    assert len(said) == 1
 
 
 def test_nothing_is_found_where_nothing_is_missing():

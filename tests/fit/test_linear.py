@@ -1,5 +1,6 @@
 """Starts that are eliminated segment by segment: against one dense least-squares problem with all of them unknown."""
 
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
@@ -72,6 +73,29 @@ def test_products_of_cleared_columns_are_those_without_the_starts(ties):
     rest = t - a @ lstsq(a, t)[0]
     found = np.concatenate(line.cleared(line.tangent))
     assert found.T @ found == pytest.approx(rest.T @ rest, abs=1e-9)
+
+
+@cases
+@lengths
+@pytest.mark.parametrize("gap", [1.0, 0.05])
+def test_condensed_rows_say_the_same_for_any_size_of_the_gaps(ties, data, gap):
+    """Products of all columns, starts and their determinant, though the ties came after."""
+    line, old = made(ties, data=data, seed=5), Weights(np.ones(1))
+    new = replace(old, gap=gap)  # data weigh the same
+    more = [np.random.default_rng(n).normal(size=(r.count, 3)) for n, r in enumerate(line.rows)]
+    few, columns = line.condensed(more)
+    assert sum(r.count for r in few.rows) <= sum(r.tie + 3 for r in line.rows) + 2 + 3 + 1
+    here, there = line.reweighted(old, new), few.reweighted(old, new)
+
+    def products(line: Linearisation, columns) -> np.ndarray:
+        joined = zip(line.tangent, recast(columns, line.rows, old, new), line.residual, strict=True)
+        whole = np.concatenate(line.cleared([np.column_stack(parts) for parts in joined]))
+        return whole.T @ whole
+
+    assert products(there, columns) == pytest.approx(products(here, more), rel=1e-10, abs=1e-10)
+    assert there.spread == pytest.approx(here.spread, abs=1e-9)
+    starts = np.concatenate(there.starts(there.residual)[:-1])
+    assert starts == pytest.approx(np.concatenate(here.starts(here.residual)), abs=1e-8)
 
 
 def test_innovations_do_not_know_what_comes_later():

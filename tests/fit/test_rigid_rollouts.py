@@ -16,6 +16,7 @@ from origami_sim.fit.least_squares import fit
 from origami_sim.fit.weights import Weights
 from origami_sim.model import State
 from origami_sim.pattern import strip
+from origami_sim.predict import rollouts
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
@@ -68,6 +69,25 @@ def test_all_frames_are_compared_and_each_segment_begins_where_the_one_before_en
     assert [b.reach is not None for b in tied.blocks] == [True] * 4 + [False]
     for b, after in pairwise(tied.blocks):
         assert b.lasting == pytest.approx(recording.times[after.first] - recording.times[b.first])
+
+
+@pytest.mark.parametrize("effect", ["", "crease_friction"])
+def test_predictions_are_the_same_bytes_on_any_number_of_threads(tied, monkeypatch, effect):
+    """Also where the segments are rolled out in several parts, and laws remember what was before them."""
+    monkeypatch.setattr(rollouts, "TOGETHER", 7)  # two segments of three worlds
+    every = tied.admitted(suspects(tied.model, tied.recordings, tied.drive, tied.parameters))
+    h = Hypothesis(tuple(s for s in every if s.effect == effect and s.entities is None))
+    free = [*tied.subject.nominals, *h.free]
+    thetas = np.array([[f.start + k * f.scale for f in free] for k in range(3)])
+    made = []
+    for threads in (1, 2, 5):
+        monkeypatch.setattr(tied, "threads", threads)
+        tied._moved.clear()
+        made.append(tied.shoot(h, thetas, np.zeros((3, len(tied.blocks), tied.local))))
+    assert bool(effect) == bool(len(h.suspects)) and len(made[0].values) == len(tied.blocks)
+    for other in made[1:]:
+        for a, b in zip((*made[0].values, *made[0].ends[:-1]), (*other.values, *other.ends[:-1]), strict=True):
+            assert a is not None and b is not None and a.tobytes() == b.tobytes()
 
 
 def test_a_fit_of_what_is_exact_leaves_rounding(tied):
