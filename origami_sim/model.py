@@ -309,16 +309,19 @@ class State:
     status: np.ndarray
 
     @classmethod
-    def at_rest(cls, model: Model, worlds: int = 1, position: np.ndarray | None = None) -> "State":
+    def at_rest(
+        cls, model: Model, worlds: int = 1, position: np.ndarray | None = None, *, placed: bool = False
+    ) -> "State":
         """The reference state, or that of given positions ([N, 3] or [N, W, 3]), without motion.
 
-        The mass points of rigid panels are put where their panels are.
+        The mass points of rigid panels are put where their panels are, as in the model, unless they are `placed`:
+        worlds whose bodies have other centres or inertia have them elsewhere.
         """
         start = model.position if position is None else np.asarray(position, float)
         if start.ndim == 2:
             start = start[:, None, :]
         x = np.array(np.broadcast_to(start, (len(model.position), worlds, 3)))
-        if len(model.carriers) and position is not None:
+        if len(model.carriers) and position is not None and not placed:
             _carry(model, x)
         effects = [get(e) for e in model.laws]
         rows = sum(size for *_, size in model.memories)

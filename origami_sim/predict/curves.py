@@ -249,7 +249,7 @@ class Static(Curves):
         """States of all worlds, step by step, and whether an equilibrium was found [n, K]."""
         model = worlds[0][0]
         steps, count = len(self.recordings[r].times), len(worlds)
-        state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1))
+        state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1), placed=True)
         alive = np.ones(count, bool)
         states, found = [], []
         before = model.position

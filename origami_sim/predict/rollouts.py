@@ -278,7 +278,7 @@ class Rollouts(Worlds, ABC):
         count, model = len(blocks), worlds[0][0]
         if self.start != "fit":
             x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
-            return remembering(State.at_rest(model, x.shape[1], position=x), shots)
+            return remembering(State.at_rest(model, x.shape[1], position=x, placed=True), shots)
         m = self.articulation.size
         base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
         x = np.empty((len(model.position), len(worlds) * count, 3))
@@ -297,7 +297,7 @@ class Rollouts(Worlds, ABC):
             at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
             x[:, at] = own_x = arm.positions(pose)
             v[:, at] = np.einsum("mnwa,mw->nwa", arm.jacobian(pose, own_x), u)
-        state = State.at_rest(model, x.shape[1], position=x)
+        state = State.at_rest(model, x.shape[1], position=x, placed=True)
         state.v[:] = v
         return remembering(state, shots)
 

@@ -101,7 +101,7 @@ class Slow(Curves):
         instants = np.unique(np.concatenate([at, knots(commanded, at)]))
         joint = Parameters.join([p for _, p in worlds])
         drive = distorted(model, joint, commanded.on(instants), float(at[-1]))
-        state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1))
+        state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1), placed=True)
         viscous = any(MOVING & set(get(e).arguments) for e in model.laws)
         options = {"among": self.shared, "threads": self.threads, "system": self._system(model, worlds)}
         search = settling(worlds, drive, state, keeping=True, viscous=viscous, **options)

@@ -20,6 +20,7 @@ from origami_sim.predict import rollouts
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
+from origami_sim.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 
@@ -210,3 +211,25 @@ def test_laws_remember_the_simulated_motion_where_a_segment_starts():
     f = fit(forward, Hypothesis((friction,)), weights, theta=begin, fixed=True, most=20)
     left = np.concatenate(f.residuals)
     assert len(forward.blocks) == 5 and np.abs(left).max() < 0.15 * NOISE
+
+
+@pytest.mark.parametrize("name", ["mass_1", "centre_1", "centre_2", "inertia_1", "inertia_2", "length_1"])
+def test_every_number_of_a_body_moves_what_is_predicted(name):
+    """Worlds whose bodies have other centres and inertia, side by side, move as each does by itself."""
+    module = scene_module("pendulum_chain")
+    settings = scene_settings(module)
+    times = np.arange(61) / RATE
+    still = {
+        f"theta{k}": Channel(f"theta{k}", "panel_angle", np.full(61, np.pi - 0.3 * k), "rad", NOISE, {"panel": k})
+        for k in (1, 2)
+    }
+    value = float(settings[name].value)
+    forward = RigidRollouts(
+        Subject.from_scene(module, settings, spreads={name: 0.01 * value}), [Recording("still", times, still)]
+    )
+    given, other = np.array([value]), np.array([1.02 * value])
+    both = forward.predict(Hypothesis(), [given, other])
+    alone = forward.predict(Hypothesis(), [other])
+    for two, one in zip(both, alone, strict=True):
+        assert two[1] == pytest.approx(one[0], abs=1e-9)
+        assert np.abs(two[1] - two[0]).max() > 1e-4
