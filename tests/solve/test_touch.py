@@ -384,15 +384,16 @@ def build(touch=False):
 def pierced(x, triangles):
     """Pairs of triangles without a common corner of which an edge of one passes through the other (Cramer's rule)."""
 
-    def through(a, b, corners):
+    def through(edge, corners):
+        a, b = edge
         rows = np.stack([b - a, corners[0] - corners[1], corners[0] - corners[2]], axis=1)
         t, u, v = np.linalg.solve(rows, corners[0] - a) if abs(np.linalg.det(rows)) > 1e-15 else (-1.0, 0.0, 0.0)
         return 0 < t < 1 and u > 0 and v > 0 and u + v < 1
 
     edges = [(t[k], t[k - 1]) for t in triangles for k in range(3)]
     return sum(
-        any(through(*x[list(e)], x[q]) for e in edges[3 * i : 3 * i + 3])
-        or any(through(*x[list(e)], x[p]) for e in edges[3 * j : 3 * j + 3])
+        any(through(x[list(e)], x[q]) for e in edges[3 * i : 3 * i + 3])
+        or any(through(x[list(e)], x[p]) for e in edges[3 * j : 3 * j + 3])
         for i, p in enumerate(triangles)
         for j, q in enumerate(triangles[:i])
         if not set(p) & set(q)
