@@ -21,15 +21,23 @@ def diagonal_share(cell: float, width: float) -> float:
 def as_beam(model: Model, parameters: Parameters, axial: ArrayLike):
     """Makes a strip of two nodes per station a plane beam of axial stiffness E A [N], one or by cell.
 
-    Both corners of a station weigh alike, so that nothing twists. The bars along the strip get all of E A: by the rule
-    for triangles they would get less the narrower the cells are, and the weight would stretch fine meshes.
+    Both corners of a station weigh alike, so that nothing twists; bars along the strip as in `stiff_along`.
     """
     pairs = parameters["inertia", "mass"].reshape(-1, 2)
     parameters.set("inertia", "mass", np.repeat(pairs.mean(axis=1), 2))
+    stiff_along(model, parameters, np.broadcast_to(axial, len(pairs) - 1))
+
+
+def stiff_along(model: Model, parameters: Parameters, axial: np.ndarray):
+    """Gives the bars along a strip of two nodes per station, its first nodes, all of E A [N], by cell.
+
+    By the rule for triangles they would get less the narrower the cells are, and the weight would stretch fine meshes.
+    """
     length = parameters["bars", "rest_length"][:, 0]
-    along = np.flatnonzero(np.abs(np.diff(model.bars, axis=1)[:, 0]) == 2)  # from a station's node to the next one's
+    inside = model.bars.max(axis=1) < 2 * (len(axial) + 1)
+    along = np.flatnonzero(inside & (np.abs(np.diff(model.bars, axis=1)[:, 0]) == 2))  # from a station to the next
     cell = model.bars[along].min(axis=1) // 2
-    stiffness = np.broadcast_to(axial, len(pairs) - 1)[cell] / 2 / length[along]
+    stiffness = axial[cell] / 2 / length[along]
     if ("bar_viscosity", "viscosity") in parameters:
         factor = np.sqrt(stiffness / parameters["bars", "stiffness"][along, 0])
         viscosity = parameters["bar_viscosity", "viscosity"][along, 0]

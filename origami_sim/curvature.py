@@ -235,7 +235,7 @@ class _Mesh:
 
     def _arcs(self, own: list[dict[int, np.ndarray]]) -> dict[str, np.ndarray]:
         """Rows of curvature along the edges, and the edges of the triangles."""
-        directions = _directions(self.outward)
+        directions, own = _directions(self.outward), self._completed(own)
         side, rows = np.full(self.loose.shape, -1, np.int32), []
         borders = [((t, k),) for t, k in zip(*np.nonzero(self.loose), strict=True)]
         for sides in [*self.pairs.values(), *borders]:
@@ -251,6 +251,38 @@ class _Mesh:
             "arc_start": np.cumsum([0, *map(len, rows)]).astype(np.int32),
             "arc_hinge": np.array([f for row in rows for f in row], np.int32),
             "arc_weight": np.array([v for row in rows for v in row.values()], float),
+        }
+
+    def _completed(self, own: list[dict[int, np.ndarray]]) -> list[dict[int, np.ndarray]]:
+        """Weights of every triangle's curvature with that across its borders, as its neighbours curve that way.
+
+        A border's own turn is no part of a triangle's curvature, so what is left tells too little along its other
+        edges. Where no neighbour knows either, those that have learnt it tell.
+        """
+        out, known = list(own), ~np.any(self.loose, axis=1)
+        while True:
+            learnt = {}
+            for t in np.flatnonzero(~known).tolist():
+                frames = {t: np.eye(3)}
+                beside = [self.across(t, q, frames) for q in self.hinges.get(t, ())]
+                beside = [b for b in beside if known[b] and not self.held[b]]
+                if beside and not self.held[t]:
+                    turned = [{f: np.linalg.inv(frames[b]) @ v for f, v in out[b].items()} for b in beside]
+                    learnt[t] = self._with_borders(t, own[t], turned)
+            if not learnt:
+                return out
+            for t, row in learnt.items():
+                out[t], known[t] = row, True
+
+    def _with_borders(self, t: int, own: dict[int, np.ndarray], beside: list[dict]) -> dict[int, np.ndarray]:
+        """A triangle's weights, and as much across its borders as makes them the mean of the rows `beside` there."""
+        across = voigt(self.outward[t][self.loose[t]])
+        asks = across * [1.0, 1.0, 0.5]  # the curvature along these normals
+        fill = across.T @ np.linalg.inv(asks @ across.T) @ asks
+        nothing = np.zeros(3)
+        return {
+            f: (w := own.get(f, nothing)) + fill @ (sum(row.get(f, nothing) for row in beside) / len(beside) - w)
+            for f in dict.fromkeys([*own, *(f for row in beside for f in row)])
         }
 
     def _kept(self, t: int, entries: dict[int, np.ndarray]) -> dict[int, np.ndarray]:

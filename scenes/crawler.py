@@ -7,7 +7,7 @@ Forward (+x) is towards the small patch. The strip is a chain of narrow cells; e
 
 import numpy as np
 
-from origami_sim.beams import as_beam, crossed
+from origami_sim.beams import as_beam, crossed, stiff_along
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, sine
 from origami_sim.gait import stride_table
@@ -109,13 +109,12 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("mass_damping", decay_rate=s.decay_rate)
     sheet.gravity((0, 0, -s.gravity))
     model, parameters = sheet.build()
+    axial = s.membrane * (s.modulus * s.thickness * middle + mae.modulus * s.patch_thickness * patch_width)
     if s.guided:
-        as_beam(
-            model,
-            parameters,
-            s.membrane * (s.modulus * s.thickness * middle + mae.modulus * s.patch_thickness * patch_width),
-        )
+        as_beam(model, parameters, axial)
         model, parameters = crossed(model, parameters)
+    else:
+        stiff_along(model, parameters, axial)
     if not s.patch_height:  # a planar chain carries its masses on its line
         model = model.with_effects(without=("eccentric_weight",))
         parameters = parameters.for_model(model)

@@ -68,6 +68,22 @@ def test_dry_friction_sticks_slides_and_loses_the_area_of_its_loop():
     assert loss(angles[cycle], m[cycle]) == pytest.approx(4 * mf * (a - s0), rel=1e-12)
 
 
+@pytest.mark.parametrize("dt", [0.05, 1.5])
+def test_branches_of_a_crease_let_go_by_exponentials_at_any_step(dt):
+    """Turned evenly by 0.6 rad within 0.4 s and held: K_i tau_i rate (1 - exp(-t / tau_i)), then exp(-t / tau_i)."""
+    turn, lasts, pairs = 0.6, 0.4, ((0.8, 0.5), (0.3, 0.05), (0.2, 4.0))
+    values = {
+        f"{n}_{i}": v for i, pair in enumerate(pairs, 1) for n, v in zip(("stiffness", "time"), pair, strict=True)
+    }
+    model = hinge(effects=("crease_relaxation",), held=(0, 1, 2, 3))
+    batch = Batch(model, quiet(model, under("crease_relaxation", **values)), Drive(), start(model))
+    batch.advance(0, lasts, np.inf)
+    for angle, step in ((turn, lasts), (turn, dt), (turn, dt)):
+        batch.carry(np.stack([batch.state().x, hinge_positions(angle)[:, None]]), step)
+    left = [k * t * turn / lasts * (1 - math.exp(-lasts / t)) * math.exp(-2 * dt / t) for k, t in pairs]
+    assert batch.remembered()[:3, 0] == pytest.approx(left, rel=1e-6, abs=1e-12)
+
+
 def ringing(values, *, angle=0.0, rate=0.0, duration=3.0, frames=200.0, drive=None):
     """A pendulum of one crease: node l turns with the inertia 0.01 LEVER^2 about the axis, which is held."""
     model = hinge(angle, held=(0, 1, 2), bars=[(3, 1), (3, 2)])

@@ -4,11 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg as spla
 
 from origami_sim.gait import strides
 from origami_sim.materials import layered_rigidity, material
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import crawler
+from origami_sim.solve.statics import tangent
 from origami_sim.solve.timestep import stable_step
 from origami_sim.studies.crawler_maps import Store, Trial, checks, judge, run_trials
 from origami_sim.studies.strides import check
@@ -177,11 +179,42 @@ def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
 
 @SLOW
 def test_free_strip_walks_like_the_guided_one(coarse):
-    """Straight on and steadily, with nothing that guides it."""
-    free, motion = walk(5, guided=False, cell=0.0038)
-    assert free[3:].mean() == pytest.approx(coarse[2:].mean(), rel=0.01)
-    assert free[4] == pytest.approx(free[3], rel=2e-3)
-    assert np.abs(motion.x[-1, :, 0, 1].mean()) < 1e-3 * free.sum() * 1e-3
+    """Straight on and steadily, with nothing that guides it.
+
+    Both scatter by 2 % with where the stations of a mesh come down, and not alike: means of two meshes are compared.
+    """
+    strides, guided = [], [coarse[2:].mean(), walk(4, cell=0.0028)[0][2:].mean()]
+    for cell in (0.0038, 0.0028):
+        free, motion = walk(4, guided=False, cell=cell)
+        assert free[3] == pytest.approx(free[2], rel=2e-3)
+        assert np.abs(motion.x[-1, :, 0, 1].mean()) < 1e-3 * free.sum() * 1e-3
+        strides.append(free[2:].mean())
+    assert np.mean(strides) == pytest.approx(np.mean(guided), rel=0.01)
+
+
+def test_free_strip_stretches_as_its_material_does():
+    """On any mesh: bars by the rule for triangles would make it 2.4 to 3.9 times as soft on cells of 3.8 to 1.9 mm."""
+    for cell in (0.0048, 0.0038, 0.0019):
+        s = read_calibration("crawler").replace(guided=False, cell=cell)
+        model, parameters, _ = crawler.build(s)
+        model = model.with_effects(
+            without=tuple(e for e in model.effects if e not in ("bars", "crease", "panel_bending"))
+        )
+        x, owner = crawler.stations(s)
+        middle, length = 0.5 * (x[1:] + x[:-1]), np.diff(x)
+        width = s.rear_width + (s.front_width - s.rear_width) * middle / x[-1]
+        patch = np.array([0.0, s.big_width, s.small_width])[owner]
+        axial = s.modulus * s.thickness * width + material("mae").modulus * s.patch_thickness * patch
+        exact = (length / axial)[1:].sum()  # the first cell is held
+        held = model.position[:, 0] < x[1] + 1e-9
+        free = np.flatnonzero(~np.repeat(held, 3))
+        k = tangent(model, parameters.for_model(model)).tocsc()
+        end = np.flatnonzero(model.position[:, 0] > x[-1] - 1e-9)
+        force = np.zeros(k.shape[0])
+        force[3 * end] = 0.5
+        u = np.zeros(len(force))
+        u[free] = spla.spsolve(k[free][:, free], force[free])
+        assert u[3 * end].mean() == pytest.approx(exact, rel=0.08)  # the taper's slant, and what the spokes carry
 
 
 def test_free_strip_is_the_same_on_its_left_and_right():

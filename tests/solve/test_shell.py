@@ -341,3 +341,26 @@ def test_the_gpu_finds_the_forces_of_the_cpu(cuda):
     for name, force in expected.forces.items():
         assert np.abs(found.forces[name] - force).max() <= 1e-11 * np.abs(force).max()
     assert np.abs(two.total_force(0.0) - one.total_force(0.0)).max() <= 1e-11 * np.abs(one.total_force(0.0)).max()
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 4, 1.2])
+def test_a_pulled_strip_stretches_as_its_material_does(angle):
+    """Tension along a strip cut from paper at an angle, on a random mesh: it contracts and shears by Hooke's law.
+
+    The stress is uniaxial, so that its free sides need no force, and its ends one of h b for a unit stress.
+    """
+    x, triangles = mesh("random", 16, 6, size=(1.0, 0.4))
+    e1, e2, nu, g = E, 0.4 * E, 0.3, 0.17 * E
+    first, second = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    model, parameters = plate(x, triangles, elasticity=orthotropic(e1, e2, nu, g), axis=(*first, 0))
+    s1, s2, s12 = first[0] ** 2, second[0] ** 2, first[0] * second[0]
+    shear = s12 / (2 * g) * (np.outer(first, second) + np.outer(second, first))
+    strain = (s1 / e1 - nu * s2 / e1) * np.outer(first, first) + (s2 / e2 - nu * s1 / e1) * np.outer(second, second)
+    moved = x.copy()
+    moved[:, :2] += 1e-3 * E * x[:, :2] @ (strain + shear)
+    report = Batch(model, parameters, Drive(), State.at_rest(model, 1, moved)).evaluate(0.0)
+    force = report.forces["shell_membrane"][:, 0] / (1e-3 * E)
+    end = x[:, 0] > 1 - 1e-9
+    beside = (x[:, 0] > 1e-9) & ~end
+    assert force[end].sum(axis=0) == pytest.approx([-THICKNESS * 0.4, 0.0, 0.0], rel=0.01, abs=4e-6)
+    assert np.abs(force[beside]).max() < 0.01 * np.abs(force).max()

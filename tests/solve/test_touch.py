@@ -1,6 +1,8 @@
 """Panels that touch: stacks, closed folds, rolls, what is kept and what is refused."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from effects.kit import random_rotation
 from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
 from origami_sim.bodies import rigid
+from origami_sim.cli import main
 from origami_sim.errors import InputError
 from origami_sim.materials import G
 from origami_sim.model import State, node_mass
@@ -324,3 +327,95 @@ def test_bad_input_is_refused_in_a_sentence():
         made(plates(0, 0.6))
     with pytest.raises(InputError, match="panel 0 and panel 1 overlap at the start"):
         made(plates(0, 0))
+
+
+def test_what_panels_touch_with_follows_from_their_material():
+    """A gram presses one pair of 1 mm PDMS 33 um deep; a corner that lands alone keeps exp(-pi zeta) of its speed.
+
+    Nearly, as contact does not pull: by integration of m dv/dt = max(-k (x + tau v), 0) until the corner leaves.
+    """
+    s = Sheet(plates(0, 5.0), thickness=1 * MM, triangulation="center").touch(friction=0.3)
+    model, parameters = s.build()
+    k = parameters["touch", "stiffness"][:, 0]
+    assert 1e-3 * G / k == pytest.approx(32.7e-6, rel=0.01)
+    assert parameters["touch", "thickness"] == pytest.approx(1 * MM)
+    assert parameters["touch_friction", "friction_coefficient"] == pytest.approx(0.3)
+    mass = parameters["inertia", "mass"][:, 0]
+    for t, corners in enumerate(model.triangles):
+        m, tau = mass[corners].mean(), parameters["touch", "loss_time"][t, 0]
+        dt, x, v = 1e-3 * math.sqrt(m / k[t]), 0.0, -1.0
+        while x <= 0:
+            v += dt / m * max(-k[t] * (x + tau * v), 0.0)
+            x += dt * v
+        assert v == pytest.approx(0.73, abs=0.02)
+    thin = Sheet(plates(0, 5.0), thickness=1 * MM).touch(thickness=0.4 * MM, stiffness=50.0).build()[1]
+    assert thin["touch", "thickness"] == pytest.approx(0.4 * MM) and thin["touch", "stiffness"] == pytest.approx(50.0)
+
+
+def test_layers_beside_a_crease_touch_at_a_fifth_of_their_way_along_the_sheet():
+    """A crease in a mesh much finer than the thickness folds to 157 degrees: 2 atan(5) (docs/contact.md).
+
+    Corners at a distance l from it are 2 l apart in the sheet and 2 l cos(fold / 2) in space.
+    """
+    for fold, touching in ((155.0, False), (159.0, True)):
+        model, parameters = made(strip([1 * MM] * 2, 8 * MM), thickness=4 * MM)
+        x = model.position - model.position[model.creases[0, 1]]
+        own = np.setdiff1d(of_panel(model, 1), of_panel(model, 0))
+        turned, a = x.copy(), math.radians(fold)
+        turned[own] = np.stack([x[own, 0] * math.cos(a), x[own, 1], x[own, 0] * math.sin(a)], axis=1)
+        report = Batch(model, parameters, Drive(), State.at_rest(model, position=turned)).evaluate(0.0)
+        assert (np.abs(report.forces["touch"]).max() > 0) == touching
+
+
+ROLL = '''
+from origami_sim import Sheet, strip
+
+DURATION = "0.3 s"
+
+def build(touch=False):
+    """Four panels that turn by 100 degrees each: the last one through the first."""
+    panels = "elastic" if touch else "rigid"
+    sheet = Sheet(strip([0.01] * 4, 0.02), thickness="0.5 mm", panels=panels).fix(panels=[0])
+    sheet.crease(stiffness="0.2 mN m/rad", rest_angle="100 deg", loss_time="20 ms")
+    return sheet.touch(stiffness="1 N/mm") if touch else sheet
+'''
+
+
+def pierced(x, triangles):
+    """Pairs of triangles without a common corner of which an edge of one passes through the other (Cramer's rule)."""
+
+    def through(edge, corners):
+        a, b = edge
+        rows = np.stack([b - a, corners[0] - corners[1], corners[0] - corners[2]], axis=1)
+        t, u, v = np.linalg.solve(rows, corners[0] - a) if abs(np.linalg.det(rows)) > 1e-15 else (-1.0, 0.0, 0.0)
+        return 0 < t < 1 and u > 0 and v > 0 and u + v < 1
+
+    edges = [(t[k], t[k - 1]) for t in triangles for k in range(3)]
+    return sum(
+        any(through(x[list(e)], x[q]) for e in edges[3 * i : 3 * i + 3])
+        or any(through(x[list(e)], x[p]) for e in edges[3 * j : 3 * j + 3])
+        for i, p in enumerate(triangles)
+        for j, q in enumerate(triangles[:i])
+        if not set(p) & set(q)
+    )
+
+
+def test_every_run_counts_the_pairs_that_pass_through_each_other(tmp_path, capsys):
+    """In what it prints, in its JSON and in its manifest; with contact there are none."""
+    device = tmp_path / "roll.py"
+    device.write_text(ROLL)
+
+    def ran(*options):
+        with pytest.raises(SystemExit) as end:
+            main(["run", str(device), "--out", str(tmp_path / "runs"), *options])
+        assert end.value.code == 0
+        return capsys.readouterr().out
+
+    said = json.loads(ran("--json"))
+    motion = load_run(said["folder"]).trajectory
+    expected = pierced(motion.x[-1, :, 0], motion.model.triangles.tolist())
+    assert expected > 0
+    assert said["crossing_pairs"] == expected
+    assert json.loads((Path(said["folder"]) / "manifest.json").read_text())["crossing_pairs"] == [expected]
+    assert f"{expected} pairs of triangles through each other" in ran()
+    assert json.loads(ran("--json", "--set", "touch=true"))["crossing_pairs"] == 0
