@@ -20,11 +20,13 @@ class Hyper:
         steep: probability of each of them, as a power of one over it: large effects are rarer than small ones.
         effects: probability of one more effect, given those that are there.
         most: effects in a set, at most.
-        gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment.
+        gaps: sizes of forces that the model lacks, as a part of the rates that they change within a segment; each as
+            probable as one over it. Chance forces of a thousandth would hide a small, lasting one.
+        least: size of such forces up to which nothing is said to be missing.
         smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
             Where each is as large as an effect that stands out by itself, nothing would be named.
-        fewer: probability of each size over that of the next smaller one: of gaps, of smooth, and of flaws.
+        fewer: probability of each size over that of the next smaller one: of smooth, and of flaws.
         unlisted: odds that what one effect of the catalogue explains is done by a law that the catalogue lacks.
         imitated: times as large for each further effect that it takes: several laws together can look like most others.
     """
@@ -33,7 +35,8 @@ class Hyper:
     steep: float = 0.5
     effects: float = 0.3
     most: int = 5
-    gaps: tuple[float, ...] = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+    gaps: tuple[float, ...] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+    least: float = 1e-3
     smooth: tuple[float, ...] = (0.0, 1.0, 10.0, 100.0)
     flaws: tuple[float, ...] = (2.0, 8.0)
     fewer: float = 0.3
@@ -54,14 +57,14 @@ class Hyper:
     @cached_property
     def log_cells(self) -> np.ndarray:
         """Log prior of each of them."""
-        parts = [np.arange(len(v)) * np.log(self.fewer) for v in (self.gaps, self.smooth, self.flaws)]
+        parts = [-np.log(self.gaps), *(np.arange(len(v)) * np.log(self.fewer) for v in (self.smooth, self.flaws))]
         parts = [p - np.log(np.sum(np.exp(p))) for p in parts]
         return np.array([a + b + c for a, b, c in product(*parts)])
 
     @cached_property
     def clean(self) -> np.ndarray:
         """Whether a cell has next to no discrepancy, of forces or of channels."""
-        return np.array([gap <= self.gaps[0] and smooth == 0.0 for gap, smooth, _ in self.cells])
+        return np.array([gap <= self.least and smooth == 0.0 for gap, smooth, _ in self.cells])
 
     def foreign(self, effects: int) -> float:
         """Probability that what so many effects explain together is done by a law that the catalogue lacks."""

@@ -67,12 +67,12 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
 
     What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
     all numbers refitted. Noise is what the best explanation leaves once forces that are missing are allowed for, up to
-    what the recorder shows; the budget allows for none.
+    what the recorder shows; the budget allows for next to none.
     """
     assert best.weights is not None
     recorder, over = recorder_noise(forward, best), over_noise(forward, best)
     level = np.minimum(best.weights.deviation, recorder)
-    noise = Weights(level, best.weights.colour, HYPER.gaps[0])
+    noise = Weights(level, best.weights.colour, HYPER.least)
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
     def missed(f: Fit) -> float:

@@ -62,10 +62,10 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     effects = [t[:, own.columns] for t in line.tangent]
     laid = own.sets(len(own.columns))
     log = []
-    for k, gap in enumerate(hyper.gaps):
+    for gap in hyper.gaps:
         now, theirs = regapped(line, effects, f.weights, gap)
         cell = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, 0.0)
-        log.append(cell.of(laid, hyper)[0][0] + k * np.log(hyper.fewer))
+        log.append(cell.of(laid, hyper)[0][0] - np.log(gap))
     return hyper.gaps[int(np.argmax(log))]
 
 

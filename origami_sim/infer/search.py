@@ -54,7 +54,7 @@ CELLS = 8
 MANY = 200
 """Sets beyond which only these cells are looked at."""
 
-TIGHT = 1e-3
+TIGHT = 1e-4
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
 
 

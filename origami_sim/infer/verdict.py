@@ -80,11 +80,13 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     classes = by_effects(p, chance)
     top = max(classes, key=lambda c: classes[c])
     lead, beside = surely(classes)
-    best = best_of(p, chance, lead or top)
-    may_be, total = (beside, sum(classes[c] for c in beside)) if beside else credible(classes)
+    best = best_of(p, chance, top if beside else lead or top)
+    may_be, total = credible(classes)
+    if beside:
+        may_be, total = beside, sum(v for c, v in classes.items() if any(c >= b for b in beside))
     left = budgets(best)
     named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
-    foreign = p.hyper.foreign(laws(lead)) if lead else imitated(p, chance, named)
+    foreign = p.hyper.foreign(laws(beside[0] if beside else lead)) if lead else imitated(p, chance, named)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
         return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), foreign)
@@ -154,8 +156,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []
         )
-        likely = [c for c in d.credible[:4] if classes[c] > 1.0 - CREDIBLE] or d.credible[:1]
-        each = [f"{_name(c)} (p = {classes[c]:.2f})" for c in likely]
+        chances = {c: holding(classes, c) if c > d.lead else classes[c] for c in d.credible}
+        likely = [c for c in d.credible[:4] if chances[c] > 1.0 - CREDIBLE] or d.credible[:1]
+        each = [f"{_name(c)} (p = {chances[c]:.2f})" for c in likely]
         rest = len(d.credible) - len(each)
         more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
         text = f"These recordings do not decide between {joined(each)}{more}. "
@@ -255,9 +258,9 @@ def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
 
 
 def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
-    """Effects that act together with at least `ALONE`; and the few explanations that add to them, if one surely does.
+    """Effects that act together with at least `ALONE`; and with what else, if one of a few surely acts besides.
 
-    What is added is listed where `LISTED` explanations or fewer hold `ALONE`.
+    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them.
     """
     marginal = of_each(classes)
     lead: frozenset[str] = frozenset()
@@ -266,11 +269,18 @@ def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[f
         if sum(v for c, v in classes.items() if c >= larger) < ALONE:
             break
         lead = larger
-    likely = sorted((c for c in classes if c > lead), key=lambda c: -classes[c])[:LISTED]
-    for n in range(1, len(likely) + 1 if lead else 1):
-        if sum(classes[c] for c in likely[:n]) >= ALONE:
-            return lead, likely[:n]
+    more = {c - lead: v for c, v in classes.items() if c >= lead}
+    chance = of_each(more)
+    likely = sorted(chance, key=lambda e: (-chance[e], e))[:LISTED]
+    for n in range(2, len(likely) + 1 if lead else 1):
+        if sum(v for c, v in more.items() if c & set(likely[:n])) >= ALONE:
+            return lead, [lead | {e} for e in likely[:n]]
     return lead, []
+
+
+def holding(classes: dict[frozenset[str], float], effects: frozenset[str]) -> float:
+    """Posterior of effects, whatever acts besides; of none, that nothing does."""
+    return sum(v for c, v in classes.items() if c >= effects) if effects else classes.get(effects, 0.0)
 
 
 def _besides(classes: dict[frozenset[str], float], lead: frozenset[str]) -> list[tuple[str, float]]:
