@@ -64,7 +64,7 @@ def test_the_missing_friction_is_found_and_all_files_are_there(diagnosed):
     assert read_report(folder / "report.html")["diagnosis"] == data
     # held-out error at the noise, which is known here, where that of the refitted model is far above
     assert data["error_after"][0] == pytest.approx(NOISE, rel=0.15)
-    assert data["error_refitted"][0] > 3 * NOISE
+    assert data["error_refitted"][0] > 2.5 * NOISE
 
 
 def test_the_patched_calibration_switches_the_effect_on(diagnosed, recorded, tmp_path, capfd):
