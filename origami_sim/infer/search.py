@@ -403,6 +403,7 @@ def _judge(
         if key in out.nodes and key and key < node.key and key not in out.renewed:
             if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
                 out.renewed.add(key)
+                out.hoped.pop(out.labels(key), None)
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
             continue
