@@ -9,7 +9,7 @@ from origami_sim.diagnose.inertia import calmer, inertia
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
-from origami_sim.fit.least_squares import linearise
+from origami_sim.fit.least_squares import linearise, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
@@ -226,7 +226,7 @@ def _absorbed(bars: Predictor, rigid: Predictor, local: np.ndarray) -> float:
         gaps.append(line.padded(n, change))
     if not all(np.all(np.isfinite(g)) for g in gaps):
         return np.inf
-    prior = np.diag([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
+    prior = np.diag(precision(free))
     a = np.concatenate([*line.cleared(line.tangent), prior])
     y = np.concatenate([*line.cleared(gaps), np.zeros(len(free))])
     x, *_ = np.linalg.lstsq(a, y, rcond=1e-10)

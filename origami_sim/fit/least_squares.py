@@ -434,7 +434,7 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     cleared, starts = line.explained([np.column_stack(p) for p in zip(line.tangent, line.residual, strict=True)])
     whole = np.concatenate(cleared)
     if width:
-        prior = _precision(free)
+        prior = precision(free)
         a = np.concatenate([whole[:, :-1], np.diag(prior)])
         right = prior * (np.array([f.start for f in free]) - theta) / scale
         y = np.concatenate([whole[:, -1], right])
@@ -452,7 +452,7 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     return change, moves, promised
 
 
-def _precision(free: Sequence[Free]) -> np.ndarray:
+def precision(free: Sequence[Free]) -> np.ndarray:
     """(P,) scales over the standard deviations of what was known before."""
     return np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
 
@@ -488,7 +488,7 @@ def _covariance(free: Sequence[Free], line: Linearisation) -> np.ndarray:
     if not line.tangent[0].shape[1]:
         return np.zeros((len(free), len(free)))
     scale = np.array([f.scale for f in free])
-    a = np.concatenate([*line.cleared(line.tangent), np.diag(_precision(free))])
+    a = np.concatenate([*line.cleared(line.tangent), np.diag(precision(free))])
     return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
 
 

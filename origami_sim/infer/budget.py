@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
@@ -135,7 +135,7 @@ def _without(f: Fit, line: Linearisation, lacking: list[int], ends: np.ndarray) 
         line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
     )
     tangent, left = whole[:, :-1], whole[:, -1] + whole[:, :-1] @ back
-    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+    prior = precision(f.free)
     away = prior * (np.array([n.start for n in f.free]) - f.theta) / scale
     a = np.concatenate([tangent[:, ~gone], np.diag(prior)[:, ~gone]])
     y = np.concatenate([left, np.where(gone, 0.0, away)])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.recording import Recording
 
@@ -37,7 +37,7 @@ def held_out(forward: Predictor, f: Fit) -> HeldOut:
     width = line.tangent[0].shape[1]
     cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
     scale = np.array([n.scale for n in f.free])
-    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+    prior = precision(f.free)
     away = prior * ((np.array([n.start for n in f.free]) - f.theta) / scale)
     low = (np.array([n.lower for n in f.free]) - f.theta) / scale
     high = (np.array([n.upper for n in f.free]) - f.theta) / scale

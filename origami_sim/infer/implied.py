@@ -10,7 +10,7 @@ import numpy as np
 from origami_sim.fit.evidence import Group, Sets, problem, summed
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.hypothesis import usual
-from origami_sim.fit.least_squares import Fit, smoothed
+from origami_sim.fit.least_squares import Fit, precision, smoothed
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import residual_process
@@ -80,7 +80,7 @@ class OwnColumns:
     def __init__(self, f: Fit):
         self.nominal = np.arange(len(f.free) - len(f.hypothesis.free))
         scale = np.array([n.scale for n in f.free])
-        self.precision = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+        self.precision = precision(f.free)
         self.away = (np.array([n.start for n in f.free]) - f.theta) / scale
         self.columns: list[int] = []
         self.groups: list[Group] = []

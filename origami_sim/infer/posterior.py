@@ -129,7 +129,11 @@ class Posterior:
 
     def imitates(self, key: Key) -> bool:
         """Whether a set is of so many laws that they rather imitate one which the catalogue lacks."""
-        return self.hyper.foreign(laws({self.suspect(n).effect for n in key})) > 0.5
+        return self.hyper.foreign(laws(self.effects(key))) > 0.5
+
+    def effects(self, key: Key) -> frozenset[str]:
+        """What acts in a set, wherever it does."""
+        return frozenset(self.suspect(n).effect for n in key)
 
     def suspect(self, n: int) -> Suspect:
         return self.signatures[n].suspect

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.fit.least_squares import UTMOST, Fit, changed
+from origami_sim.fit.least_squares import UTMOST, Fit, changed, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.screen import Signature
@@ -69,7 +69,7 @@ class Cleared:
         line = f.reweighted(weights).linear
         assert line is not None
         self.line, self.scale = line, np.array([n.scale for n in f.free])
-        prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 0.0 for n in f.free])
+        prior = precision(f.free)
         self.away = prior * (np.array([n.start for n in f.free]) - f.theta) / self.scale
         self.q, self.r = np.linalg.qr(np.concatenate([*line.cleared(line.tangent), np.diag(prior)]))
 

@@ -28,7 +28,7 @@ from origami_sim.infer.budget import Budget, Share, budget
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.search import enter, log_priors, place
-from origami_sim.infer.verdict import COMPARED, best_of, considered, decide, unnamed_verdict
+from origami_sim.infer.verdict import COMPARED, best_of, decide, unnamed_verdict
 
 NULL = 1e-9
 """Part of the largest eigenvalue of the discrepancy's columns below which an axis is nothing but rounding."""
@@ -161,8 +161,7 @@ class Stored:
         elif word == "UNKNOWN":
             chosen = [p.label(d.best)]
         elif d.tie:
-            chance = considered(p)
-            chosen = [p.label(best_of(p, chance, c)) if c else "nominal" for c in d.credible]
+            chosen = [p.label(best_of(p, d.chance, c)) if c else "nominal" for c in d.credible]
         elif word != "UNTESTABLE":
             chosen = [p.suspect(n).label for n in d.best if p.suspect(n).effect in d.lead]
         return {"verdict": word, "chosen": chosen, "probability": probability}

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
 from origami_sim.infer.discrepancy import laws, of_recorder
@@ -58,7 +58,8 @@ class Decision:
     Attributes:
         word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
         credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
-            named, or of them. foreign: that a law which the catalogue lacks is imitated by them.
+            named, or of them. chance: posterior of the sets that may be named, see `considered`. foreign: that a law
+            which the catalogue lacks is imitated by them.
     """
 
     word: str
@@ -67,7 +68,8 @@ class Decision:
     credible: list[frozenset[str]]
     tie: bool
     probability: float
-    foreign: float = 0.0
+    chance: dict[Key, float]
+    foreign: float
 
 
 def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
@@ -89,7 +91,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     foreign = p.hyper.foreign(laws(beside[0] if beside else lead)) if lead else imitated(p, chance, named)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
-        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), foreign)
+        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, foreign)
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
@@ -111,8 +113,7 @@ def considered(p: Posterior) -> dict[Key, float]:
     most, of the fitted sets, and what those leave is real and not named.
     """
     chance = p.probabilities()
-    best = max(chance, key=lambda k: chance[k])
-    if not p.imitates(best):
+    if not p.imitates(max(chance, key=lambda k: chance[k])):
         return chance
     return p.probabilities(among=[k for k in p.nodes if not p.imitates(k)])
 
@@ -131,13 +132,13 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return budgets[key]
 
     d = decide(p, budgeted)
-    chance = considered(p)
-    more_laws = len(chance) < len(p.total)
+    chance = d.chance
+    more_laws = len(chance) < len(p.total)  # only some may be named
     classes = by_effects(p, chance)
     shown, explained = widened(p, d.best), _explained(budgeted(d.best))
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
-    others = [widened(p, k) for k in ranked if class_of(p, k) != d.lead]
+    others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
     common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares}
     suspects = shown.hypothesis.suspects
     chosen = [s.label for s in suspects]
@@ -222,7 +223,7 @@ def odds_of_numbers(given: Fit, base: Fit) -> float:
     assert line is not None
     if not line.tangent[0].shape[1]:
         return -np.inf
-    prior = np.array([n.scale / n.spread if np.isfinite(n.spread) else 1e-6 for n in base.free])
+    prior = np.maximum(precision(base.free), 1e-6)  # nothing is known to better than that of those without a prior
     a = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])
     size = np.abs(np.diag(np.linalg.qr(a, mode="r")))
     return float(0.5 * (given.misfit - base.cost) - np.sum(np.log(size / prior)))
@@ -232,18 +233,14 @@ def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], f
     """Posterior of each set of effects, wherever they act."""
     out: dict[frozenset[str], float] = {}
     for key, value in chance.items():
-        c = class_of(p, key)
+        c = p.effects(key)
         out[c] = out.get(c, 0.0) + value
     return out
 
 
-def class_of(p: Posterior, key: Key) -> frozenset[str]:
-    return frozenset(p.suspect(n).effect for n in key)
-
-
 def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
     """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
-    mine = [(value, c) for key, value in chance.items() if (c := class_of(p, key)) in classes]
+    mine = [(value, c) for key, value in chance.items() if (c := p.effects(key)) in classes]
     total = sum(value for value, _ in mine)
     return sum(value * p.hyper.foreign(laws(c)) for value, c in mine) / total if total else 0.0
 
@@ -294,7 +291,7 @@ def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> 
     """The most probable fitted set of these effects; or else of these and others, or else of any."""
     if not effects:
         return frozenset()
-    classes = {k: class_of(p, k) for k in p.nodes}
+    classes = {k: p.effects(k) for k in p.nodes}
     mine = [k for k, c in classes.items() if c == effects]
     mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
     return max(mine, key=lambda k: chance.get(k, 0.0))
@@ -359,7 +356,7 @@ def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], bes
     """Where else the same effects may act, in words."""
     where: dict[str, float] = {}
     for key, value in chance.items():
-        if class_of(p, key) >= lead:
+        if p.effects(key) >= lead:
             name = joined(sorted({p.suspect(n).label for n in key if p.suspect(n).effect in lead}))
             where[name] = where.get(name, 0.0) + value
     least = (1.0 - CREDIBLE) * sum(where.values())
