@@ -78,19 +78,22 @@ def search(
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     if given is not None and strained(base):
-        by = level(forward, base)
-        given = fit(forward, Hypothesis(), by, local=given.local, most=0)  # with derivatives by its numbers
-        suspects = [s.suspect for s in signatures]
-        about = {(s.suspect.label, s.suspect.free[1:]): s for s in screen(forward, suspects, given, by)}
-        alone = [k for k in out.estimates if len(k) == 1]
-        names = [(s.label, s.free[1:]) for s in (out.suspect(n) for k in alone for n in k)]
-        known = [(k, about[name]) for k, name in zip(alone, names, strict=True) if name in about]
-        found = from_given_numbers(forward, [s for _, s in known], given, base, by)
-        _promised(out, [k for k, _ in known], found)
+        _about_given(out, forward, base, given)
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
         extended(out, forward, progress=progress, most=most)
     return out
+
+
+def _about_given(out: Posterior, forward: Predictor, base: Fit, given: Fit) -> None:
+    """Enters what single effects promise about the model as given, where the refit left its numbers' priors."""
+    by = level(forward, base)
+    given = fit(forward, Hypothesis(), by, local=given.local, most=0)  # with derivatives by its numbers
+    about = screen(forward, [s.suspect for s in out.signatures], given, by)
+    of = {(s.suspect.label, s.suspect.free[1:]): s for s in about}  # their strengths have another scale here
+    alone = {k: of.get((s.label, s.free[1:])) for k in out.estimates if len(k) == 1 for s in map(out.suspect, k)}
+    known = {k: s for k, s in alone.items() if s is not None}
+    _promised(out, list(known), from_given_numbers(forward, list(known.values()), given, base, by))
 
 
 def reconsidered(
