@@ -123,7 +123,7 @@ def diagnose(
     noted = list(dict.fromkeys([*judged.notes, *noted]))
     nowhere, left_out = np.full(len(forward.components), np.nan), "Held-out error could not be told"
     errors = {
-        key: attempt(noted, left_out, lambda f=node.fit: held_out(forward, f).rms, nowhere)
+        key: attempt(noted, left_out, lambda f=node.fit: held_out(forward, f, weights).rms, nowhere)
         for key, node in posterior.nodes.items()
     }
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)

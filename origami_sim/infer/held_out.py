@@ -8,6 +8,7 @@ from scipy.optimize import lsq_linear
 
 from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 from origami_sim.recording import Recording
 
 FOLDS = 5
@@ -29,10 +30,16 @@ class HeldOut:
     folds: np.ndarray
 
 
-def held_out(forward: Predictor, f: Fit) -> HeldOut:
-    """Errors with numbers from all other folds, by one Gauss-Newton step from the full fit; starts are adapted."""
+def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
+    """Errors with numbers from all other folds, by one Gauss-Newton step from the full fit; starts are adapted.
+
+    Args:
+        alike: the noise, and the gaps between segments, to which starts are adapted: the same for all that is compared.
+            In noise of its own, a model that is far off may leave its segments freely, and a good one may not.
+    """
     line, weights = f.linear, f.weights
     assert line is not None and weights is not None
+    judged = line.reweighted(weights, alike)
     dims = len(weights.deviation)
     width = line.tangent[0].shape[1]
     cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
@@ -52,11 +59,11 @@ def held_out(forward: Predictor, f: Fit) -> HeldOut:
             y = np.concatenate([y, np.zeros(width)])
             q, r = np.linalg.qr(a)
             step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
-        left = line.smoothed([r - t @ step for r, t in zip(line.residual, line.tangent, strict=True)])
+        left = judged.smoothed([r - t @ step for r, t in zip(judged.residual, judged.tangent, strict=True)])
         own, count = np.zeros(dims), np.zeros(dims)
         for n in part:
             block = forward.blocks[f.blocks[n]]
-            r = weights.restored(left[n][line.data(n)], line.rows[n])
+            r = alike.restored(left[n][judged.data(n)], judged.rows[n])
             own += np.sum(np.where(block.seen(), r, 0.0) ** 2, axis=0)
             count += block.seen().sum(axis=0)
         folds_.append(float(np.mean(own / np.maximum(count, 1) / forward.blocks[0].noise ** 2)))

@@ -1,17 +1,18 @@
-"""Coarse scans of the strength of an effect, from the numbers that a model was given.
+"""Coarse scans of the numbers of an effect, where linear estimates do not lead to the best fit.
 
 A model that lacks a strong effect follows it with numbers that are no fault of theirs, and from there no fit finds the
-effect: dry friction that holds a crease back is as a weaker magnet.
+effect: dry friction that holds a crease back is as a weaker magnet. And a number beside a strength, such as the angle
+at which friction yields, may have several values from which a fit goes no further.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
 from scipy.stats import chi2
 
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.fit.least_squares import UTMOST, Fit, changed, precision
+from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
+from origami_sim.fit.least_squares import SLOWEST, UTMOST, Fit, changed, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.screen import Signature
@@ -62,16 +63,26 @@ def scanned(
     return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None
 
 
-class Cleared:
-    """Whitened residuals of a fit, and changes of them, without what its starts and numbers explain."""
+SHAPES = 7
+"""Values of a number beside a strength that are tried, over what is plausible: 2.2 times apart for a factor of 100."""
 
-    def __init__(self, f: Fit, weights: Weights):
+
+class Cleared:
+    """Whitened residuals of a fit, and changes of them, without what its starts and numbers explain.
+
+    Args:
+        held: numbers of the fit that are not to explain anything.
+    """
+
+    def __init__(self, f: Fit, weights: Weights, held: Collection[int] = ()):
         line = f.reweighted(weights).linear
         assert line is not None
         self.line, self.scale = line, np.array([n.scale for n in f.free])
         prior = precision(f.free)
         self.away = prior * (np.array([n.start for n in f.free]) - f.theta) / self.scale
-        self.q, self.r = np.linalg.qr(np.concatenate([*line.cleared(line.tangent), np.diag(prior)]))
+        self.moved = np.array([n for n in range(len(f.free)) if n not in held], int)
+        columns = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])[:, self.moved]
+        self.q, self.r = np.linalg.qr(columns)
 
     def whole(self, columns: list[np.ndarray], *, away: bool) -> np.ndarray:
         """[rows, K] of columns [r, K] per segment, with what is known of the numbers below if they are residuals."""
@@ -81,6 +92,10 @@ class Cleared:
     def rest(self, whole: np.ndarray) -> np.ndarray:
         """[rows, K] without what numbers explain."""
         return whole - self.q @ (self.q.T @ whole)
+
+    def explaining(self, whole: np.ndarray) -> np.ndarray:
+        """Changes of the numbers that are not held, over their scales, that explain (rows,)."""
+        return np.linalg.lstsq(self.r, self.q.T @ whole, rcond=1e-10)[0]
 
     def squares(self, residual: list[np.ndarray]) -> np.ndarray:
         """Squares (K,) of residuals [r, K] that no starts and numbers explain."""
@@ -121,7 +136,7 @@ def from_given_numbers(
         mine = about.rest(change[:, None])[:, 0]
         strength = np.clip(mine @ rest / max(mine @ mine, 1e-300), *np.concatenate(s.bounds))
         left = float(np.sum((rest - strength * mine) ** 2))
-        moved = np.linalg.lstsq(about.r, about.q.T @ (residual - strength * change), rcond=1e-10)[0]
+        moved = about.explaining(residual - strength * change)
         numbers = np.clip(given.theta + moved * about.scale, low, high)
         first, *others = s.suspect.free
         theta = np.array([*numbers, first.start + strength * s.size, *(f.start for f in others)])
@@ -160,6 +175,46 @@ def over_their_range(
         best = int(np.argmin(left))
         gain = gained(forward, base, about.missed, left[best])
         yield (thetas[1 + best], gain) if gain > 0.0 else None
+
+
+def over_shapes(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarray, float] | None:
+    """The numbers (P,) of a fit with another value of one beside a strength, and the log likelihood that this gains.
+
+    What a value changes is simulated; starts and other numbers follow linearly. None where no other value gains any.
+    """
+    own = len(forward.subject.nominals)
+    every = [(s, n) for s in f.hypothesis.suspects for n in s.free]
+    least, found = forward.step(f.hypothesis, f.theta) / SLOWEST, None
+    low, high = np.array([(n.lower, n.upper) for n in f.free]).T
+    for k, (s, n) in enumerate(every, start=own):
+        if n in s.strengths:
+            continue
+        thetas = np.repeat(f.theta[None], 1 + SHAPES, axis=0)
+        thetas[1:, k] = over_what_is_plausible(n)
+        thetas = np.array([thetas[0], *(t for t in thetas[1:] if forward.step(f.hypothesis, t) >= least)])
+        shot = forward.shoot(f.hypothesis, thetas, np.repeat(f.local[None], len(thetas), axis=0), f.blocks)
+        parts = changed(forward, shot, weights, f.blocks)
+        about = Cleared(f, weights, held=[k])
+        whole = about.whole([r[:, None] - c.T for r, c in zip(about.line.residual, parts, strict=True)], away=True)
+        left = np.sum(about.rest(whole) ** 2, axis=0)
+        if not np.any(np.isfinite(left)):
+            continue
+        best = int(np.nanargmin(left))
+        gain = gained(forward, f, about.missed, left[best])
+        if gain > (found[1] if found else 0.0):
+            theta = thetas[1 + best]
+            theta[about.moved] += about.explaining(whole[:, best]) * about.scale[about.moved]
+            found = np.clip(theta, low, high), gain
+    return found
+
+
+def over_what_is_plausible(shape: Free) -> np.ndarray:
+    """(SHAPES,) values of a number beside a strength, evenly in their logarithm if it has one sign."""
+    if shape.lower >= 0.0 and shape.start > 0.0:
+        ends = max(shape.lower, shape.start / PLAUSIBLE), min(shape.upper, shape.start * PLAUSIBLE)
+        return np.geomspace(*ends, SHAPES)
+    far = PLAUSIBLE * shape.scale
+    return np.linspace(max(shape.lower, shape.start - far), min(shape.upper, shape.start + far), SHAPES)
 
 
 def over_range(strength: Free) -> np.ndarray:

@@ -29,7 +29,7 @@ from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
 from origami_sim.infer.nominal import level
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
-from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
+from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.threads import side_by_side
 
@@ -163,20 +163,19 @@ def extended(
     return out
 
 
-def _likely(out: Posterior) -> Key | None:
-    """The set to fit next: that which promises most, if it may hold much of the posterior.
+def _named(out: Posterior) -> list[Key]:
+    """The fitted sets of which one may be named, once others are known.
 
-    Where the best set is of so many laws that they rather imitate another, few are to be named: then also of these.
+    Where the best set is of so many laws that they rather imitate another, none of its kind is: it suffices to know it.
     """
-    key = _likely_among(out, list(out.nodes), list(out.estimates))
-    if key is None and out.imitates(max(out.nodes, key=lambda k: out.total[k])):
-        few = ([k for k in keys if not out.imitates(k)] for keys in (out.nodes, out.estimates))
-        key = _likely_among(out, *few)
-    return key
+    few = [k for k in out.nodes if not out.imitates(k)]
+    return few if out.imitates(max(out.nodes, key=lambda k: out.total[k])) else list(out.nodes)
 
 
-def _likely_among(out: Posterior, fitted: list[Key], others: list[Key]) -> Key | None:
-    """Of sets that were not fitted, that which promises most, if it may be as probable as the best of the fitted."""
+def _likely(out: Posterior) -> Key | None:
+    """The set to fit next: of those that may be named that which promises most, if it may be as probable as any."""
+    fitted = _named(out)
+    others = out.estimates if len(fitted) == len(out.nodes) else [k for k in out.estimates if not out.imitates(k)]
     least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
     doubts = {k: min(0.0, _most(gains)) for k, gains in out.gains.items() if len(gains) > 1}
     unfitted = {k: _promise(out, k) + doubts.get(out.estimates[k].parent, 0.0) for k in others}
@@ -229,15 +228,14 @@ def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
 def polished(out: Posterior, forward: Predictor) -> bool:
     """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
 
-    Leaders are those that hold part of the posterior, or would if they gained as much as others did; and the same of
-    sets of few laws, where more of them rather imitate one that the catalogue lacks.
+    Leaders are those of the sets that may be named that hold part of the posterior, or would if they gained as much as
+    others did.
     """
     prior, some = log_priors(out.signatures), False
     while True:
-        near = np.log(UNFITTED) - max(0.0, _most(list(out.polished.values())))
-        few = [k for k in out.nodes if not out.imitates(k)]
-        least = {k: max(out.total[k] for k in among) + near for among in (out.nodes, few) for k in among}
-        leaders = [k for k in out.nodes if out.total[k] >= least[k] and k not in out.polished]
+        fitted = _named(out)
+        least = max(out.total[k] for k in fitted) + np.log(UNFITTED) - max(0.0, _most(list(out.polished.values())))
+        leaders = [k for k in fitted if out.total[k] >= least and k not in out.polished]
         if not leaders:
             return some
         key, some = max(leaders, key=lambda k: out.total[k]), True
@@ -494,7 +492,18 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
-        return fit(forward, hypothesis, by, theta=given, local=parent.local)
+        return _elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local))
     # derivatives by the numbers of the model and by starts hardly change with an effect
     near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
-    return fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
+    return _elsewhere(forward, fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near))
+
+
+def _elsewhere(forward: Predictor, f: Fit) -> Fit:
+    """A fit, or a better one from another value of a number beside a strength, which may lie beyond a ridge."""
+    if f.failed or f.weights is None:
+        return f
+    found = over_shapes(forward, f, f.weights)
+    if found is None or found[1] < OWED:
+        return f
+    other = fit(forward, f.hypothesis, f.weights, theta=found[0], local=f.local)
+    return other if not other.failed and other.cost < f.cost else f

@@ -147,7 +147,7 @@ def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
     angle, rate, missing = _samples(forward, motions_of(forward, base), 0, [0])
     assert np.ptp(angle) == pytest.approx(np.ptp(made.angles[:, 0, 0]), rel=0.1)
     assert np.polyfit(rate, missing, 1)[0] == pytest.approx(-9.8e-5, rel=0.1)
-    refitted, *others = baselines(forward, base, weights, held_out(forward, base).rms)
+    refitted, *others = baselines(forward, base, weights, held_out(forward, base, weights).rms)
     assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(refitted.rms) for b in others)
 
 

@@ -19,6 +19,7 @@ from origami_sim.fit.least_squares import fit
 from origami_sim.infer.held_out import folds, held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals
+from origami_sim.infer.scan import over_shapes
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
 from origami_sim.recording import DriveChannel, Recording
@@ -65,6 +66,31 @@ def test_the_effect_its_site_and_its_strength_are_found(found, rubbing):
     assert numbers["crease_friction.friction_moment"] == pytest.approx(2e-5, rel=0.2)
     assert missed(rubbing[0], f) < 1.1 and missed(rubbing[0], rubbing[2]) > 10.0
     assert marginals(found)["crease_friction at crease 1"] > 0.5
+
+
+def test_another_yield_angle_is_found_about_a_fit_that_ended_with_a_wrong_one(found, rubbing):
+    forward, _, _, weights, _ = rubbing
+    best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
+    right = fit(forward, best.hypothesis, weights, theta=best.theta, local=best.local)
+    assert (over_shapes(forward, right, weights) or (0, 0.0))[1] < 1.0
+    (one,) = best.hypothesis.suspects
+    held = tuple(replace(f, lower=0.0299) if f.name == "yield_angle" else f for f in one.free)
+    begin = np.append(best.theta[:-1], 0.03)
+    wrong = fit(forward, Hypothesis((replace(one, free=held),)), weights, theta=begin, local=best.local)
+    stuck = replace(wrong, hypothesis=best.hypothesis, free=best.free)
+    assert stuck.theta[-1] == pytest.approx(0.03, rel=0.01)
+    theta, gain = over_shapes(forward, stuck, weights)
+    assert gain > 10.0 and theta[-1] < 0.02
+    assert fit(forward, best.hypothesis, weights, theta=theta, local=best.local).cost < 1.01 * right.cost < stuck.cost
+
+
+def test_what_is_held_out_is_judged_in_one_noise_for_all(found, rubbing):
+    """A good fit in tight noise of its own, and in that of the model it is compared with."""
+    forward, _, base, weights, _ = rubbing
+    best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
+    one, other = (held_out(forward, f, weights).rms for f in (best, best.reweighted(weights)))
+    assert one == pytest.approx(other, rel=0.1)
+    assert np.all(one < 0.5 * held_out(forward, base, weights).rms)
 
 
 def test_nothing_is_found_of_a_strip_as_it_is():
@@ -139,7 +165,7 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
         for n, (r, t) in enumerate(zip(line.residual, line.tangent, strict=True))
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
-    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=asks)))
+    left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=asks)), base.weights)
     assert len(left.folds) == 5 and left.folds[0] > 3.0 * max(left.folds[1:])
 
 
@@ -169,7 +195,7 @@ def test_recordings_of_one_drive_level_are_held_out_together(levels, parts):
 def test_baselines_are_left_out_where_nothing_is_left_to_learn_from():
     forward, _ = arranged(subject(3), [record(**SMALL)], Options(start="fit", segment=99.0))
     _, base, weights = nominal_fits(forward)
-    refitted, *others = baselines(forward, base, weights, held_out(forward, base).rms)
+    refitted, *others = baselines(forward, base, weights, held_out(forward, base, weights).rms)
     assert np.all(np.isfinite(refitted.rms))
     assert others and all(np.all(np.isnan(b.rms)) and "two halves" in b.note for b in others)
 
