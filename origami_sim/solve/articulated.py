@@ -41,6 +41,8 @@ class Tree:
     rates: int
     rows: int
     follows: int  # 1: the root turns about its own centre
+    first_body: int  # that moves: 1 where the root is held, of which all stays as it is
+    first_number: int  # of the coordinates that changes: then the first joint's angle
     parent: wp.array(dtype=wp.int32)  # [B]
     body_of: wp.array(dtype=wp.int32)  # [N] body that carries a node
     joint_of: wp.array(dtype=wp.int32)  # [C] joint of a crease, -1 where it closes a loop
@@ -230,6 +232,9 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
     for row in range(X.shape[0]):
         n = row & NATURAL
         b = tree.body_of[n]
+        F[n, w] = zero
+        if b < tree.first_body:
+            continue
         if b != body:  # nodes of a body mostly follow each other
             body = b
             own = mat_at(s, o + tree.turned + 9 * b)
@@ -239,7 +244,6 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         x = own * vec_at(s, o + tree.reference + 3 * n) + place
         X[n, w] = x
         V[n, w] = speed + wp.cross(omega, x - origin)
-        F[n, w] = zero
 
 
 @wp.func
@@ -260,6 +264,8 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
     for row in range(X.shape[0]):
         n = row & NATURAL
         b = tree.body_of[n]
+        if b < tree.first_body:
+            continue
         if b != body:  # nodes of a body mostly follow each other
             put_vec(s, o + tree.force + 3 * body, pull)
             put_vec(s, o + tree.moment + 3 * body, torque)
@@ -271,7 +277,7 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
         torque = torque + wp.cross(X[n, w] - origin, f)
     put_vec(s, o + tree.force + 3 * body, pull)
     put_vec(s, o + tree.moment + 3 * body, torque)
-    for b in range(tree.bodies):
+    for b in range(tree.first_body, tree.bodies):
         turn = mat_at(s, o + tree.turned + 9 * b)
         c = turn * vec_at(s, o + tree.centre + 3 * b) + vec_at(s, o + tree.placed + 3 * b) - origin
         mass = at(s, o + tree.mass + b)
@@ -286,7 +292,7 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
         put_vec(s, o + tree.first + 3 * b, mass * c)
         put_mat(s, o + tree.second + 9 * b, own + outer_inertia(mass, c))
     # towards the root: what a joint carries is the sum of all beyond it
-    for back in range(tree.bodies):
+    for back in range(tree.bodies - tree.first_body):
         b = tree.bodies - 1 - back
         heavy = at(s, o + tree.heavy + b)
         first = vec_at(s, o + tree.first + 3 * b)
@@ -322,8 +328,8 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
                 by = wp.dot(tree.axes[r], angular) + wp.dot(along_root(tree, r, origin), momentum)
                 s[(factor + k * m + r) & NATURAL] = by
             k += 1
-        if b > 0:
-            p = tree.parent[b]
+        p = tree.parent[b]
+        if p >= tree.first_body:
             put_vec(s, o + tree.force + 3 * p, vec_at(s, o + tree.force + 3 * p) + force)
             put_vec(s, o + tree.moment + 3 * p, vec_at(s, o + tree.moment + 3 * p) + moment)
             s[(o + tree.heavy + p) & NATURAL] = at(s, o + tree.heavy + p) + heavy

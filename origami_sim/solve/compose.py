@@ -182,6 +182,7 @@ class _Composer(Sheets, Touching):
             t(f"on{word} = active[{word}, w]")
         if self.family("pair"):
             t("pressed = int(-1)  # a node that is pressed too deep into the surface")
+            t("swept = scalar(0.0)  # how far a pair came within a step, over what it may")
         return str(t)
 
     def channel(self, k: str) -> str:
@@ -575,10 +576,11 @@ class _Composer(Sheets, Touching):
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
         mass = self.value("inertia", "total", "n")
-        halts = ["\n" + s for s in (templates.HALT, templates.HALT_RIGID)] if self.family("pair") else ["", ""]
+        texts = (templates.HALT, templates.HALT_RIGID, templates.SWEPT_RIGID)
+        halt, stop, swept = ("\n" + s if self.family("pair") else "" for s in texts)
         return {
-            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass, halt=halts[0]),
-            "rigid": templates.RIGID.format(**given, body=self.body("rigid"), halt=halts[1]),
+            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass, halt=halt),
+            "rigid": templates.RIGID.format(**given, body=self.body("rigid"), halt=stop, swept=swept),
             "evaluate": templates.EVALUATE.format(**given, body=self.body("evaluate")),
             "total": templates.TOTAL.format(**given, body=self.body("total")),
         }

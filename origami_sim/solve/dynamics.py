@@ -376,6 +376,8 @@ def _cause(model: Model, parameters: Parameters, state: State, world: int, dt: f
         return f"a position or a velocity is not a number ({margin})"
     if "touch" in model.laws and (why := too_deep(model, parameters, x, world)):
         return why
+    if model.panels == "rigid":
+        return f"no step within {dt:.3g} s is accurate enough; take a finer rate or step, softer creases and contacts"
     if len(strain) and strain.max() > 0.05:
         worst = int(strain.argmax())
         return f"bar {worst} strained by {strain[worst]:.0%} ({margin}); take a smaller step or a smaller load"

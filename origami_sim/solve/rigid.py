@@ -1,6 +1,7 @@
 """Rollouts of rigid panels: hinge angles and the pose of the root in place of the nodes of bars."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -47,9 +48,11 @@ class RigidBatch(Batch):
     def __init__(
         self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options
     ):
+        self.tree_of = Topology(model)
+        if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
+            state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
         super().__init__(model, parameters, drive, state, **options)
         self.tolerance, self.finest = tolerance, FINEST
-        self.tree_of = Topology(model)
         self._fresh = 1
         self._tree = self._made(state)
 
@@ -59,6 +62,8 @@ class RigidBatch(Batch):
         joints, rates = len(t.joints), len(t.joints) + len(t.turns)
         tree = articulated.Tree()
         tree.bodies, tree.roots, tree.rates, tree.rows = len(t.parent), len(t.turns), rates, len(t.row_node)
+        held = not len(t.turns)
+        tree.first_body, tree.first_number = int(held), int(articulated.POSE) if held else 0
         tree.hinges, tree.memories = len(state.angles), len(state.memory)
         tree.feet_count, tree.effects = len(model.contacts), len(self.program.effects)
         tree.follows, tree.stabilisation, tree.softness = int(t.follows), STABILISATION, SOFTNESS

@@ -163,7 +163,7 @@ def go(tree: Tree, stage: int, h: scalar, w: int):
     s = tree.data
     o = w * tree.width
     n = POSE + tree.bodies - 1
-    for i in range(n):
+    for i in range(tree.first_number, n):
         s[(o + tree.y + i) & NATURAL] = at(s, o + tree.y0 + i) + h * weighted(tree, o + tree.dy + i, n, stage, stage)
     m = tree.rates
     for i in range(m):
@@ -184,7 +184,7 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
     o = w * tree.width
     n = POSE + tree.bodies - 1
     worst = scalar(0.0)
-    for i in range(n):
+    for i in range(tree.first_number, n):
         x = wp.abs(h * weighted(tree, o + tree.dy + i, n, STAGES, STAGES))
         if i < 3:
             x = x / size

@@ -17,9 +17,12 @@ _ARGUMENTS = """
 HALT = """        if pressed >= 0 and limit < scalar(wp.inf):  # without a limit nothing stops a world
             fastest = pressed"""
 
-HALT_RIGID = """        if pressed >= 0:
-            status[0, w] = first_step + s + 1
-            status[1, w] = pressed"""
+HALT_RIGID = """                if pressed >= 0:  # by the end of the step; a step that is taken back says nothing
+                    status[0, w] = first_step + wp.max(s, 0) + 1
+                    status[1, w] = pressed
+                    going = int(0)"""
+
+SWEPT_RIGID = """                error = runge_kutta.larger(error, allowed * wp.pow(swept, scalar(5.0)))"""
 
 
 def arguments(shells: bool, sources: bool, touches: bool) -> str:
@@ -185,7 +188,7 @@ def rigid({arguments}
             if still == 0:
                 error = runge_kutta.error_of(tree, step, size, w)
                 if tolerance > scalar(0.0) and tree.memories > 0:
-                    error = runge_kutta.larger(error, runge_kutta.reversal_of(tree, step, tolerance, w))
+                    error = runge_kutta.larger(error, runge_kutta.reversal_of(tree, step, tolerance, w)){swept}
             if error <= allowed:
                 runge_kutta.carry_over(tree, work, step, w)
                 clock += step
@@ -193,16 +196,16 @@ def rigid({arguments}
                     going = int(0)
                 if still == 0 and tolerance > scalar(0.0):
                     longer = runge_kutta.lengthen(tree, step, error / allowed, ends, w)
-                still = int(0)
+                still = int(0){halt}
             else:
                 runge_kutta.go_back(tree, angles, memory, power, w)
                 longer = scalar(0.0)
                 if tolerance > scalar(0.0):
                     longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
-            if longer < finest:
+            if longer <= finest:
                 status[0, w] = first_step + s + 1
                 status[1, w] = runge_kutta.fastest(V, w)
-                going = int(0){halt}
+                going = int(0)
         if status[0, w] >= 0:
             break
         if s >= 0 and every > 0:

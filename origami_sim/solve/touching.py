@@ -159,6 +159,47 @@ def look(s: Skin, X: wp.array2d(dtype=wp.vec3d), row: int, w: int):
     return near
 
 
+@wp.func
+def fastest(s: Skin, X: wp.array2d(dtype=wp.vec3d), V: wp.array2d(dtype=wp.vec3d), w: int):
+    """Speed of the fastest point [m/s]."""
+    most = scalar(0.0)
+    for k in range(s.rest.shape[0]):
+        v = velocity(s, X, V, k, w)
+        most = wp.max(most, wp.dot(v, v))
+    return wp.sqrt(most)
+
+
+@wp.func
+def swept(s: Skin, X: wp.array2d(dtype=wp.vec3d), V: wp.array2d(dtype=wp.vec3d), row: int, h: scalar, w: int):
+    """Way that a pair came in a step of h [s], over the most after which it cannot have passed unseen.
+
+    That is its gap and half of the distance at which it touches: so far apart at the end, and closer than that in
+    between, it would have been pressed too deep. Of a pair that touches only the way along its normal counts.
+    """
+    p = s.points[row, w]
+    a = place(s, X, p[0], w)
+    b = place(s, X, p[1], w)
+    c = place(s, X, p[2], w)
+    d = place(s, X, p[3], w)
+    away = off_triangle(a, b, c, d)
+    if s.kind[row, w][0] != 0:
+        away = off_edge(a, b, c, d)
+    gap = wp.length(away) - s.offset[row, w]
+    along = wp.identity(n=3, dtype=wp.float64)
+    if gap < scalar(0.0):
+        along = wp.outer(nearness.unit(away), nearness.unit(away))
+    va = velocity(s, X, V, p[0], w)
+    vb = velocity(s, X, V, p[1], w)
+    vc = velocity(s, X, V, p[2], w)
+    vd = velocity(s, X, V, p[3], w)
+    speed = wp.max(wp.length(along * (va - vc)), wp.length(along * (va - vd)))
+    if s.kind[row, w][0] == 0:
+        speed = wp.max(speed, wp.length(along * (va - vb)))
+    else:
+        speed = wp.max(speed, wp.max(wp.length(along * (vb - vc)), wp.length(along * (vb - vd))))
+    return h * speed / (wp.max(gap, scalar(0.0)) + scalar(0.5) * s.offset[row, w])
+
+
 # the list -------------------------------------------------------------------------------------------------------------
 
 

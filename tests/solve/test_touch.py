@@ -298,6 +298,53 @@ def test_rigid_panels_rest_on_the_same_contact():
     assert np.abs(found.angles - slow.angles[-1, :, 0]).max() < 1e-9
 
 
+def swinging(*, begin, speed=0.0, gravity=0.0, thickness=1 * MM, damping_ratio=0.1):
+    """A rigid panel that swings about an edge of another from a fold [deg] at a rate [rad/s]: model and state."""
+    model, parameters = made(strip([20 * MM] * 2, 12 * MM), stiffness=1e-7, gravity=(0, 0, -gravity), held=[0],
+                             thickness=thickness, damping_ratio=damping_ratio)  # fmt: skip
+    model, parameters = rigid(model, parameters)
+    x, own = model.position, np.setdiff1d(of_panel(model, 1), of_panel(model, 0))
+    arm, a = x[own] - x[model.creases[0, 1]], math.radians(begin)
+    position = x.copy()
+    position[own] += np.stack([arm[:, 0] * (math.cos(a) - 1), 0 * arm[:, 0], arm[:, 0] * math.sin(a)], axis=1)
+    state = State.at_rest(model, position=position)
+    state.v[own, 0] = speed * arm[:, :1] * [-math.sin(a), 0, math.cos(a)]
+    return model, parameters, state
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"begin": 110, "gravity": G, "damping_ratio": 0.0},  # a trial step ends deep inside and is taken back
+        {"begin": 90, "speed": 60.0, "thickness": 0.5 * MM},  # a frame is a turn and more, and nothing errs
+        {"begin": 30, "speed": 30.0, "thickness": 0.3 * MM},
+    ],
+)
+def test_rigid_panels_that_fall_shut_rebound_at_any_length_of_frames(how):
+    model, parameters, state = swinging(**how)
+    runs = [simulate(model, parameters, duration=0.2, rate=rate, state=state) for rate in (10, 60, 1000)]
+    for run in runs:
+        assert not run.failures
+        assert run.crossings() == [0]
+        assert np.abs(run.creases).max() < math.pi
+        assert run.energy_error[0] < 1e-4
+        assert run.creases[-1, 0, 0] == pytest.approx(runs[-1].creases[-1, 0, 0], abs=1e-3)
+    assert np.ptp(runs[-1].creases) > 0.05
+
+
+def test_rigid_panels_that_slam_too_hard_are_said_to_be_pressed_through():
+    model, parameters, state = swinging(begin=90, speed=100.0, thickness=0.2 * MM)
+    for rate in (60, 1000):
+        run = simulate(model, parameters, duration=0.1, rate=rate, state=state)
+        assert "panel 0 and panel 1 are pressed 0.1" in str(run.failures[0])
+
+
+def test_a_given_step_too_long_for_contact_stops_rigid_panels():
+    model, parameters, state = swinging(begin=110, gravity=G)
+    run = simulate(model, parameters, duration=0.2, rate=60, dt=2e-3, state=state)
+    assert "no step within 0.00185 s is accurate enough" in str(run.failures[0])
+
+
 @pytest.mark.slow
 def test_implicit_steps_come_to_rest_on_the_same_contact():
     model, parameters = letter()
