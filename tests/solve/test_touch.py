@@ -353,7 +353,7 @@ def test_implicit_steps_come_to_rest_on_the_same_contact():
     model, parameters = letter()
     drive = Drive(load=ramp(1.0, 0.2))
     runs = [
-        simulate(model, parameters, drive, duration=0.5, rate=10, **how)
+        simulate(model, parameters, drive, duration=1.0, rate=10, **how)
         for how in ({}, {"method": "implicit", "spectral_radius": 0.5})
     ]
     assert np.abs(runs[0].x[-1] - runs[1].x[-1]).max() < 1e-6
