@@ -181,7 +181,8 @@ def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
 def test_free_strip_walks_like_the_guided_one(coarse):
     """Straight on and steadily, with nothing that guides it.
 
-    Both scatter by 2 % with where the stations of a mesh come down, and not alike: means of two meshes are compared.
+    Both scatter with where the stations of a mesh come down, and not alike: cells of 3.8, 3.2, 2.8, 2.4 mm give 24.35,
+    25.47, 25.33, 26.25 mm free and 25.00, 24.48, 24.34, 25.53 guided. That two means agree is these two meshes' luck.
     """
     strides, guided = [], [coarse[2:].mean(), walk(4, cell=0.0028)[0][2:].mean()]
     for cell in (0.0038, 0.0028):
