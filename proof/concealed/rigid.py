@@ -7,9 +7,6 @@ from laws import MEASUREMENT, build
 from recorder import channels, readings, tracked, write
 from world import FINE, Law, Motion, Numbers, World
 
-STRETCH = 1.0
-"""Length of the stretches over which d' is taken [s]; what nothing holds starts from rest, as one stretch."""
-
 EVERY = 4
 """Of the samples of a motion, which are used for d'."""
 
@@ -40,7 +37,7 @@ def numbers_of(o: dict, factors: dict[str, float]) -> Numbers:
 class RigidCase:
     """An object with its true common factors; effects are entries {mechanism, strength, place, extra}.
 
-    The signature of effects is the difference that they make, over stretches of a second that start alike, in standard
+    The signature of effects is the difference that they make, over whole recordings that start alike, in standard
     deviations of the noise, after projecting out what the starts and the uncertain numbers (within what is known of
     them) can take up. Its norm is d'.
     """
@@ -49,7 +46,7 @@ class RigidCase:
         self.o, self.factors = o, factors
         self._tangents: list | None = None
         self._about: list = []
-        self._without: list[Motion] = []
+        self._without: list[np.ndarray] = []
         self._rest = o["held"] is None
         self._plain: dict[int, np.ndarray] = {}
         noise = np.hypot(o["noise"], o["noise"] / 2 / np.sqrt(12))
@@ -85,19 +82,18 @@ class RigidCase:
             fresh: find anew what starts and numbers can take up, about this motion; else about the last that did.
         """
         (laws, chain), plain = entered(entries), self.world()
-        stretches = list(self._stretches(self.motions(laws)))
+        recorded = list(zip(self.o["recordings"], self.motions(laws), strict=True))
         if fresh or self._tangents is None:
-            self._tangents = [self._tangent(r, m, k) for r, m, k in stretches]
-            self._about, self._without = stretches, []
+            self._tangents = [self._tangent(r, m) for r, m in recorded]
+            self._about, self._without = recorded, []
         rows = []
-        for n, ((r, m, k), (basis, _)) in enumerate(zip(stretches, self._tangents, strict=True)):
-            times = m.times[k : k + round(self._length(r) * FINE) + 1 : EVERY]
+        for n, ((r, m), (basis, _)) in enumerate(zip(recorded, self._tangents, strict=True)):
             without = self._plain.get(n)
             if without is None:
-                without = self._stretch(plain, r, m.angles[k], m.rates[k], m.times[k])
+                without = self._repeated(plain, r, m.angles[0], m.rates[0])
             if self._rest:  # it starts alike, whatever is concealed
                 self._plain[n] = without
-            gap = readings(plain, m, times, chain) - without
+            gap = readings(plain, m, self._times(r, m), chain) - without
             d = gap.ravel() / self._sigma
             rows.append(d - basis @ (basis.T @ d))
         return self._cleared(rows)
@@ -105,56 +101,47 @@ class RigidCase:
     def beside(self, other: dict) -> np.ndarray:
         """The signature of another, small effect, about the motion for which signatures were last found afresh.
 
-        Laws with memory begin each stretch without one.
+        Laws with memory begin without one.
         """
         (laws, chain), plain, gaps = entered([other]), self.world(), []
         if laws:
-            self._without = self._without or self._repeated(plain)
-            for a, b in zip(self._repeated(self.world(laws)), self._without, strict=True):
-                gaps.append((channels(plain, a.angles) - channels(plain, b.angles))[::EVERY])
-        else:  # as it is seen, since the recording began
-            for r, m, k in self._about:
-                times = m.times[k : k + round(self._length(r) * FINE) + 1 : EVERY]
+            self._without = self._without or [self._repeated(plain, r, m.angles[0], m.rates[0]) for r, m in self._about]
+            world = self.world(laws)
+            for (r, m), without in zip(self._about, self._without, strict=True):
+                gaps.append(self._repeated(world, r, m.angles[0], m.rates[0]) - without)
+        else:
+            for r, m in self._about:
+                times = self._times(r, m)
                 gaps.append(readings(plain, m, times, chain) - readings(plain, m, times, {}))
         rows = [gap.ravel() / self._sigma for gap in gaps]
         bases = [basis for basis, _ in self._tangents or ()]
         return self._cleared([d - basis @ (basis.T @ d) for d, basis in zip(rows, bases, strict=True)])
 
-    def _repeated(self, world: World) -> list[Motion]:
-        """The stretches of that motion, from where they start."""
-        given = [{"duration": self._length(r), "start": m.times[k]} for r, m, k in self._about]
-        return [world.run(r, m.angles[k], m.rates[k], **g) for (r, m, k), g in zip(self._about, given, strict=True)]
-
     def _cleared(self, rows: list[np.ndarray]) -> np.ndarray:
-        """Differences over the stretches without what the numbers can take up, and by how much they would change."""
+        """Differences over the recordings without what the numbers can take up, and by how much they would change."""
         t, d = np.concatenate([c for _, c in self._tangents or ()]), np.concatenate(rows)
         x = np.linalg.solve(t.T @ t + np.eye(t.shape[1]), t.T @ d)
         return np.concatenate([d - t @ x, -x])
 
-    def _stretches(self, motions: list[Motion]):
-        """Recording, motion and first sample of every stretch."""
-        for r, m in zip(self.o["recordings"], motions, strict=True):
-            for start in [0.0] if self._rest else np.arange(0.0, self.duration(r) - 0.5 * STRETCH, STRETCH):
-                yield r, m, round(start * FINE)
+    def _times(self, r: dict, m: Motion) -> np.ndarray:
+        """Times of the samples of a recording that are used for d' [s]."""
+        return m.times[: round(self.duration(r) * FINE) + 1 : EVERY]
 
-    def _length(self, r: dict) -> float:
-        return self.duration(r) if self._rest else STRETCH
+    def _repeated(self, world: World, r: dict, q: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Readings (n, D) of a recording from a start."""
+        return channels(world, world.run(r, q, w, duration=self.duration(r)).angles)[::EVERY]
 
-    def _stretch(self, world: World, r: dict, q, w, start: float) -> np.ndarray:
-        """Readings (n, D) of one stretch from a start."""
-        return channels(world, world.run(r, q, w, duration=self._length(r), start=start).angles)[::EVERY]
-
-    def _tangent(self, r: dict, m: Motion, k: int) -> tuple[np.ndarray, np.ndarray]:
+    def _tangent(self, r: dict, m: Motion) -> tuple[np.ndarray, np.ndarray]:
         """Orthonormal columns of what the start takes up, and columns of the numbers per standard deviation."""
-        q, w, start, e = m.angles[k], m.rates[k], m.times[k], np.eye(0 if self._rest else len(self.o["creases"]))
+        q, w, e = m.angles[0], m.rates[0], np.eye(0 if self._rest else len(self.o["creases"]))
         plain, priors = self.world(), self.o["priors"]
-        base = self._stretch(plain, r, q, w, start)
-        local = [(self._stretch(plain, r, q + 1e-4 * v, w, start) - base) / 1e-4 for v in e]
-        local += [(self._stretch(plain, r, q, w + 1e-3 * v, start) - base) / 1e-3 for v in e]
+        base = self._repeated(plain, r, q, w)
+        local = [(self._repeated(plain, r, q + 1e-4 * v, w) - base) / 1e-4 for v in e]
+        local += [(self._repeated(plain, r, q, w + 1e-3 * v) - base) / 1e-3 for v in e]
         common = []
         for n, spread in priors.items():
             other = self.world(**{n: self.factors.get(n, 1.0) * 1.001})
-            common.append((self._stretch(other, r, q, w, start) - base) / 1e-3 * spread)
+            common.append((self._repeated(other, r, q, w) - base) / 1e-3 * spread)
         common = np.stack([v.ravel() for v in common], axis=1) / self._sigma
         basis = np.zeros((len(common), 0))
         if local:

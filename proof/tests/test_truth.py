@@ -462,8 +462,7 @@ def test_an_effect_outside_is_as_strong_as_no_two_laws_can_imitate(truth):
     assert min(left) <= account["like"]["apart"] * (1 + 1e-6)  # which admits only losses, not gains
 
 
-def test_what_starts_alike_is_repeated_by_its_stretches(truth):
-    """Beside its own motion, a small effect shows as it does from rest."""
+def test_a_small_effect_shows_beside_its_own_motion_as_it_does_from_rest(truth):
     draw = truth["draw"]
     o = truth["objects"].draw("pendulum_chain", np.random.default_rng(1))
     case = draw.case_of(o, {})
