@@ -16,6 +16,9 @@ from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
 
 from origami_sim.fit.weights import Rows, Weights, recast
 
+PART = 1000
+"""Rows of a long matrix that are factored together: a core keeps them at hand. Half or double is as fast."""
+
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
@@ -139,7 +142,7 @@ class Linearisation:
             rows.append(Rows(len(r), 0, own.tie))
             slopes.append(np.concatenate([r, known[ends:]]))
             kept.append(np.concatenate([reached, whole[ends:]]))
-        kept.append(np.asarray(np.linalg.qr(np.concatenate(beyond), mode="r")))
+        kept.append(triangle(np.concatenate(beyond)))
         rows.append(Rows(len(kept[-1])))
         slopes.append(np.zeros((len(kept[-1]), 0)))
         tangent, more, residual = zip(*(np.split(x, [width, width + count], axis=1) for x in kept), strict=True)
@@ -177,6 +180,18 @@ class Linearisation:
             [None if t is None else t * (old.gap / new.gap) for t in self.tie],
             self.steps,
         )
+
+
+def triangle(a: np.ndarray) -> np.ndarray:
+    """Factor R [min(n, k), k] of a long matrix [n, k]: of its first rows, then of that and the next ones, and so on.
+
+    As numpy finds it but for signs of rows, in less than half the time.
+    """
+    out = np.zeros((0, a.shape[1]))
+    for first in range(0, len(a) if a.size else 0, PART):
+        part = np.concatenate([out, a[first : first + PART]])
+        out = np.triu(dgeqrf(part)[0][: min(part.shape)])
+    return out
 
 
 def _orthogonal(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
