@@ -9,12 +9,15 @@ its innovations, which no choice of the starts can explain, and which are indepe
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
 
 from origami_sim.fit.weights import Rows, Weights, recast
+
+PART = 1000
+"""Rows of a long matrix that are factored together: a core keeps them at hand. Half or double is as fast."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +95,11 @@ class Linearisation:
         ):
             size = slopes.shape[1]
             right = c[:size] if tie is None else c[:size] - r[:size, size:] @ out[-1]
-            diagonal = np.abs(np.diag(r)[:size])
-            safe = np.where(diagonal > 1e-12 * diagonal.max(initial=1e-300), np.diag(r)[:size], np.inf)
-            own = np.where(np.isinf(safe)[:, None], 0.0, r[:size, :size])
-            own[np.diag_indices(size)] = np.where(np.isinf(safe), 1.0, np.diag(r)[:size])
-            right = np.where(np.isinf(safe).reshape(-1, *[1] * (right.ndim - 1)), 0.0, right)
+            own, told = r[:size, :size], _told(r, size)
+            if not told.all():  # what nothing tells stays where it is
+                right = np.where(told.reshape(-1, *[1] * (right.ndim - 1)), right, 0.0)
+                own = np.where(told[:, None], own, 0.0)
+                own[~told, ~told] = 1.0
             solved = dtrtrs(own, right.reshape(size, -1))[0] if right.size else right
             out.append(solved.reshape(right.shape))
         return left, out[::-1]
@@ -117,9 +120,9 @@ class Linearisation:
         total = 0.0
         for (_, r), slopes, tie in zip(self._factors, self.slopes, self.tie, strict=True):
             size = slopes.shape[1]
-            total += float(np.sum(np.log(np.maximum(np.abs(np.diag(r)[:size]), 1e-300))))
+            total += float(np.log(np.maximum(np.abs(r.diagonal()[:size]), 1e-300)).sum())
             if tie is not None:
-                total -= float(np.sum(np.log(tie)))
+                total -= float(np.log(tie).sum())
         return total
 
     def condensed(self, columns: Sequence[np.ndarray]) -> tuple["Linearisation", list[np.ndarray]]:
@@ -139,7 +142,7 @@ class Linearisation:
             rows.append(Rows(len(r), 0, own.tie))
             slopes.append(np.concatenate([r, known[ends:]]))
             kept.append(np.concatenate([reached, whole[ends:]]))
-        kept.append(np.asarray(np.linalg.qr(np.concatenate(beyond), mode="r")))
+        kept.append(triangle(np.concatenate(beyond)))
         rows.append(Rows(len(kept[-1])))
         slopes.append(np.zeros((len(kept[-1]), 0)))
         tangent, more, residual = zip(*(np.split(x, [width, width + count], axis=1) for x in kept), strict=True)
@@ -179,10 +182,34 @@ class Linearisation:
         )
 
 
+def triangle(a: np.ndarray) -> np.ndarray:
+    """Factor R [min(n, k), k] of a long matrix [n, k]: of its first rows, then of that and the next ones, and so on.
+
+    As numpy finds it but for signs of rows, in less than half the time.
+    """
+    out = np.zeros((0, a.shape[1]))
+    for first in range(0, len(a) if a.size else 0, PART):
+        part = np.concatenate([out, a[first : first + PART]])
+        out = np.triu(dgeqrf(part)[0][: min(part.shape)])
+    return out
+
+
 def _orthogonal(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Factors Q, R of a matrix, as numpy finds them, which takes thrice as long over a small one."""
     if not a.size:
         return np.zeros((len(a), 0)), np.zeros((0, a.shape[1]))
     count = min(a.shape)
     packed, tau, _, _ = dgeqrf(a)
-    return dorgqr(packed[:, :count], tau)[0], np.triu(packed[:count])
+    return dorgqr(packed[:, :count], tau)[0], packed[:count] * _upper(count, a.shape[1])
+
+
+@cache
+def _upper(rows: int, columns: int) -> np.ndarray:
+    """Ones above and on the diagonal: numpy makes them anew for every matrix."""
+    return np.triu(np.ones((rows, columns)))
+
+
+def _told(r: np.ndarray, size: int) -> np.ndarray:
+    """(L,) which numbers of a start a factor R tells, of which the first `size` columns are the start's."""
+    diagonal = np.abs(r.diagonal()[:size])
+    return diagonal > 1e-12 * diagonal.max(initial=1e-300)

@@ -14,6 +14,7 @@ from scipy.optimize import lsq_linear
 from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.linear import triangle
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, patterns, recast
 from origami_sim.infer.implied import OwnColumns, left_by
@@ -50,7 +51,7 @@ class Foresight:
         columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
         cleared, starts = line.explained(columns)
         whole = with_priors(cleared, own.precision[own.nominal], own.away[own.nominal])
-        root = np.asarray(np.linalg.qr(whole, mode="r"))
+        root = triangle(whole)
         white = summed(without_numbers(whole, count, theirs[0].shape[1], -line.spread), 0.0, hyper.flaws[0])
         parts = np.concatenate([s[: r.data] for s, r in zip(line.smoothed(columns, starts), line.rows, strict=True)])
         return cls(forward, f, plain, own.groups, count, white, root, parts)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from threading import Lock
 
 import numpy as np
 
@@ -63,6 +64,8 @@ class RigidRollouts(Rollouts):
         super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
         self._tree = Topology(self.model)
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
+        self._films: dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]] = {}
+        self._filming = Lock()
         check_tree(self._tree, self.articulation.floating)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
@@ -103,6 +106,65 @@ class RigidRollouts(Rollouts):
         return float(np.median(np.diff(self.recordings[0].times)))
 
     def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+        """See `Rollouts._filmed`; not again of the first world, if it was filmed a short while ago.
+
+        It is the point about which derivatives are taken, where a fit has just been. Worlds are the same to the last
+        digit whatever others run beside them, unless some are late, which has them all driven in another way.
+        """
+        keys = [] if np.any(shots.late) else self._film_keys(shots)
+        known = [self._films[k] for k in keys if k in self._films]
+        count, drive = len(shots.blocks), self.drives[shots.recording]
+        some = bool(keys) and len(known) == len(keys)
+        if not some:
+            raw, arrived = self._simulated(shots)
+        else:
+            raw = np.stack([film for *_, film, _ in known], axis=2)
+            ends = [end for *_, end in known if end is not None]
+            arrived = np.stack(ends, axis=2) if ends else None
+        if some and len(shots.worlds) > 1:
+            others = replace(
+                shots,
+                worlds=shots.worlds[1:],
+                late=shots.late[1:],
+                local=None if shots.local is None else shots.local[1:],
+                memory=None if shots.memory is None else shots.memory[:, count:],
+            )
+            more, beyond = self._simulated(others)
+            raw = np.concatenate([raw, more], axis=2)
+            arrived = None if arrived is None or beyond is None else np.concatenate([arrived, beyond], axis=2)
+        with self._filming:
+            for n, (key, block) in enumerate(zip(keys, shots.blocks, strict=False)):
+                end = None if arrived is None else arrived[:, :, n].copy()
+                self._films.setdefault(key, (block, drive, raw[:, :, n].copy(), end))
+            while len(self._films) > POINTS * len(self.blocks):
+                del self._films[next(iter(self._films))]
+        return raw, arrived
+
+    def _film_keys(self, shots: Shots) -> list[tuple]:
+        """For each block, all that a film of the first world depends on."""
+        (model, parameters), local, memory = shots.worlds[0], shots.local, shots.memory
+        drive = id(self.drives[shots.recording])  # kept with the film, as blocks are, so that no other gets its number
+        world = (
+            drive,
+            shots.recording,
+            shots.step,
+            shots.frames,
+            shots.ends,
+            shots.clocked,
+            model.hash,
+            parameters.hash,
+        )
+        return [
+            (
+                *world,
+                id(b),
+                b"" if local is None else local[0, n].tobytes(),
+                b"" if memory is None else memory[:, n].tobytes(),
+            )
+            for n, b in enumerate(shots.blocks)
+        ]
+
+    def _simulated(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         state = self._state(shots)

@@ -215,8 +215,12 @@ class Rollouts(Worlds, ABC):
         late, shown = lateness(model, once, k, begins, self.start == "fit")
         longer = lateness(model, once, k, begins + blocks[0].lasting, self.start == "fit")[0] - late
         clocked = bool(ends and np.any(longer))
-        last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
-        frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
+        distort = [e for e in model.effects if get(e).family == "measurement"]
+        frames = len(times)
+        as_filmed = not distort and np.allclose(times, np.arange(frames) * step, atol=1e-6 * step)
+        if not as_filmed:
+            last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
+            frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, group]
         moves, of = distinct_motions(worlds, late, starts)
         some = None if starts is None else starts[moves]
@@ -235,12 +239,11 @@ class Rollouts(Worlds, ABC):
         channels = raw[:, :, columns]
         plain = channels[:, : len(turning)]  # without the depths
         grid = np.arange(len(raw)) * step
-        distort = [e for e in model.effects if get(e).family == "measurement"]
         if distort:
             parameters = Parameters.join([p for _, p in worlds], repeat=count)
             rested = self.start != "fit"
             values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
-        elif len(times) <= len(grid) and np.allclose(times, grid[: len(times)], atol=1e-6 * step):
+        elif as_filmed:
             values = plain[: len(times)]
         else:
             values = spline(grid, plain)(times)
@@ -334,6 +337,7 @@ class Rollouts(Worlds, ABC):
             carried = batch.remembered()
             if first in motion.memory:
                 carried = carried + (motion.memory[first][:, None] - carried[:, :1])
+                carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
             last, out[first] = first, carried[:, of]
         return out
 

@@ -45,6 +45,7 @@ class Tree:
     first_number: int  # of the coordinates that changes: then the first joint's angle
     parent: wp.array(dtype=wp.int32)  # [B]
     body_of: wp.array(dtype=wp.int32)  # [N] body that carries a node
+    moving: wp.array(dtype=wp.int32)  # nodes of the bodies that move, body after body
     joint_of: wp.array(dtype=wp.int32)  # [C] joint of a crease, -1 where it closes a loop
     # [3 d + R] angular velocities of the root for unit rates, velocities of its centre besides, points about which it
     # turns where those do not move with it; then directions in which constraints hold
@@ -226,16 +227,15 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
         put_vec(s, o + tree.force + 3 * b, zero)
         put_vec(s, o + tree.moment + 3 * b, zero)
+    for n in range(X.shape[0]):
+        F[n & NATURAL, w] = zero
     body = int(-1)
     own = turn
     place = zero
-    for row in range(X.shape[0]):
-        n = row & NATURAL
+    for row in range(tree.moving.shape[0]):
+        n = tree.moving[row & NATURAL] & NATURAL
         b = tree.body_of[n]
-        F[n, w] = zero
-        if b < tree.first_body:
-            continue
-        if b != body:  # nodes of a body mostly follow each other
+        if b != body:
             body = b
             own = mat_at(s, o + tree.turned + 9 * b)
             place = vec_at(s, o + tree.placed + 3 * b)
@@ -261,12 +261,10 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
     body = int(0)
     pull = vec_at(s, o + tree.force)
     torque = vec_at(s, o + tree.moment)
-    for row in range(X.shape[0]):
-        n = row & NATURAL
+    for row in range(tree.moving.shape[0]):
+        n = tree.moving[row & NATURAL] & NATURAL
         b = tree.body_of[n]
-        if b < tree.first_body:
-            continue
-        if b != body:  # nodes of a body mostly follow each other
+        if b != body:
             put_vec(s, o + tree.force + 3 * body, pull)
             put_vec(s, o + tree.moment + 3 * body, torque)
             body = b

@@ -308,8 +308,9 @@ class _Composer(Sheets, Touching):
         if not effects:
             return
         for group in self.alike(effects):
-            with self.acting(t, group[0]), t.block("for row in range(mask.shape[0]):"):
-                t("n = row & NATURAL")
+            rows, n = ("tree.moving", "tree.moving[row & NATURAL]") if mode == "rigid" else ("mask", "row")
+            with self.acting(t, group[0]), t.block(f"for row in range({rows}.shape[0]):"):
+                t(f"n = {n} & NATURAL")
                 t(f"mass = {self.value('inertia', 'mass', 'n')}")
                 t("x = X[n, w]")
                 t("v = V[n, w]")

@@ -84,11 +84,32 @@ def test_predictions_are_the_same_bytes_on_any_number_of_threads(tied, monkeypat
     for threads in (1, 2, 5):
         monkeypatch.setattr(tied, "threads", threads)
         tied._moved.clear()
+        tied._films.clear()
         made.append(tied.shoot(h, thetas, np.zeros((3, len(tied.blocks), tied.local))))
     assert bool(effect) == bool(len(h.suspects)) and len(made[0].values) == len(tied.blocks)
     for other in made[1:]:
         for a, b in zip((*made[0].values, *made[0].ends[:-1]), (*other.values, *other.ends[:-1]), strict=True):
             assert a is not None and b is not None and a.tobytes() == b.tobytes()
+
+
+@pytest.mark.parametrize("effect", ["crease_friction", "angle_scale"])
+def test_a_point_that_was_just_simulated_is_the_same_bytes_among_other_worlds(tied, effect):
+    suspect = next(s for s in suspects(tied.model, tied.recordings, tied.drive) if s.effect == effect)
+    hypothesis = Hypothesis((suspect,))
+    theta = np.array([f.start for f in (*tied.subject.nominals, *suspect.free)])
+    theta[len(tied.subject.nominals)] += suspect.free[0].scale
+    worlds = np.repeat(theta[None], 3, axis=0)
+    worlds[1, 0] *= 1.01
+    worlds[2, len(tied.subject.nominals)] += suspect.free[0].scale
+    local = np.zeros((3, len(tied.blocks), tied.local))
+    tied._films.clear()
+    together = tied.shoot(hypothesis, worlds, local)
+    tied._films.clear()
+    alone = tied.shoot(hypothesis, worlds[:1], local[:1])
+    again = tied.shoot(hypothesis, worlds, local)
+    for a, b, c in zip(together.values, again.values, alone.values, strict=True):
+        assert np.array_equal(a, b) and np.array_equal(b[0], c[0])
+    assert all(a is b or np.array_equal(a, b) for a, b in zip(together.ends, again.ends, strict=True))
 
 
 def test_a_fit_of_what_is_exact_leaves_rounding(tied):
