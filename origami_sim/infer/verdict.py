@@ -158,12 +158,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
             ["nothing"] if frozenset() in d.credible else []
         )
         chances = {c: holding(classes, c) if c > d.lead else classes[c] for c in d.credible}
-        likely = [c for c in d.credible[:4] if chances[c] > 1.0 - CREDIBLE] or d.credible[:1]
-        each = [f"{_name(c)} (p = {chances[c]:.2f})" for c in likely]
-        rest = len(d.credible) - len(each)
-        more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
-        text = f"These recordings do not decide between {joined(each)}{more}. "
-        text += f"The best is {say(shown)}, which {explained}."
+        text = undecided(d.lead, d.credible, chances)
+        text += f" The best is {say(shown)}, which {explained}."
         return Judgement(d.word, text + _unlisted(d), d.probability, names, **common)
     # the shown set may hold more than what surely acts: of that, each effect by its own probability
     named = [s for s in suspects if s.effect in d.lead]
@@ -182,6 +178,17 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""
         text += f" Something acts besides (p = {more:.2f}), and these recordings do not tell what{likely}."
     return Judgement(d.word, text, d.probability, chosen, **common)
+
+
+def undecided(lead: frozenset[str], credible: list[frozenset[str]], chances: dict[frozenset[str], float]) -> str:
+    """Between which explanations recordings do not decide, and what acts in all of them, in words."""
+    likely = [c for c in credible[:4] if chances[c] > 1.0 - CREDIBLE] or credible[:1]
+    lead = lead if all(c > lead for c in credible) else frozenset()
+    each = [f"{_name(c - lead)} (p = {chances[c]:.2f})" for c in likely]
+    rest = len(credible) - len(each)
+    more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
+    sure = f"Found: {joined(sorted(map(title, lead)))}; besides, these" if lead else "These"
+    return f"{sure} recordings do not decide between {joined(each)}{more}."
 
 
 def unnamed_verdict(

@@ -13,7 +13,7 @@ from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import credible, decide
+from origami_sim.infer.verdict import credible, decide, undecided
 from origami_sim.infer.words import joined, said, title
 from origami_sim.locate.describe import described
 
@@ -125,6 +125,15 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
     assert decided.word == word and decided.lead == set(three[:2])
     if word == "SEVERAL":
         assert decided.probability == pytest.approx(1.0 / 1.28)
+
+
+def test_what_acts_in_every_explanation_is_said_once():
+    drag, friction, delay = (frozenset((e,)) for e in ("air_drag", "crease_friction", "clock_delay"))
+    text = undecided(drag, [drag, friction], {drag: 0.6, friction: 0.3})
+    assert text.startswith("These recordings do not decide between ") and "(p = 0.60) and" in text
+    text = undecided(friction, [friction | drag, friction | delay], {friction | drag: 0.6, friction | delay: 0.3})
+    assert text.startswith("Found: dry friction in a crease; besides, these recordings do not decide between ")
+    assert text.count("dry friction") == 1 and " with " not in text
 
 
 def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
