@@ -2,10 +2,13 @@
 
 The two that learn a correction learn it from the residual moment of equation error at each crease (`locate.motion`),
 on half of the segments, as a function of that crease's angle and rate. It is then put into the simulator as a table
-and predicts the other half, with the starts adapted exactly as for every hypothesis.
+and predicts the other half, with the starts adapted exactly as for every hypothesis. Numbers of the model are those of
+the refit without that half.
 """
 
+import copy
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -14,6 +17,7 @@ from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Baseline
+from origami_sim.infer.held_out import steps_without
 from origami_sim.locate.locate import motion
 
 KNOTS = 9
@@ -51,17 +55,22 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
         nan = [float("nan")] * len(forward.components)
         return [*out, Baseline("sparse regression (STLSQ)", nan, why), Baseline("Gaussian process", nan, why)]
 
-    motions: list = [None]
-    if forward.start == "fit":
-        motions = [motion(forward, base, r) for r in range(len(forward.recordings))]  # type: ignore[arg-type]
-    if forward.start != "fit" or any(m is None for m in motions) or not len(forward.model.creases):
+    if forward.start != "fit" or not len(forward.model.creases):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
     halves = _halves(forward)
-    if any(not h or len(next(_samples(forward, motions, 0, h))) < FEWEST for h in halves):
+    if any(not h for h in halves):
+        return without("needs segments in two halves, and frames outside of each")
+    scale = np.array([n.scale for n in base.free])
+    told = [replace(base, theta=base.theta + scale * step) for step in steps_without(base, halves)]
+    count = len(forward.recordings)
+    moved = [[motion(forward, f, r) for r in range(count)] for f in told]  # type: ignore[arg-type]
+    if any(m is None for motions in moved for m in motions):
+        return without("needs recorded coordinates of every crease, and segments with starts of their own")
+    if any(len(next(_samples(forward, *of))) < FEWEST for of in zip(moved, [0] * len(halves), halves, strict=True)):
         return without("needs segments in two halves, and frames outside of each")
     for name, learn in (("sparse regression (STLSQ)", _sparse), ("Gaussian process", _process)):
-        squares, count, terms = 0.0, 0.0, []
-        for held in halves:
+        squares, seen, terms = 0.0, 0.0, []
+        for held, known, motions in zip(halves, told, moved, strict=True):
             tables, said = [], []
             for k in range(len(forward.articulation.creases)):
                 a, w, y = _samples(forward, motions, k, held)
@@ -70,14 +79,14 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
                 tables.append((grid_a, grid_w, values))
                 said.append(text)
             terms.append("; ".join(said))
-            f = _predict(forward, base, tables, held, weights)
+            f = _predict(forward, known, tables, held, weights)
             if f is None or f.failed:
                 squares = np.full(len(forward.components), np.nan)
                 break
             r = np.concatenate(f.residuals)
             squares = squares + np.nansum(r**2, axis=0)
-            count = count + np.sum(np.isfinite(r), axis=0)
-        rms = np.sqrt(squares / np.maximum(count, 1))
+            seen = seen + np.sum(np.isfinite(r), axis=0)
+        rms = np.sqrt(squares / np.maximum(seen, 1))
         out.append(Baseline(name, np.atleast_1d(rms).tolist(), terms[0] if terms else ""))
     return out
 
@@ -202,8 +211,6 @@ def _predict(forward: Predictor, base: Fit, tables, held: list[int], weights: We
                 out.set("crease_discrepancy", name, value, np.array([c]))
             out.set("crease_discrepancy", "missing_moment", table.reshape(1, 1, -1), np.array([c]))
         return richer, out, drive
-
-    import copy
 
     other = copy.copy(forward)
     nominals = tuple(

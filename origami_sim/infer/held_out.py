@@ -1,6 +1,6 @@
 """Held-out error: of each stretch of the data, with numbers that all others tell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,26 +39,9 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
     """
     line, weights = f.linear, f.weights
     assert line is not None and weights is not None
-    judged = line.reweighted(weights, alike)
-    dims = len(weights.deviation)
-    width = line.tangent[0].shape[1]
-    cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
-    scale = np.array([n.scale for n in f.free])
-    prior = precision(f.free)
-    away = prior * ((np.array([n.start for n in f.free]) - f.theta) / scale)
-    low = (np.array([n.lower for n in f.free]) - f.theta) / scale
-    high = (np.array([n.upper for n in f.free]) - f.theta) / scale
+    judged, dims, parts = line.reweighted(weights, alike), len(weights.deviation), folds(forward, f.blocks)
     squares, seen, folds_ = np.zeros(dims), np.zeros(dims), []
-    for part in folds(forward, f.blocks):
-        step = np.zeros(width)
-        if width:
-            rows = [cleared[n] for n in range(len(cleared)) if n not in part]
-            a = np.concatenate([*(r[:, :-1] for r in rows), np.diag(prior)])
-            y = np.concatenate([*(r[:, -1] for r in rows), away])
-            a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
-            y = np.concatenate([y, np.zeros(width)])
-            q, r = np.linalg.qr(a)
-            step = lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+    for part, step in zip(parts, steps_without(f, parts), strict=True):
         left = judged.smoothed([r - t @ step for r, t in zip(judged.residual, judged.tangent, strict=True)])
         own, count = np.zeros(dims), np.zeros(dims)
         for n in part:
@@ -69,6 +52,31 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
         folds_.append(float(np.mean(own / np.maximum(count, 1) / forward.blocks[0].noise ** 2)))
         squares, seen = squares + own, seen + count
     return HeldOut(np.sqrt(squares / np.maximum(seen, 1)), np.array(folds_))
+
+
+def steps_without(f: Fit, parts: Sequence[Sequence[int]]) -> Iterator[np.ndarray]:
+    """Changes of the numbers (P,) of a fit, over their scales, without each of some parts of its segments.
+
+    One Gauss-Newton step within the bounds. Nothing if the fit left the numbers as they were.
+    """
+    line = f.linear
+    assert line is not None
+    width = line.tangent[0].shape[1]
+    cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
+    scale, prior = np.array([n.scale for n in f.free]), precision(f.free)
+    away = prior * ((np.array([n.start for n in f.free]) - f.theta) / scale)
+    low, high = ((np.array([getattr(n, end) for n in f.free]) - f.theta) / scale for end in ("lower", "upper"))
+    for part in parts:
+        if not width:
+            yield np.zeros(0)
+            continue
+        rows = [cleared[n] for n in range(len(cleared)) if n not in part]
+        a = np.concatenate([*(r[:, :-1] for r in rows), np.diag(prior)])
+        y = np.concatenate([*(r[:, -1] for r in rows), away])
+        a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
+        y = np.concatenate([y, np.zeros(width)])
+        q, r = np.linalg.qr(a)
+        yield lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
 
 
 def folds(forward: Predictor, blocks: Sequence[int]) -> list[list[int]]:

@@ -64,7 +64,10 @@ def scanned(
 
 
 SHAPES = 7
-"""Values of a number beside a strength that are tried, over what is plausible: 2.2 times apart for a factor of 100."""
+"""Values of a number beside a strength that are tried, over what is plausible: 2.2 times apart for a factor of 100.
+
+Half and double change no word of four swings, and no probability by more than 0.033.
+"""
 
 
 class Cleared:
