@@ -66,7 +66,7 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
     moved = [[motion(forward, f, r) for r in range(count)] for f in told]  # type: ignore[arg-type]
     if any(m is None for motions in moved for m in motions):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
-    if any(len(next(_samples(forward, *of))) < FEWEST for of in zip(moved, [0] * len(halves), halves, strict=True)):
+    if any(len(next(_samples(forward, m, 0, h))) < FEWEST for m, h in zip(moved, halves, strict=True)):
         return without("needs segments in two halves, and frames outside of each")
     for name, learn in (("sparse regression (STLSQ)", _sparse), ("Gaussian process", _process)):
         squares, seen, terms = 0.0, 0.0, []

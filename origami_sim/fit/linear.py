@@ -16,8 +16,11 @@ from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
 
 from origami_sim.fit.weights import Rows, Weights, recast
 
-PART = 1000
-"""Rows of a long matrix that are factored together: a core keeps them at hand. Half or double is as fast."""
+PART = 8000
+"""Rows of a long matrix that are factored together.
+
+Of 31,800 by 150 in 0.7 and 0.8 of numpy's time on one core and on two; half in 0.7 and 1.0. A thousand take 0.6 and 1.7.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +188,7 @@ class Linearisation:
 def triangle(a: np.ndarray) -> np.ndarray:
     """Factor R [min(n, k), k] of a long matrix [n, k]: of its first rows, then of that and the next ones, and so on.
 
-    As numpy finds it but for signs of rows, in less than half the time.
+    As numpy finds it but for signs of rows.
     """
     out = np.zeros((0, a.shape[1]))
     for first in range(0, len(a) if a.size else 0, PART):

@@ -340,8 +340,9 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
 
 
 def forget(out: Posterior, key: Key) -> None:
-    """Leaves out a fit of a set, and what was estimated by it."""
+    """Leaves out a fit of a set, what was estimated by it, and that it was polished: the next one has to be as well."""
     out.nodes.pop(key, None)
+    out.polished.pop(key, None)
     for k in [k for k, e in out.estimates.items() if e.parent == key]:
         out.drop(k)
 

@@ -21,7 +21,7 @@ from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
 from origami_sim.infer.screen import screen
-from origami_sim.infer.search import search
+from origami_sim.infer.search import forget, search
 from origami_sim.recording import DriveChannel, Recording
 from tests.diagnose.strips import record, subject
 
@@ -82,6 +82,15 @@ def test_another_yield_angle_is_found_about_a_fit_that_ended_with_a_wrong_one(fo
     theta, gain = over_shapes(forward, stuck, weights)
     assert gain > 10.0 and theta[-1] < 0.02
     assert fit(forward, best.hypothesis, weights, theta=theta, local=best.local).cost < 1.01 * right.cost < stuck.cost
+
+
+def test_a_set_that_is_fitted_again_is_polished_again(found):
+    """Evidence of fits with stale derivatives by starts is not comparable with that of polished ones."""
+    key = next(iter(found.polished))
+    other = replace(found, **{n: dict(getattr(found, n)) for n in ("nodes", "estimates", "polished")})
+    other = replace(other, **{n: dict(getattr(found, n)) for n in ("log", "total", "promise")})
+    forget(other, key)
+    assert key not in other.nodes and key not in other.polished and key in found.polished
 
 
 def test_what_is_held_out_is_judged_in_one_noise_for_all(found, rubbing):
