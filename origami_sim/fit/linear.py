@@ -19,7 +19,7 @@ from origami_sim.fit.weights import Rows, Weights, recast
 PART = 8000
 """Rows of a long matrix that are factored together.
 
-Of 31,800 by 150 in 0.7 and 0.8 of numpy's time on one core and on two; half in 0.7 and 1.0. A thousand take 0.6 and 1.7.
+Of 31,800 by 150 in 0.7 and 0.8 of the time of numpy on one core and two; half in 0.7 and 1.0, 1,000 in 0.6 and 1.7.
 """
 
 
