@@ -12,6 +12,7 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.words import pooled
 
 FAR = 2.0
@@ -89,7 +90,9 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     suspects = best.hypothesis.suspects
     parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
     for s, part in zip(suspects, parts, strict=True):
-        out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", gain * part / total))
+        named = s.effect != UNLISTED
+        kind = "rest" if not named else "measurement" if s.kind == "measurement" else "effect"
+        out.append(Share(s.label if named else f"not named, at {s.site}", kind, gain * part / total))
     out.append(Share("not named", "rest", rest / total))
     return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over)
 

@@ -31,6 +31,7 @@ from origami_sim.infer.nominal import level
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
+from origami_sim.infer.unlisted import anywhere, beside
 from origami_sim.threads import side_by_side
 
 UNFITTED = 0.05
@@ -82,6 +83,7 @@ def search(
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
         extended(out, forward, progress=progress, most=most)
+    beyond_the_catalogue(out, forward)
     return out
 
 
@@ -111,6 +113,35 @@ def reconsidered(
     alone = [k for k in out.estimates if len(k) == 1]
     suspects = [out.suspect(n) for k in alone for n in k]
     return _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), progress))
+
+
+def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
+    """Enters a smooth moment of a crease that no law gives, if beside the best set one explains more.
+
+    It is fitted alone, and competes with what was found: where that is right the moment explains less, as it cannot do
+    what laws of the drive, of memory or with sharp bends do.
+    """
+    best = max(_named(out), key=lambda k: out.total[k])
+    coefficients = anywhere(forward)
+    left = [one for one in beside(forward, out.nodes[best].fit, coefficients, out.hyper) if one[2] > 0.0]
+    if not left:
+        return
+    out.left = max(left, key=lambda one: one[2])[0].site
+    none, sites = out.nodes[frozenset()].fit, {s.site for s, *_ in left}
+    about = beside(forward, none, [s for s in coefficients if s.site in sites], out.hyper)
+    if not about:
+        return
+    suspect, begin, gain = max(about, key=lambda one: one[2])
+    doubt = max(0.0, _most(out.gains.get(frozenset(), [])))
+    if out.total[frozenset()] + gain + doubt < out.total[best] + np.log(UNFITTED):
+        return
+    out.signatures.append(Signature(suspect, [], 1.0))
+    key, theta = frozenset({len(out.signatures) - 1}), np.concatenate([none.theta, begin])
+    f = fit(forward, Hypothesis((suspect,)), level(forward, none), theta=theta, local=none.local)
+    if f.failed:
+        out.failed[key] = f.failed
+    else:
+        enter(out, _node(out, forward, key, f)[0], log_priors(out.signatures))
 
 
 def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.ndarray, float] | None]) -> bool:

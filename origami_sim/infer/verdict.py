@@ -12,6 +12,7 @@ from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
+from origami_sim.infer.unlisted import UNLISTED, largest
 from origami_sim.infer.words import distinct, joined, said, say, title
 
 CREDIBLE = 0.95
@@ -95,7 +96,8 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    if left.rest > left.named and (left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE):
+    real = UNLISTED in lead or left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE
+    if left.rest > left.named and real:
         return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])
@@ -135,7 +137,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     chance = d.chance
     more_laws = len(chance) < len(p.total)  # only some may be named
     classes = by_effects(p, chance)
-    shown, explained = widened(p, d.best), _explained(budgeted(d.best))
+    shown, explained = widened(p, d.best), _explained(budgeted(d.best), p.left)
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
@@ -149,6 +151,15 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if not d.lead:
         word, text, chosen = unnamed_verdict(forward, given, base, compared, unknown=d.word == "UNKNOWN")
         return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
+    if d.word == "UNKNOWN" and UNLISTED in d.lead:
+        b = budgeted(d.best)
+        left = f"it explains {b.rest:.0%} of the mismatch, numbers of the model {b.numbers:.0%}"
+        text = (
+            f"Something real is missing that the catalogue does not name: {smooth_moment(shown)}. {left.capitalize()}."
+        )
+        nearest = next((f for f in others if f.hypothesis.suspects), None)
+        text += f" The closest of the catalogue is {say(nearest)}." if nearest else ""
+        return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
     if d.word == "UNKNOWN":
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         text += MORE_LAWS if more_laws else ""
@@ -178,6 +189,12 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""
         text += f" Something acts besides (p = {more:.2f}), and these recordings do not tell what{likely}."
     return Judgement(d.word, text, d.probability, chosen, **common)
+
+
+def smooth_moment(f: Fit) -> str:
+    """The moment of a crease that no law of the catalogue gives, in words."""
+    site = next(s.site for s in f.hypothesis.suspects if s.effect == UNLISTED)
+    return f"{title(UNLISTED)}, at {site} (up to {said(largest(f), 'N m', 2)})"
 
 
 def undecided(lead: frozenset[str], credible: list[frozenset[str]], chances: dict[frozenset[str], float]) -> str:
@@ -346,11 +363,13 @@ def deviations(node: Node, p: Posterior) -> np.ndarray:
     return out
 
 
-def _explained(b: Budget) -> str:
+def _explained(b: Budget, left: str) -> str:
+    """What a set explains, what numbers of the model do, and how much at which crease is left, in words."""
     text = f"explains {b.named:.0%} of the mismatch"
     if b.numbers >= 0.005:
         text += f", numbers of the model {b.numbers:.0%}"
-    return text + (f"; {b.rest:.0%} is real and not named" if b.rest >= 0.005 else "")
+    where = f", above all at {left}" if left else ""
+    return text + (f"; {b.rest:.0%} is real and not named{where}" if b.rest >= 0.005 else "")
 
 
 def _unlisted(d: Decision) -> str:

@@ -1,0 +1,87 @@
+"""A moment by angle and rate that no law of the catalogue gives: a polynomial, and no mechanism."""
+
+import math
+
+import numpy as np
+import warp as wp
+
+from origami_sim.effects._effect import Effect, Parameter, scalar
+
+ORDER = 5
+"""Highest order in the angle or the rate alone."""
+
+
+@wp.func
+def moment(
+    angle: scalar,
+    rate: scalar,
+    constant: scalar,
+    angle_1: scalar,
+    angle_2: scalar,
+    angle_3: scalar,
+    angle_4: scalar,
+    angle_5: scalar,
+    rate_1: scalar,
+    rate_2: scalar,
+    rate_3: scalar,
+    rate_4: scalar,
+    rate_5: scalar,
+    both_11: scalar,
+    both_12: scalar,
+    both_21: scalar,
+    middle: scalar,
+    reach: scalar,
+    fastest: scalar,
+):
+    one = scalar(1.0)
+    x = wp.clamp((angle - middle) / reach, -one, one)
+    y = wp.clamp(rate / fastest, -one, one)
+    x2 = scalar(2.0) * x * x - one
+    x3 = scalar(2.0) * x * x2 - x
+    x4 = scalar(2.0) * x * x3 - x2
+    x5 = scalar(2.0) * x * x4 - x3
+    y2 = scalar(2.0) * y * y - one
+    y3 = scalar(2.0) * y * y2 - y
+    y4 = scalar(2.0) * y * y3 - y2
+    y5 = scalar(2.0) * y * y4 - y3
+    by_angle = angle_1 * x + angle_2 * x2 + angle_3 * x3 + angle_4 * x4 + angle_5 * x5
+    by_rate = rate_1 * y + rate_2 * y2 + rate_3 * y3 + rate_4 * y4 + rate_5 * y5
+    return constant + by_angle + by_rate + both_11 * x * y + both_12 * x * y2 + both_21 * x2 * y
+
+
+TERMS = (
+    ("constant", 0, 0),
+    *((f"angle_{n}", n, 0) for n in range(1, ORDER + 1)),
+    *((f"rate_{n}", 0, n) for n in range(1, ORDER + 1)),
+    ("both_11", 1, 1),
+    ("both_12", 1, 2),
+    ("both_21", 2, 1),
+)
+"""Names of the coefficients, and their orders in the angle and in the rate."""
+
+
+def _steepest(axis: int, over: str):
+    """Bound of a slope: |T_n'| <= n^2 and |T_n| <= 1."""
+    return lambda p: sum(t[axis] ** 2 * np.abs(p[t[0]]) for t in TERMS) / p[over]
+
+
+EFFECT = Effect(
+    name="crease_polynomial",
+    family="crease",
+    force=moment,
+    parameters=(
+        *(
+            Parameter(name, f"M{i}{j}", "N m", 0.0, (-math.inf, math.inf), f"coefficient of T{i}(x) T{j}(y)")
+            for name, i, j in TERMS
+        ),
+        Parameter("middle", "theta_m", "rad", 0.0, (-20.0, 20.0), "angle in the middle of the range"),
+        Parameter("reach", "theta_r", "rad", math.pi, (0.001, 20.0), "half of the range of angles"),
+        Parameter("fastest", "w_r", "rad/s", 20.0, (0.001, 1e4), "largest rate"),
+    ),
+    needs=tuple(name for name, *_ in TERMS),
+    stiffness=_steepest(1, "reach"),
+    damping=_steepest(2, "fastest"),
+    formula="M = sum_ij Mij Ti(x) Tj(y),  x = (theta - theta_m) / theta_r,  y = w / w_r;  constant beyond |x|, |y| = 1",
+    source="Chebyshev polynomials; a discrepancy (Kennedy & O'Hagan 2001) that is a moment of the crease",
+    matters="how much a law of angle and rate could still explain at a crease that the catalogue does not name",
+)
