@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import cholesky_banded, lapack
-from scipy.sparse import dia_array
 
 from origami_sim.errors import InputError
 
@@ -47,5 +46,7 @@ def divided(bands: np.ndarray, columns: np.ndarray) -> np.ndarray:
 
 def multiplied(bands: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Columns [m, k] of independent numbers as correlated ones: multiplied by their factor."""
-    size = bands.shape[1]
-    return dia_array((bands, -np.arange(len(bands))), shape=(size, size)) @ columns
+    out = bands[0][:, None] * columns
+    for d in range(1, len(bands)):
+        out[d:] += bands[d, :-d, None] * columns[:-d]
+    return out

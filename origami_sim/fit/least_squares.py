@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Prediction, Predictor
-from origami_sim.fit.weights import Weights
+from origami_sim.fit.weights import Weights, restored, whitened
 
 STEPS = (1.0, 0.4, 0.1, 0.01)
 """Fractions of a Gauss-Newton step that are tried, until one keeps its promise."""
@@ -210,14 +210,14 @@ def links(forward: Predictor, blocks: Sequence[int]) -> list[tuple[bool, bool]]:
 
 def changed(forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int]) -> list[np.ndarray]:
     """Per block, whitened changes [K - 1, r] of what is predicted, from the first world to each of the others."""
-    out = []
-    for b, (before, after), values, ends in zip(blocks, links(forward, blocks), shot.values, shot.ends, strict=True):
-        block = forward.blocks[b]
-        gap, rows = values[1:] - values[0], block.rows(before, after)
-        data = weights.whitened(np.where(block.seen(), gap, 0.0), rows)
-        data[np.any(np.isnan(gap) & block.seen(), axis=(1, 2))] = np.nan
-        parts = [data, np.zeros((len(data), rows.start))]
-        if after and ends is not None and block.reach is not None:
+    out, every = [], [forward.blocks[b] for b in blocks]
+    rows = [block.rows(*link) for block, link in zip(every, links(forward, blocks), strict=True)]
+    gaps = [np.where(b.seen(), v[1:] - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
+    white = whitened(weights, gaps, rows)
+    for block, own, gap, data, ends in zip(every, rows, gaps, white, shot.ends, strict=True):
+        data[np.any(np.isnan(gap), axis=(1, 2))] = np.nan
+        parts = [data, np.zeros((len(data), own.start))]
+        if own.tie and ends is not None and block.reach is not None:
             parts.append((ends[1:] - ends[0]) / (weights.gap * block.reach))
         out.append(np.concatenate(parts, axis=1))
     return out
@@ -228,15 +228,15 @@ def residuals(
 ) -> list[np.ndarray]:
     """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed."""
     shot = forward.shoot(hypothesis, theta[None], local[None], blocks)
-    out = []
-    for b, (before, after), values, ends in zip(blocks, links(forward, blocks), shot.values, shot.ends, strict=True):
-        block = forward.blocks[b]
-        gap = np.where(block.seen(), block.values - values[0], 0.0)
-        data = weights.whitened(gap, block.rows(before, after))
+    out, every = [], [forward.blocks[b] for b in blocks]
+    rows = [block.rows(*link) for block, link in zip(every, links(forward, blocks), strict=True)]
+    gaps = [np.where(b.seen(), b.values - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
+    white = whitened(weights, gaps, rows)
+    for b, block, own, gap, data, ends in zip(blocks, every, rows, gaps, white, shot.ends, strict=True):
         parts = [data if np.all(np.isfinite(gap)) else np.full(len(data), np.nan)]
-        if forward.local and not before:
+        if own.start:
             parts.append(-local[b] / block.known)
-        if after and ends is not None and block.reach is not None:
+        if own.tie and ends is not None and block.reach is not None:
             parts.append((local[b + 1] - ends[0]) / (weights.gap * block.reach))
         out.append(np.concatenate(parts))
     return out
@@ -413,11 +413,7 @@ def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
     width = line.tangent[0].shape[1]
     change, moves, _ = _proposed(forward, f.free, f.theta, f.local, f.blocks, line)
     left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
-    out = []
-    for n, rest in enumerate(line.smoothed(left, list(moves[list(f.blocks)]))):
-        r = weights.restored(rest[line.data(n)], line.rows[n])
-        out.append(np.where(forward.blocks[f.blocks[n]].seen(), r, np.nan))
-    return out
+    return restored(weights, line.smoothed(left, list(moves[list(f.blocks)])), line.rows)
 
 
 def promised(forward, f: Fit) -> float:
@@ -458,10 +454,7 @@ def precision(free: Sequence[Free]) -> np.ndarray:
 
 
 def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) -> Fit:
-    residuals = []
-    for n, b in enumerate(blocks):
-        r = weights.restored(line.residual[n][line.data(n)], line.rows[n])
-        residuals.append(np.where(forward.blocks[b].seen(), r, np.nan))
+    residuals = restored(weights, line.residual, line.rows)
     misfit = float(sum(r @ r for r in line.residual))
     scale = np.array([f.scale for f in free])
     lower, upper = np.array([f.lower for f in free]), np.array([f.upper for f in free])

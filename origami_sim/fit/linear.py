@@ -51,16 +51,15 @@ class Linearisation:
         """Per segment, the factors Q, R of its columns: of its own start, then of the next one."""
         out, carry = [], None
         for rows, slopes, tie in zip(self.rows, self.slopes, self.tie, strict=True):
-            size = slopes.shape[1]
-            own = slopes if np.all(np.isfinite(slopes)) else np.zeros_like(slopes)
-            both = np.zeros((rows.count, size * (1 if tie is None else 2)))
-            both[:, :size] = own
-            if tie is not None:
-                both[rows.count - size :, size:] = -np.diag(tie)
+            size, first = slopes.shape[1], 0 if carry is None else len(carry)
+            both = np.zeros((first + rows.count, size * (1 if tie is None else 2)))
             if carry is not None:
-                above = np.zeros((len(carry), both.shape[1]))
-                above[:, :size] = carry
-                both = np.concatenate([above, both])
+                both[:first, :size] = carry
+            if np.isfinite(slopes).all():
+                both[first:, :size] = slopes
+            if tie is not None:
+                each = np.arange(size)
+                both[each - size, each + size] = -tie
             q, r = _orthogonal(both)
             out.append((q, r))
             carry = r[size:, size:] if tie is not None else None

@@ -104,13 +104,33 @@ def recast(columns: Sequence[np.ndarray], rows: Sequence[Rows], old: Weights, ne
     out = [np.array(c, float) for c in columns]
     if not old.like(new):
         for mine in patterns(rows):
-            data = np.stack([np.moveaxis(out[n][: rows[n].data], 0, -1) for n in mine])
-            data = new.whitened(old.restored(data, rows[mine[0]]), rows[mine[0]])
+            own = rows[mine[0]]
+            data = np.moveaxis(np.stack([out[n][: own.data] for n in mine]), 1, -1)
+            data = np.moveaxis(new.whitened(old.restored(data, own), own), -1, 1)
             for n, part in zip(mine, data, strict=True):
-                out[n][: rows[n].data] = np.moveaxis(part, -1, 0)
+                out[n][: own.data] = part
     if old.gap != new.gap:
         for c, r in zip(out, rows, strict=True):
             c[r.data + r.start :] *= old.gap / new.gap
+    return out
+
+
+def whitened(weights: Weights, values: Sequence[np.ndarray], rows: Sequence[Rows]) -> list[np.ndarray]:
+    """Residuals [..., n, D] of segments as `Weights.whitened`, together where they are whitened alike."""
+    return _together(weights.whitened, values, rows)
+
+
+def restored(weights: Weights, white: Sequence[np.ndarray], rows: Sequence[Rows]) -> list[np.ndarray]:
+    """Whitened numbers (..., n D) of segments as residuals, see `Weights.restored`; nan where nothing was measured."""
+    parts = _together(weights.restored, [w[..., : r.data] for w, r in zip(white, rows, strict=True)], rows)
+    return [p if r.seen is None else np.where(r.seen, p, np.nan) for p, r in zip(parts, rows, strict=True)]
+
+
+def _together(of, parts: Sequence[np.ndarray], rows: Sequence[Rows]) -> list[np.ndarray]:
+    out: list[np.ndarray] = [np.zeros(0)] * len(rows)
+    for mine in patterns(rows):
+        for n, part in zip(mine, of(np.stack([parts[n] for n in mine]), rows[mine[0]]), strict=True):
+            out[n] = part
     return out
 
 

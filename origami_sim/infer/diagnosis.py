@@ -299,17 +299,17 @@ class Diagnosis:
         return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
     def save_json(self, path: str | Path) -> Path:
-        """Writes everything as JSON."""
-        return write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
+        """Writes everything as JSON, a field per line: with a line for every number it takes ten times as long."""
+        lines = [f" {json.dumps(name)}: {json.dumps(v, allow_nan=False)}" for name, v in self.to_dict().items()]
+        return write_text(path, "{\n" + ",\n".join(lines) + "\n}")
 
 
 def _plain(value):
-    if type(value) is float:  # nearly all of it
-        return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
+        # nearly all of it are finite numbers
+        return [v if type(v) is float and math.isfinite(v) else _plain(v) for v in value]
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if is_dataclass(value):

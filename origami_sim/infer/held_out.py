@@ -8,7 +8,7 @@ from scipy.optimize import lsq_linear
 
 from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.weights import Weights
+from origami_sim.fit.weights import Weights, restored
 from origami_sim.recording import Recording
 
 FOLDS = 5
@@ -44,11 +44,11 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
     for part, step in zip(parts, steps_without(f, parts), strict=True):
         left = judged.smoothed([r - t @ step for r, t in zip(judged.residual, judged.tangent, strict=True)])
         own, count = np.zeros(dims), np.zeros(dims)
-        for n in part:
-            block = forward.blocks[f.blocks[n]]
-            r = alike.restored(left[n][judged.data(n)], judged.rows[n])
-            own += np.sum(np.where(block.seen(), r, 0.0) ** 2, axis=0)
-            count += block.seen().sum(axis=0)
+        rest = restored(alike, [left[n] for n in part], [judged.rows[n] for n in part])
+        for n, r in zip(part, rest, strict=True):
+            seen_here = forward.blocks[f.blocks[n]].seen()
+            own += np.sum(np.where(seen_here, r, 0.0) ** 2, axis=0)
+            count += seen_here.sum(axis=0)
         folds_.append(float(np.mean(own / np.maximum(count, 1) / forward.blocks[0].noise ** 2)))
         squares, seen = squares + own, seen + count
     return HeldOut(np.sqrt(squares / np.maximum(seen, 1)), np.array(folds_))

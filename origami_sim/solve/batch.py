@@ -229,7 +229,7 @@ class Batch:
         return np.ascontiguousarray(a if self.device.is_cuda else np.swapaxes(a, 0, 1), float).ravel()
 
     def _room(self, *shape: int, dtype, fill: Any = 0) -> wp.array:
-        """An array [*shape, W].
+        """An array [*shape, W]; with None for what fills it, as the memory happens to be.
 
         On a GPU the same entity of neighbouring worlds lies side by side, for threads that read together; on the CPU
         each world has a stretch of its own, for threads that must not write into each other's cache lines.
@@ -237,11 +237,11 @@ class Batch:
         if self.device.is_cuda:
             # rows a multiple of 4 KiB apart would all fall into one cache set
             stride = self.worlds + (8 if self.worlds % 64 == 0 else 0)
-            return wp.full((*shape, stride), fill, dtype=dtype, device=self.device)
+            return _filled((*shape, stride), fill, dtype, self.device)
         size = wp.types.type_size_in_bytes(dtype)
         count = math.prod(shape)
         length = count + -(-APART // size)
-        whole = wp.full((self.worlds, length), fill, dtype=dtype, device=self.device)
+        whole = _filled((self.worlds, length), fill, dtype, self.device)
         strides = (*(size * math.prod(shape[i + 1 :]) for i in range(len(shape))), size * length)
         shape = (*shape, self.worlds)
         out = wp.array(ptr=whole.ptr, dtype=dtype, shape=shape, strides=strides, device=self.device, copy=False)
@@ -325,10 +325,16 @@ class Batch:
         Returns: positions [F, N, W, 3] [m] and hinge angles [F, C + Q, W] [rad]; nan after a world has stopped.
         """
         n, rows = len(self.model.position), len(self.model.creases) + len(self.model.bends)
-        film = self._room(frames, max(n, 1), dtype=wp.vec3d, fill=wp.vec3d(np.nan))
-        angles = self._room(frames, max(rows, 1), dtype=wp.float64, fill=np.nan)
+        film = self._room(frames, max(n, 1), dtype=wp.vec3d, fill=None)
+        angles = self._room(frames, max(rows, 1), dtype=wp.float64, fill=None)
+        begun = max(self.step, 0)
         self._run(frames * steps, dt, speed_limit, steps, film, angles, self._nothing)
-        return film.numpy()[:, :n, : self.worlds], angles.numpy()[:, :rows, : self.worlds]
+        x, turned = film.numpy()[:, :n, : self.worlds], angles.numpy()[:, :rows, : self.worlds]
+        stopped = self.status()
+        for w in np.flatnonzero(stopped >= 0):  # within the step before that number, or before all of these
+            first = max(stopped[w] - 1 - begun, 0) // steps
+            x[first:, :, w], turned[first:, :, w] = np.nan, np.nan
+        return x, turned
 
     def carry(self, path: np.ndarray, dt: float):
         """Carries the nodes that are held along positions path [F + 1, N, S, 3], one step of dt [s] each.
@@ -449,6 +455,12 @@ class Batch:
             step=self.step,
             status=self._download(self._status, 2),
         )
+
+
+def _filled(shape: tuple[int, ...], fill: Any, dtype, device) -> wp.array:
+    if fill is None:
+        return wp.empty(shape, dtype=dtype, device=device)
+    return wp.full(shape, fill, dtype=dtype, device=device)
 
 
 _FIRST = object()
