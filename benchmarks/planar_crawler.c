@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define MOST 512
+#define POINTS 16
 #define BAND 6 /* a hinge joins three stations of two coordinates */
 
 typedef struct {
@@ -17,7 +18,10 @@ typedef struct {
     double length[MOST], couple[MOST];            /* of cells [m], moment along the cell [A m^2] */
     double lift[MOST];                            /* of cells: weight times its height above the line [N m] */
     double mass[MOST];                            /* of stations [kg] */
-    double kn[MOST], cn[MOST];                    /* of stations: ground [N/m, N s/m], feet at both ends */
+    double kn[MOST], cn[MOST];                    /* of cells: ground below them [N/m, N s/m] */
+    double foot_kn, foot_cn;                      /* of the feet, one at either end */
+    int points;                                   /* that stand for the ground below a cell (Gauss) */
+    double at[POINTS], share[POINTS];             /* where they are along it, 0 to 1; they sum to 1 */
     double belly, foot;                           /* depths below the line [m] */
     double mu, mu_forward, mu_back;               /* friction of the belly, of the feet */
     double field, frequency, gravity, decay;
@@ -32,24 +36,25 @@ static void lose(double (*a)[BAND], int first, int k, const double *g, double c)
         for (int j = 0; j <= i; j++) a[first + i][j - i + BAND - 1] += c * g[i] * g[j];
 }
 
-/* one contact of cell j's end n, o along the cell's normal below the line; adds its force, updates its bristle; what
-   its dashpots add to the system goes into the matrix */
-static void touch(const V *p, const V *v, V *f, double (*matrix)[BAND], int j, int n, double o, double length, double kn, double cn,
-                  double mu_forward, double mu_back, double dt, double *bristle)
+/* one contact of cell j at its share t, o along the cell's normal below the line; adds its force, updates its bristle;
+   what its dashpots add to the system goes into the matrix */
+static void touch(const V *p, const V *v, V *f, double (*matrix)[BAND], int j, double t, double o, double length,
+                  double kn, double cn, double mu_forward, double mu_back, double dt, double *bristle)
 {
     const int a = j, b = j + 1;
     const double ux = (p[b].x - p[a].x) / length, uz = (p[b].z - p[a].z) / length;
-    const double gap = p[n].z - o * ux;           /* the normal is (-uz, ux) */
+    const double gap = (1 - t) * p[a].z + t * p[b].z - o * ux;           /* the normal is (-uz, ux) */
     if (gap >= 0) { *bristle = 0; return; }
     const double turn = (ux * (v[b].z - v[a].z) - uz * (v[b].x - v[a].x)) / length;
-    const double vx = v[n].x + o * ux * turn, vz = v[n].z + o * uz * turn;
+    const double vx = (1 - t) * v[a].x + t * v[b].x + o * ux * turn;
+    const double vz = (1 - t) * v[a].z + t * v[b].z + o * uz * turn;
     double load = -kn * gap - cn * vz;
     if (load <= 0) { *bristle = 0; return; }
     double s = *bristle + vx * dt, pull = -kn * s - cn * vx;
     /* it slides, or is about to, against the pull; the body's forward direction is that of u along the ground */
     const double along = (pull > 0 ? -1.0 : 1.0) * (ux > 0 ? 1.0 : -1.0);
     const double limit = load * (along > 0 ? mu_forward : mu_back);
-    const double side = n == a ? 1 : 0, r = o / length;
+    const double side = 1 - t, r = o / length;
     const double up[4] = {r * uz * uz, side - r * uz * ux, -r * uz * uz, 1 - side + r * uz * ux};
     const double on[4] = {side + r * ux * uz, -r * ux * ux, 1 - side - r * ux * uz, r * ux * ux};
     load += cn * vz; /* the dashpots act with the velocity at the end of the step */
@@ -63,9 +68,8 @@ static void touch(const V *p, const V *v, V *f, double (*matrix)[BAND], int j, i
     }
     *bristle = s;
     const double c = o * (ux * pull + uz * load) / length;
-    f[n].x += pull; f[n].z += load;
-    f[b].x -= c * uz; f[b].z += c * ux;
-    f[a].x += c * uz; f[a].z -= c * ux;
+    f[a].x += side * pull + c * uz; f[a].z += side * load - c * ux;
+    f[b].x += t * pull - c * uz; f[b].z += t * load + c * ux;
 }
 
 /* solves a x = b by Cholesky's decomposition; a holds the lower band, row by row, its diagonal last; x goes into b */
@@ -94,11 +98,12 @@ static void solve(int n, double (*a)[BAND], double *b)
 int run(const Device *d, double *state, double dt, long steps, long every, double *out)
 {
     static _Thread_local V f[MOST];
-    static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[2 * MOST], a[2 * MOST][BAND];
+    static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[POINTS * MOST], ends[2], a[2 * MOST][BAND];
     const int n = d->cells;
     V *p = (V *)state, *v = p + n + 1;
     double total = 0;
     memset(bristle, 0, sizeof bristle);
+    ends[0] = ends[1] = 0;
     for (int i = 0; i <= n; i++) total += d->mass[i];
     for (long k = 0; k < steps; k++) {
         memset(a, 0, 2 * (n + 1) * sizeof *a);
@@ -125,15 +130,14 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
             f[j].x += q * uz[j]; f[j].z -= q * ux[j];
             f[j + 1].x -= q * uz[j]; f[j + 1].z += q * ux[j];
         }
-        touch(p, v, f, a, 0, 0, d->foot, len[0], d->kn[0], d->cn[0], d->mu_forward, d->mu_back, dt, bristle);
-        touch(p, v, f, a, n - 1, n, d->foot, len[n - 1], d->kn[n], d->cn[n], d->mu_forward, d->mu_back, dt,
-              bristle + 2 * n);
-        for (int i = 1; i < n; i++) {
-            if (p[i].z > d->belly) { bristle[2 * i] = bristle[2 * i + 1] = 0; continue; }
-            touch(p, v, f, a, i - 1, i, d->belly, len[i - 1], d->kn[i] / 2, d->cn[i] / 2, d->mu, d->mu, dt,
-                  bristle + 2 * i);
-            touch(p, v, f, a, i, i, d->belly, len[i], d->kn[i] / 2, d->cn[i] / 2, d->mu, d->mu, dt,
-                  bristle + 2 * i + 1);
+        touch(p, v, f, a, 0, 0, d->foot, len[0], d->foot_kn, d->foot_cn, d->mu_forward, d->mu_back, dt, ends);
+        touch(p, v, f, a, n - 1, 1, d->foot, len[n - 1], d->foot_kn, d->foot_cn, d->mu_forward, d->mu_back, dt, ends + 1);
+        for (int j = 0; j < n; j++) {
+            double *b = bristle + j * d->points;
+            if (fmin(p[j].z, p[j + 1].z) > d->belly) { memset(b, 0, d->points * sizeof *b); continue; }
+            for (int i = 0; i < d->points; i++)
+                touch(p, v, f, a, j, d->at[i], d->belly, len[j], d->kn[j] * d->share[i], d->cn[j] * d->share[i], d->mu,
+                      d->mu, dt, b + i);
         }
         double x = 0;
         for (int i = 0; i <= n; i++) {

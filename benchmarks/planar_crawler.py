@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-MOST = 512
+MOST, POINTS = 512, 16
 ARRAYS = ("rigidity", "loss", "axial", "dashpot", "length", "couple", "lift", "mass", "kn", "cn")
 NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay")
 MAE = 0.78e6
@@ -32,6 +32,11 @@ class Device(ctypes.Structure):
     _fields_ = [
         ("cells", ctypes.c_int),
         *((n, ctypes.c_double * MOST) for n in ARRAYS),
+        ("foot_kn", ctypes.c_double),
+        ("foot_cn", ctypes.c_double),
+        ("points", ctypes.c_int),
+        ("at", ctypes.c_double * POINTS),
+        ("share", ctypes.c_double * POINTS),
         *((n, ctypes.c_double) for n in NUMBERS),
     ]
 
@@ -82,11 +87,12 @@ def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, floa
     reduced = mass[1:] * mass[:-1] / (mass[1:] + mass[:-1])
     middle = np.cumsum(length) - length / 2
     poled = np.where(middle < s["overhang"] + s["big_length"] + s["span"] / 2, s["big_moment"], -1.0)
-    kn = np.full(n + 1, s["foot_stiffness"])
-    kn[1:n] = s["ground_stiffness"] * (length[1:] + length[:-1]) / 2
+    kn, foot = s["ground_stiffness"] * length, s["foot_stiffness"]
+    at, share = np.polynomial.legendre.leggauss(int(s["belly_points"]))
     values = {
         "cells": n, "rigidity": k, "loss": c, "axial": axial, "length": length, "mass": mass, "kn": kn,
         "dashpot": 2 * s["membrane_damping"] * np.sqrt(axial * reduced), "cn": s["ground_time"] * kn,
+        "foot_kn": foot, "foot_cn": s["ground_time"] * foot, "points": len(at), "at": (1 + at) / 2, "share": share / 2,
         "couple": s["polarity"] * poled * s["remanence"] / (4e-7 * np.pi) * t * patch * length,
         "lift": weight * s["gravity"] * (h + t) / 2 * bool(s["patch_height"]),
         "belly": h / 2, "foot": h / 2 + s["foot_height"], "mu": s["belly_friction"],
@@ -97,7 +103,9 @@ def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, floa
     near = np.minimum(np.append(length[0], length), np.append(length, length[-1]))
     hinge, rod = (np.maximum.reduce([a, np.append(a[1:], 0), np.append(0, a[:-1])]) for a in (k, np.append(axial, 0)))
     lever = (1 + 2 * values["foot"] / near) ** 2
-    step = 2 / np.sqrt(((16 * hinge / near**2 + 4 * rod + kn * lever) / mass).max())
+    ground = (np.append(kn, 0) + np.append(0, kn)) / 2
+    ground[[0, -1]] += foot
+    step = 2 / np.sqrt(((16 * hinge / near**2 + 4 * rod + ground * lever) / mass).max())
     state = np.zeros((2, n + 1, 2))
     state[0] = np.column_stack([x, np.full(n + 1, values["foot"])])
     return values, state, step

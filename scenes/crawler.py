@@ -81,7 +81,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
                         poling=(s.heading * sign, 0, 0), remanence=s.remanence * factor,
                         density=s.patch_density)  # fmt: skip
 
-    # a foot at either end, two points each; the belly everywhere, with a stiffness per length, whatever the cells
+    # a foot at either end, two points each
     last = len(cells) - 1
     feet, ends = [], ((0, x[0], width[0]), (last, x[-1], width[-1]))
     for panel, at, w in ends:
@@ -89,12 +89,16 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
             feet.append(sheet.contact(panel, (at, y * w / 2, 0), offset=-s.thickness / 2 - s.foot_height,
                                       axis=(s.heading, 0, 0), name=f"foot at x = {at:.3f}"))  # fmt: skip
         sheet.mass([2 * (panel + (panel == last)), 2 * (panel + (panel == last)) + 1], s.foot_mass / 2)
-    belly = []  # at every station, shared by the cells on either side, so that fore and aft look the same
-    for k in range(1, len(x) - 1):
-        for cell in (k - 1, k):
-            belly += [sheet.contact(cell, (x[k], y * width[k] / 2, 0), offset=-s.thickness / 2) for y in (-1, 1)]
-    along = 0.5 * (cells[1:] + cells[:-1])  # what a station stands for
-    stiff = np.repeat(s.ground_stiffness / 4 * along, 4)
+    # the belly's pressure is integrated along both borders: with points at the stations alone, the strip would land on
+    # some of them and not between, elsewhere on every mesh
+    at, weight = np.polynomial.legendre.leggauss(int(s.belly_points))
+    belly, along = [], []
+    for k, cell in enumerate(cells):
+        for t, share in zip((1 + at) / 2, weight / 2, strict=True):
+            half = ((1 - t) * width[k] + t * width[k + 1]) / 2
+            belly += [sheet.contact(k, (x[k] + t * cell, y * half, 0), offset=-s.thickness / 2) for y in (-1, 1)]
+            along += [share * cell] * 2  # what a point stands for
+    stiff = s.ground_stiffness / 2 * np.array(along)
     for effect in ("ground", "friction"):
         sheet.set(effect, feet, stiffness=s.foot_stiffness / 2, damping=s.foot_stiffness / 2 * s.ground_time)
         sheet.set(effect, belly, stiffness=stiff, damping=stiff * s.ground_time)
