@@ -12,6 +12,12 @@ ORDER = 5
 
 
 @wp.func
+def area_sinh(x: scalar):
+    size = wp.abs(x)
+    return wp.sign(x) * wp.log(size + wp.sqrt(size * size + scalar(1.0)))
+
+
+@wp.func
 def moment(
     angle: scalar,
     rate: scalar,
@@ -31,11 +37,12 @@ def moment(
     both_21: scalar,
     middle: scalar,
     reach: scalar,
+    usual: scalar,
     fastest: scalar,
 ):
     one = scalar(1.0)
     x = wp.clamp((angle - middle) / reach, -one, one)
-    y = wp.clamp(rate / fastest, -one, one)
+    y = wp.clamp(area_sinh(rate / usual) / area_sinh(fastest / usual), -one, one)
     x2 = scalar(2.0) * x * x - one
     x3 = scalar(2.0) * x * x2 - x
     x4 = scalar(2.0) * x * x3 - x2
@@ -60,9 +67,9 @@ TERMS = (
 """Names of the coefficients, and their orders in the angle and in the rate."""
 
 
-def _steepest(axis: int, over: str):
-    """Bound of a slope: |T_n'| <= n^2 and |T_n| <= 1."""
-    return lambda p: sum(t[axis] ** 2 * np.abs(p[t[0]]) for t in TERMS) / p[over]
+def _steepest(p, axis: int):
+    """Bound of the slope against x or y: |T_n'| <= n^2 and |T_n| <= 1."""
+    return sum(term[axis] ** 2 * np.abs(p[term[0]]) for term in TERMS)
 
 
 EFFECT = Effect(
@@ -76,12 +83,16 @@ EFFECT = Effect(
         ),
         Parameter("middle", "theta_m", "rad", 0.0, (-20.0, 20.0), "angle in the middle of the range"),
         Parameter("reach", "theta_r", "rad", math.pi, (0.001, 20.0), "half of the range of angles"),
+        Parameter(
+            "usual", "w_0", "rad/s", 2.0, (0.001, 1e4), "rate up to which y goes with the rate, beyond with its log"
+        ),
         Parameter("fastest", "w_r", "rad/s", 20.0, (0.001, 1e4), "largest rate"),
     ),
     needs=tuple(name for name, *_ in TERMS),
-    stiffness=_steepest(1, "reach"),
-    damping=_steepest(2, "fastest"),
-    formula="M = sum_ij Mij Ti(x) Tj(y),  x = (theta - theta_m) / theta_r,  y = w / w_r;  constant beyond |x|, |y| = 1",
+    stiffness=lambda p: _steepest(p, 1) / p["reach"],
+    damping=lambda p: _steepest(p, 2) / (p["usual"] * np.arcsinh(p["fastest"] / p["usual"])),
+    formula="M = sum_ij Mij Ti(x) Tj(y),  x = (theta - theta_m) / theta_r,  y = asinh(w / w_0) / asinh(w_r / w_0); "
+    "constant beyond |x|, |y| = 1",
     source="Chebyshev polynomials; a discrepancy (Kennedy & O'Hagan 2001) that is a moment of the crease",
     matters="how much a law of angle and rate could still explain at a crease that the catalogue does not name",
 )

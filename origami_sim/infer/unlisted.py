@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebval2d
 from scipy.signal import savgol_filter
 
-from origami_sim.effects.crease_polynomial import EFFECT, TERMS
-from origami_sim.fit.evidence import Group, Sets
+from origami_sim.effects.crease_polynomial import EFFECT, ORDER, TERMS
+from origami_sim.fit.evidence import Group
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Free, Suspect, scaled, suspects, told_apart
 from origami_sim.fit.least_squares import Fit
@@ -31,24 +32,26 @@ HELD = 1e-3
 """Deviation of the range, as a part of it, in a fit: it is no unknown."""
 
 
+WIDE = 3.0
+"""Deviation of the coefficients, over one that changes as much as is missed: what angle and rate do not tell apart,
+such as their squares in a swing that keeps its energy, stays small. Of three friction laws a third and three times as
+much change no log evidence by more than LOGS."""
+
+
 def anywhere(forward: Predictor) -> list[Suspect]:
     """Each coefficient of a polynomial moment alone, at each crease that the channels tell apart."""
-    arm = forward.articulation
-    if not len(arm.creases):
-        return []
-    tracks = [t for r in forward.recordings if (t := track(forward, r)) is not None]
     every = suspects(forward.model, forward.recordings, forward.drive, forward.parameters)
     every = [s for s in told_apart(every, len(forward.components)) if s.kind == "crease" and not s.stretch]
     each = {s.site: s.entities or tuple(range(len(forward.model.creases))) for s in every if s.entities or s.sites == 1}
-    out = []
+    out, moved = [], motion(forward)
     for site, entities in each.items():
-        mine = [len(arm.creases) - k - 1 for k, c in enumerate(arm.creases[::-1]) if c in entities]
-        if not mine or not tracks:
+        mine = np.isin(forward.articulation.creases, entities)
+        if not np.any(mine) or moved is None:
             continue
-        folds = [t.q[len(t.q) - len(arm.creases) :][mine] for t in tracks]
-        low, high = min(float(q.min()) for q in folds), max(float(q.max()) for q in folds)
-        fast = [_fastest(q, float(np.median(np.diff(t.times)))) for q, t in zip(folds, tracks, strict=True)]
-        span = {"middle": 0.5 * (low + high), "reach": 0.5 * (high - low), "fastest": max(fast)}
+        angles, rates = (values[mine] for values in moved)
+        low, high = float(angles.min()), float(angles.max())
+        usual, fastest = np.quantile(np.abs(rates), [0.5, 0.998])
+        span = {"middle": 0.5 * (low + high), "reach": 0.5 * (high - low), "usual": usual, "fastest": fastest}
         fixed = [_free(name, np.clip(value, *EFFECT.parameter(name).bounds), entities) for name, value in span.items()]
         for name, _, by_rate in TERMS:
             if not (by_rate and forward.curve):
@@ -57,11 +60,16 @@ def anywhere(forward: Predictor) -> list[Suspect]:
     return out
 
 
-def _fastest(q: np.ndarray, step: float) -> float:
-    """Largest rate of a recorded angle [.., n], but for what noise adds to a few."""
-    if q.shape[-1] <= WINDOW:
-        return 0.0
-    return float(np.quantile(np.abs(savgol_filter(q, WINDOW, 2, deriv=1, delta=step, axis=-1)), 0.998))
+def motion(forward: Predictor) -> tuple[np.ndarray, np.ndarray] | None:
+    """Recorded angles of creases and their rates, [J, n] each, all recordings one after the other; None if not told."""
+    tracks = [t for r in forward.recordings if (t := track(forward, r)) is not None and len(t.times) > WINDOW]
+    folds = len(forward.articulation.creases)
+    if not tracks or not folds:
+        return None
+    angles = [t.q[len(t.q) - folds :] for t in tracks]
+    steps = [float(np.median(np.diff(t.times))) for t in tracks]
+    rates = [savgol_filter(q, WINDOW, 2, deriv=1, delta=h, axis=1) for q, h in zip(angles, steps, strict=True)]
+    return np.concatenate(angles, axis=1), np.concatenate(rates, axis=1)
 
 
 def _free(name: str, value: float, entities: tuple[int, ...]) -> Free:
@@ -105,25 +113,42 @@ def beside(
     sets = [(*range(before), before + n) for n in range(len(sites))]
     gains = ahead.gains([[groups[g] for g in s] for s in sets], hyper)
     out = []
-    for s, gain, mine in zip(sets, gains, sites.values(), strict=True):
-        _, values = ahead.white.of(Sets.of([s], groups, before, count), hyper)
-        suspect, sizes = _joint(mine), np.array([m.size for m in mine])
+    for of, gain, mine in zip(sets, gains, sites.values(), strict=True):
+        columns = [c for g in of for c in groups[g].columns]
+        suspect, sizes = _joint(mine, float(np.sqrt(f.cost))), np.array([m.size for m in mine])
+        known = [0.0] * len(own.columns) + [s.size / n.spread for s, n in zip(mine, suspect.free, strict=False)]
+        gram = ahead.white.gram
+        values = np.linalg.lstsq(
+            gram[np.ix_(columns, columns)] + np.diag(np.square(known)), gram[columns, -1], rcond=None
+        )[0]
         shapes = [n.start for n in suspect.free[len(mine) :]]
-        out.append((suspect, np.array([*values[0, -len(mine) :] * sizes, *shapes]), float(gain)))
+        out.append((suspect, np.array([*values[-len(mine) :] * sizes, *shapes]), float(gain)))
     return out
 
 
-def _joint(mine: Sequence[Signature]) -> Suspect:
-    """One suspect with all of its coefficients."""
-    strengths = [replace(s.suspect.free[0], scale=abs(s.size)) for s in mine]
+def _joint(mine: Sequence[Signature], missed: float) -> Suspect:
+    """One suspect with all of its coefficients.
+
+    Args:
+        missed: norm of what is missed, over the noise.
+    """
+    unit = missed * float(np.median([abs(s.size) / s.raw for s in mine]))
+    strengths = [replace(s.suspect.free[0], scale=abs(s.size), spread=WIDE * unit) for s in mine]
     first = mine[0].suspect
     return replace(first, free=(*strengths, *first.free[1:]))
 
 
-def largest(f: Fit) -> float:
-    """The largest moment of a fit's polynomial on the ellipse of its angles and rates [N m]."""
-    value = {n.name: v for n, v in zip(f.free, f.theta, strict=True) if n.owner == UNLISTED}
-    grid = np.linspace(-1.0, 1.0, 41)
-    waves = np.cos(np.arange(6)[:, None] * np.arccos(grid))
-    table = np.sum([value.get(name, 0.0) * np.outer(waves[i], waves[j]) for name, i, j in TERMS], axis=0)
-    return float(np.max(np.abs(table[np.hypot(*np.meshgrid(grid, grid)) <= 1.0])))
+def usual_moment(forward: Predictor, f: Fit) -> float:
+    """Root mean square of a fit's polynomial moment over the recorded motion [N m]."""
+    (suspect,) = (s for s in f.hypothesis.suspects if s.effect == UNLISTED)
+    value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    of = {n.name: float(value[id(n)]) for n in suspect.free}
+    moved = motion(forward)
+    assert moved is not None and suspect.entities is not None
+    angle, rate = (v[np.isin(forward.articulation.creases, suspect.entities)] for v in moved)
+    x = np.clip((angle - of["middle"]) / of["reach"], -1.0, 1.0)
+    y = np.clip(np.arcsinh(rate / of["usual"]) / np.arcsinh(of["fastest"] / of["usual"]), -1.0, 1.0)
+    table = np.zeros((ORDER + 1, ORDER + 1))
+    for name, i, j in TERMS:
+        table[i, j] = of.get(name, 0.0)
+    return float(np.sqrt(np.mean(np.square(chebval2d(x, y, table)))))

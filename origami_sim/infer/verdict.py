@@ -12,7 +12,7 @@ from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
-from origami_sim.infer.unlisted import UNLISTED, largest
+from origami_sim.infer.unlisted import UNLISTED, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
 
 CREDIBLE = 0.95
@@ -153,10 +153,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
     if d.word == "UNKNOWN" and UNLISTED in d.lead:
         b = budgeted(d.best)
-        left = f"it explains {b.rest:.0%} of the mismatch, numbers of the model {b.numbers:.0%}"
-        text = (
-            f"Something real is missing that the catalogue does not name: {smooth_moment(shown)}. {left.capitalize()}."
-        )
+        text = f"Something real is missing that the catalogue does not name: {smooth_moment(forward, shown)}."
+        text += f" It explains {b.rest:.0%} of the mismatch, numbers of the model {b.numbers:.0%}."
         nearest = next((f for f in others if f.hypothesis.suspects), None)
         text += f" The closest of the catalogue is {say(nearest)}." if nearest else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
@@ -191,10 +189,10 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     return Judgement(d.word, text, d.probability, chosen, **common)
 
 
-def smooth_moment(f: Fit) -> str:
+def smooth_moment(forward: Predictor, f: Fit) -> str:
     """The moment of a crease that no law of the catalogue gives, in words."""
     site = next(s.site for s in f.hypothesis.suspects if s.effect == UNLISTED)
-    return f"{title(UNLISTED)}, at {site} (up to {said(largest(f), 'N m', 2)})"
+    return f"{title(UNLISTED)}, at {site} (root mean square {said(usual_moment(forward, f), 'N m', 2)})"
 
 
 def undecided(lead: frozenset[str], credible: list[frozenset[str]], chances: dict[frozenset[str], float]) -> str:

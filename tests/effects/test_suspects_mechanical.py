@@ -6,10 +6,11 @@ import math
 import numpy as np
 import pytest
 from effects.kit import ALL, hinge, hinge_positions, lengths, make_model, quiet, slope, start
+from numpy.polynomial import chebyshev
 from scipy.integrate import quad
 
 from origami_sim.drive import Drive, series
-from origami_sim.effects import CATALOGUE
+from origami_sim.effects import CATALOGUE, crease_polynomial
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
@@ -274,6 +275,26 @@ def test_table_of_the_discrepancy_is_exact_for_bilinear_moments():
     p = quiet(hinge(), values).of("crease_discrepancy")
     assert CATALOGUE["crease_discrepancy"].stiffness(p) == pytest.approx(np.abs(-0.3 + 0.05 * -3 * np.ones((1, 1))))
     assert CATALOGUE["crease_discrepancy"].damping(p) == pytest.approx((0.02 + 0.05 * 2) * np.ones((1, 1)))
+
+
+def test_polynomial_of_a_crease_is_that_of_chebyshev():
+    rng, ends = np.random.default_rng(3), {"middle": 0.2, "reach": 0.9, "usual": 0.7, "fastest": 6.0}
+    table = np.zeros((6, 6))
+    for _, i, j in crease_polynomial.TERMS:
+        table[i, j] = rng.normal()
+    given = {name: table[i, j] for name, i, j in crease_polynomial.TERMS}
+    values = under("crease_polynomial", **given, **ends)
+    angles = np.linspace(-1.4, 1.8, 23)
+    for rate in (-9.0, -6.0, -0.3, 0.0, 0.8, 4.0, 20.0):
+        x = ((angles - 0.2) / 0.9).clip(-1, 1)
+        y = np.clip(np.arcsinh(rate / 0.7) / np.arcsinh(6.0 / 0.7), -1, 1)
+        expected = chebyshev.chebval2d(x, np.full_like(x, y), table)
+        assert moments(["crease_polynomial"], values, angles, rate=rate) == pytest.approx(expected, abs=1e-12)
+    p = quiet(hinge(), values).of("crease_polynomial")
+    grid = np.linspace(-1.0, 1.0, 201)
+    for axis, per, bound in ((0, 0.9, "stiffness"), (1, 0.7 * np.arcsinh(6.0 / 0.7), "damping")):
+        steepest = np.abs(chebyshev.chebgrid2d(grid, grid, chebyshev.chebder(table, axis=axis))).max() / per
+        assert steepest <= getattr(CATALOGUE["crease_polynomial"], bound)(p)[0, 0] < 5.0 * steepest
 
 
 # --- nodes ------------------------------------------------------------------------------------------------------------
