@@ -114,6 +114,11 @@ class Posterior:
         total = logsumexp(p)
         return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
 
+    @property
+    def leader(self) -> Key:
+        """The most probable set of those that were fitted."""
+        return max(self.nodes, key=lambda k: self.total[k])
+
     def labels(self, key: Key) -> tuple[str, ...]:
         """Effects of a set and their sites."""
         if key not in self._labels:

@@ -106,8 +106,7 @@ def reconsidered(
     A model that snaps, or a crease that sticks, has no derivatives that tell why. So before nothing is said to explain
     a recording, each effect is tried over its range, once.
     """
-    best = max(out.nodes, key=lambda k: out.total[k])
-    if out.reconsidered or over_noise(forward, out.nodes[best].fit) < FAR:
+    if out.reconsidered or over_noise(forward, out.nodes[out.leader].fit) < FAR:
         return False
     out.reconsidered = True
     alone = [k for k in out.estimates if len(k) == 1]
@@ -200,7 +199,7 @@ def _named(out: Posterior) -> list[Key]:
     Where the best set is of so many laws that they rather imitate another, none of its kind is: it suffices to know it.
     """
     few = [k for k in out.nodes if not out.imitates(k)]
-    return few if out.imitates(max(out.nodes, key=lambda k: out.total[k])) else list(out.nodes)
+    return few if out.imitates(out.leader) else list(out.nodes)
 
 
 def _likely(out: Posterior) -> Key | None:
