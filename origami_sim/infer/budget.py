@@ -12,6 +12,7 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.bursts import bursts
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.words import pooled
 
@@ -42,11 +43,12 @@ class Budget:
 
     Attributes:
         shares: add up to one; none if nothing is missed. over: error that is left, over the recorder's noise (root mean
-            square over the components).
+            square over the components). bursts: log odds that forces act now and then, see `bursts`.
     """
 
     shares: list[Share]
     over: float
+    bursts: float = -np.inf
 
     @property
     def named(self) -> float:
@@ -72,7 +74,10 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     """
     assert best.weights is not None
     recorder, over = recorder_noise(forward, best), over_noise(forward, best)
+    now_and_then = bursts(best)
     level = np.minimum(best.weights.deviation, recorder)
+    if now_and_then.odds > 0.0:
+        level = np.minimum(level, np.maximum(now_and_then.level, forward.blocks[0].noise))
     noise = Weights(level, best.weights.colour, HYPER.least)
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
@@ -85,7 +90,7 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
     total = numbers + gain + rest
     if total <= 0.0:
-        return Budget([], over)
+        return Budget([], over, now_and_then.odds)
     out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
     suspects = best.hypothesis.suspects
     parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
@@ -94,7 +99,7 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
         kind = "rest" if not named else "measurement" if s.kind == "measurement" else "effect"
         out.append(Share(s.label if named else f"not named, at {s.site}", kind, gain * part / total))
     out.append(Share("not named", "rest", rest / total))
-    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over)
+    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now_and_then.odds)
 
 
 def over_noise(forward: Predictor, f: Fit) -> float:

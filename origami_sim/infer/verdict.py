@@ -9,6 +9,7 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
+from origami_sim.infer.bursts import bursts
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
@@ -96,7 +97,8 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    real = UNLISTED in lead or left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE
+    pushed = left.bursts + np.log(p.hyper.unlisted) > np.log(ALONE / (1.0 - ALONE))
+    real = pushed or UNLISTED in lead or left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE
     if left.rest > left.named and real:
         return as_("UNKNOWN", np.nan)
     if not top:
@@ -218,7 +220,13 @@ def unnamed_verdict(
     if unknown:
         text = f"The refitted model misses the recordings by {over:.2f} times the noise"
         if over < FAR:
+            now = bursts(base)
             text = "The refitted model follows the recordings only if forces that it lacks act on the device"
+            if now.odds > 0.0:
+                text += (
+                    f" now and then: {now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as"
+                )
+                text += " the others"
         return "UNKNOWN", f"{text}, and nothing in the catalogue explains it.", []
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
