@@ -131,8 +131,7 @@ def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
     if not about:
         return
     suspect, begin, gain = max(about, key=lambda one: one[2])
-    doubt = max(0.0, _most(out.gains.get(frozenset(), [])))
-    if out.total[frozenset()] + gain + doubt < out.total[best] + np.log(UNFITTED):
+    if out.total[frozenset()] + gain < out.total[best] + np.log(UNFITTED):
         return
     out.signatures.append(Signature(suspect, [], 1.0))
     key, theta = frozenset({len(out.signatures) - 1}), np.concatenate([none.theta, begin])
