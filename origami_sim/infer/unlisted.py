@@ -61,7 +61,12 @@ def anywhere(forward: Predictor) -> list[Suspect]:
 
 
 def motion(forward: Predictor) -> tuple[np.ndarray, np.ndarray] | None:
-    """Recorded angles of creases and their rates, [J, n] each, all recordings one after the other; None if not told."""
+    """Recorded angles of creases and their rates, [J, n] each, all recordings one after the other; None if not told.
+
+    Where the motion is prescribed, moments were recorded and no angles.
+    """
+    if forward.prescribed:
+        return None
     tracks = [t for r in forward.recordings if (t := track(forward, r)) is not None and len(t.times) > WINDOW]
     folds = len(forward.articulation.creases)
     if not tracks or not folds:
