@@ -29,6 +29,7 @@ from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search
 from origami_sim.infer.stored import Stored
+from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
@@ -231,7 +232,7 @@ def scored(p: Posterior) -> list[tuple[Signature, float]]:
         if p.signatures[o].side * z[o] < 0:
             z[o] = 0.0
     order = np.argsort(-np.abs(z), kind="stable")
-    return [(p.signatures[k], float(z[k])) for k in order]
+    return [(p.signatures[k], float(z[k])) for k in order if p.suspect(k).effect != UNLISTED]  # it is screened alone
 
 
 def alike(signatures: Sequence[Signature], base: Fit) -> dict:

@@ -120,6 +120,8 @@ def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
     It is fitted alone, and competes with what was found: where that is right the moment explains less, as it cannot do
     what laws of the drive, of memory or with sharp bends do.
     """
+    if all(s.status for s in out.signatures):  # nothing can be tested
+        return
     best = max(_named(out), key=lambda k: out.total[k])
     coefficients = anywhere(forward)
     left = [one for one in beside(forward, out.nodes[best].fit, coefficients, out.hyper) if one[2] > 0.0]
