@@ -22,6 +22,7 @@ from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
+from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
@@ -29,7 +30,6 @@ from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search
 from origami_sim.infer.stored import Stored
-from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
@@ -170,7 +170,9 @@ def diagnose(
         return {"places": found, "acting": actions}
 
     def left() -> dict:
-        more = unnamed(forward, base, best) if judged.verdict == "UNKNOWN" else ""
+        # what acts now and then goes with nothing that the device does
+        steady = judged.verdict == "UNKNOWN" and bursts(best).probability < 0.5
+        more = unnamed(forward, base, best) if steady else ""
         return {"sentence": f"{judged.sentence} {more}".strip()}
 
     def experiments() -> dict:
@@ -232,7 +234,8 @@ def scored(p: Posterior) -> list[tuple[Signature, float]]:
         if p.signatures[o].side * z[o] < 0:
             z[o] = 0.0
     order = np.argsort(-np.abs(z), kind="stable")
-    return [(p.signatures[k], float(z[k])) for k in order if p.suspect(k).effect != UNLISTED]  # it is screened alone
+    seen = [k for k in order if p.signatures[k].parts or p.signatures[k].status]  # of others there is no signature
+    return [(p.signatures[k], float(z[k])) for k in seen]
 
 
 def alike(signatures: Sequence[Signature], base: Fit) -> dict:

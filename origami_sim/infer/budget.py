@@ -43,12 +43,13 @@ class Budget:
 
     Attributes:
         shares: add up to one; none if nothing is missed. over: error that is left, over the recorder's noise (root mean
-            square over the components). bursts: log odds that forces act now and then, see `bursts`.
+            square over the components). pushed: probability that forces act now and then, see
+            `bursts`.
     """
 
     shares: list[Share]
     over: float
-    bursts: float = -np.inf
+    pushed: float = 0.0
 
     @property
     def named(self) -> float:
@@ -74,10 +75,9 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     """
     assert best.weights is not None
     recorder, over = recorder_noise(forward, best), over_noise(forward, best)
-    now_and_then = bursts(best)
-    level = np.minimum(best.weights.deviation, recorder)
-    if now_and_then.odds > 0.0:
-        level = np.minimum(level, np.maximum(now_and_then.level, forward.blocks[0].noise))
+    level, now = np.minimum(best.weights.deviation, recorder), bursts(best)
+    if now.probability > 0.5:
+        level = np.minimum(level, np.maximum(now.level, forward.blocks[0].noise))
     noise = Weights(level, best.weights.colour, HYPER.least)
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
@@ -90,16 +90,18 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
     total = numbers + gain + rest
     if total <= 0.0:
-        return Budget([], over, now_and_then.odds)
+        return Budget([], over, now.probability)
     out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
     suspects = best.hypothesis.suspects
     parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
     for s, part in zip(suspects, parts, strict=True):
-        named = s.effect != UNLISTED
-        kind = "rest" if not named else "measurement" if s.kind == "measurement" else "effect"
-        out.append(Share(s.label if named else f"not named, at {s.site}", kind, gain * part / total))
+        share = gain * part / total
+        if s.effect == UNLISTED:
+            out.append(Share(f"not named, at {s.site}", "rest", share))
+        else:
+            out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", share))
     out.append(Share("not named", "rest", rest / total))
-    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now_and_then.odds)
+    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now.probability)
 
 
 def over_noise(forward: Predictor, f: Fit) -> float:

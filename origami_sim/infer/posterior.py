@@ -70,10 +70,10 @@ class Posterior:
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
-            refitted model. reconsidered: whether all were tried over their ranges. left: the crease at
-            which a law that the catalogue lacks explains more beside the best set. swapped: by how much single effects
-            were better than they promised in the place of the best set. missed: by how much sets were better than their
-            estimates, by the fit that these are about.
+            refitted model. reconsidered: whether all were tried over their ranges. left: the crease at which a
+            law that the catalogue lacks explains most beside the best set, if it does. swapped: by how much single
+            effects were better than they promised in the place of the best set. missed: by how much sets were better
+            than their estimates, by the fit that these are about.
     """
 
     signatures: list[Signature]

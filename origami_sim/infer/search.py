@@ -122,14 +122,15 @@ def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
     """
     if all(s.status for s in out.signatures):  # nothing can be tested
         return
-    best = max(_named(out), key=lambda k: out.total[k])
+    best, none = max(_named(out), key=lambda k: out.total[k]), out.nodes[frozenset()].fit
     coefficients = anywhere(forward)
     left = [one for one in beside(forward, out.nodes[best].fit, coefficients, out.hyper) if one[2] > 0.0]
     if not left:
         return
-    out.left = max(left, key=lambda one: one[2])[0].site
-    none, sites = out.nodes[frozenset()].fit, {s.site for s, *_ in left}
-    about = beside(forward, none, [s for s in coefficients if s.site in sites], out.hyper)
+    out.left, sites = max(left, key=lambda one: one[2])[0].site, {s.site for s, *_ in left}
+    about = left
+    if best:
+        about = beside(forward, none, [s for s in coefficients if s.site in sites], out.hyper)
     if not about:
         return
     suspect, begin, gain = max(about, key=lambda one: one[2])

@@ -180,7 +180,7 @@ class Stored:
             ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
-                | {"wide": key in self.wide, "over": mismatch.over, "bursts": _json(mismatch.bursts)}
+                | {"wide": key in self.wide, "over": mismatch.over, "pushed": mismatch.pushed}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))
@@ -242,8 +242,7 @@ class Stored:
                 size, constant = arrays[f"{n}.{k}.size"], float(arrays[f"{n}.{k}.constant"])
                 problems[float(gap)] = Reduced(gram, cross, size, constant)
             nodes[key] = list(node["members"]), groups, list(node["others"]), problems
-            (pushed,) = _wide([node.get("bursts")], -np.inf)
-            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], float(pushed))
+            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], node.get("pushed", 0.0))
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
         wide = frozenset(frozenset(n["members"]) for n in about["nodes"] if n["wide"])

@@ -26,16 +26,15 @@ UNLISTED = EFFECT.name
 
 WINDOW = 7
 """Frames over which a recorded angle is smoothed, to see how fast it goes: rates beyond the range have the moment of
-the fastest in it, so that nothing depends on where exactly it ends."""
+the fastest in it. Of a friction that falls with speed, 5 and 15 add 3 and 11 to a log evidence that leads by 234."""
 
 HELD = 1e-3
-"""Deviation of the range, as a part of it, in a fit: it is no unknown."""
-
+"""Deviation of the range, as a part of it, in a fit: no unknown. Half and double change no log evidence by 0.01."""
 
 WIDE = 3.0
 """Deviation of the coefficients, over one that changes as much as is missed: what angle and rate do not tell apart,
-such as their squares in a swing that keeps its energy, stays small. Of a friction that falls with
-speed, an eighth of it changes the log evidence by 0.4."""
+such as their squares in a swing that keeps its energy, stays small. Half and double change no log evidence by 0.1, and
+the moment by 2 %."""
 
 
 def anywhere(forward: Predictor) -> list[Suspect]:
@@ -78,10 +77,9 @@ def motion(forward: Predictor) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _free(name: str, value: float, entities: tuple[int, ...]) -> Free:
+    scale = abs(value) or 1.0
     unit = EFFECT.parameter(name).unit
-    return Free(
-        UNLISTED, name, unit, float(value), abs(value) or 1.0, spread=HELD * (abs(value) or 1.0), entities=entities
-    )
+    return Free(UNLISTED, name, unit, float(value), scale, spread=HELD * scale, entities=entities)
 
 
 def beside(

@@ -97,8 +97,8 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    pushed = left.bursts + np.log(p.hyper.unlisted) > np.log(ALONE / (1.0 - ALONE))
-    real = pushed or UNLISTED in lead or left.over > FAR or np.sum(p.cells(best)[~p.hyper.clean]) > ALONE
+    missing = max(left.pushed, float(np.sum(p.cells(best)[~p.hyper.clean])))
+    real = UNLISTED in lead or left.over > FAR or missing > ALONE
     if left.rest > left.named and real:
         return as_("UNKNOWN", np.nan)
     if not top:
@@ -222,11 +222,9 @@ def unnamed_verdict(
         if over < FAR:
             now = bursts(base)
             text = "The refitted model follows the recordings only if forces that it lacks act on the device"
-            if now.odds > 0.0:
-                text += (
-                    f" now and then: {now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as"
-                )
-                text += " the others"
+            if now.probability > 0.5:
+                missed = f"{now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as the others"
+                text = f"{text} now and then: {missed}"
         return "UNKNOWN", f"{text}, and nothing in the catalogue explains it.", []
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."

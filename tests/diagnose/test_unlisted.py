@@ -1,5 +1,7 @@
 """A law that the catalogue lacks: a smooth moment of a crease by its angle and rate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.tables import patch
 from origami_sim.effects.crease_polynomial import TERMS
 from origami_sim.fit.hypothesis import suspects
-from origami_sim.infer.budget import Budget, Share, budget
+from origami_sim.infer.budget import budget
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
@@ -48,10 +50,10 @@ def test_a_law_that_no_other_imitates_is_more_probable_than_all_and_at_its_creas
     best = max(found.nodes, key=lambda k: found.total[k])
     assert found.label(best) == f"{UNLISTED} at crease 1" and found.left == "crease 1"
     others = [found.total[k] for k in found.nodes if k != best]
-    assert len(others) > 1 and found.total[best] > max(others) + 10.0
+    assert len(others) > 1 and found.total[best] > max(others) + 100.0
     _, rates = motion(forward) or (None, np.zeros((2, 1)))
     size = np.sqrt(np.mean(np.interp(rates[1], RATES, FALLING) ** 2))
-    assert usual_moment(forward, found.nodes[best].fit) == pytest.approx(size, rel=0.2)
+    assert usual_moment(forward, found.nodes[best].fit) == pytest.approx(size, rel=0.05)  # 3 % off
     decided = decide(found, lambda key: budget(forward, given, base, found.nodes[key].fit))
     assert decided.word == "UNKNOWN" and decided.lead == {UNLISTED}
     left = budget(forward, given, base, found.nodes[best].fit)
@@ -74,11 +76,11 @@ def test_coefficients_span_what_was_recorded(fallen):
     for crease in (0, 1):
         recorded = forward.recordings[0].channels[f"fold{crease + 1}"].values
         _, middle, reach, usual, fastest = next(s for s in every if s.site == f"crease {crease}").free
-        assert middle.start - reach.start == pytest.approx(recorded.min(), abs=0.01)
-        assert middle.start + reach.start == pytest.approx(recorded.max(), abs=0.01)
+        assert middle.start - reach.start == pytest.approx(recorded.min())
+        assert middle.start + reach.start == pytest.approx(recorded.max())
         rate = np.abs(np.diff(recorded)) * 100.0
-        assert usual.start == pytest.approx(np.median(rate), rel=0.3)
-        assert np.quantile(rate, 0.95) < fastest.start < 1.1 * rate.max()
+        assert usual.start == pytest.approx(np.median(rate), rel=0.2)  # noise adds to differences
+        assert np.quantile(rate, 0.95) < fastest.start < rate.max()
 
 
 def test_what_it_gains_is_that_of_a_fit(fallen):
@@ -87,7 +89,7 @@ def test_what_it_gains_is_that_of_a_fit(fallen):
     gain = {s.site: gain for s, _, gain in beside(forward, found.nodes[frozenset()].fit, anywhere(forward))}
     best = max(found.nodes, key=lambda k: found.total[k])
     assert gain["crease 1"] > gain["crease 0"]
-    assert gain["crease 1"] == pytest.approx(found.total[best] - found.total[frozenset()], rel=0.25)
+    assert gain["crease 1"] == pytest.approx(found.total[best] - found.total[frozenset()], rel=0.12)
 
 
 def test_the_moment_is_named_in_the_sentence_and_in_the_patch(fallen):
@@ -99,6 +101,11 @@ def test_the_moment_is_named_in_the_sentence_and_in_the_patch(fallen):
     assert UNLISTED in str(patch(said.best))
 
 
-def test_what_is_left_beside_named_laws_is_said_to_be_at_a_crease():
-    shares = [Share("a", "effect", 0.9), Share("not named, at fold1", "rest", 0.06), Share("not named", "rest", 0.04)]
-    assert Budget(shares, 1.0).rest == pytest.approx(0.1) and Budget(shares, 1.0).named == pytest.approx(0.9)
+def test_what_is_left_beside_named_laws_is_said_to_be_at_its_crease(fallen):
+    """Without the moment, friction is the closest; more is real and not named."""
+    forward, given, base, found = fallen
+    kept = [k for k in found.nodes if UNLISTED not in found.effects(k)]
+    parts = {name: {k: getattr(found, name)[k] for k in kept} for name in ("nodes", "total", "log")}
+    said = judge(forward, given, base, replace(found, **parts), 1.0)
+    assert "the closest, dry friction in a crease at crease 1" in said.sentence
+    assert "is real and not named, above all at crease 1." in said.sentence

@@ -99,11 +99,11 @@ def test_unknown_is_what_leaves_more_than_it_names_and_leaves_something_real(nam
     assert decide(p, lambda key: budget).word == word
 
 
-@pytest.mark.parametrize(("odds", "word"), [(3.0, ""), (5.0, "UNKNOWN")])
-def test_forces_that_act_now_and_then_are_unknown(odds, word):
+@pytest.mark.parametrize(("pushed", "word"), [(0.7, ""), (0.9, "UNKNOWN")])
+def test_forces_that_act_now_and_then_are_unknown(pushed, word):
     p = posterior({(): 0.0, ("air_drag",): -9.0})
     shares = [Share("", "numbers", 0.99), Share("", "rest", 0.01)]
-    assert decide(p, lambda key: Budget(shares, 1.0, odds)).word == word
+    assert decide(p, lambda key: Budget(shares, 1.0, pushed)).word == word
 
 
 @pytest.mark.parametrize(
