@@ -105,7 +105,7 @@ class Memory:
     own: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """One physical effect: law, parameters and prose.
 

@@ -204,7 +204,7 @@ class Batch:
                     and parameters[e.name, "reach"].size
                 ]
                 a = np.maximum(a, max(reaches, default=0.0))
-            worlds, knots = a.shape[1], int(np.prod(a.shape[2:]))
+            worlds, knots = a.shape[1], math.prod(a.shape[2:])
             if worlds not in (1, self.worlds):
                 raise InputError(
                     "a parameter is given for another number of worlds than the state has",

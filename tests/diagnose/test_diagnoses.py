@@ -27,7 +27,7 @@ def test_friction_is_found_with_its_strength_and_the_fit_improves():
     assert found.exit_code >= 10 and found.candidates[0].odds > 0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_crease_that_sticks_is_found_though_no_derivative_promises_it(seed):
     """From the model without friction a stiffening crease promises more, and leaves seventeen times the noise."""
     also = ("crease_stiffening", "crease_quadratic_damping", "crease_relaxation", "air_drag", "tracker_lag")
@@ -41,8 +41,8 @@ def test_a_crease_that_sticks_is_found_though_no_derivative_promises_it(seed):
 
 def test_words_and_numbers_are_the_same_on_any_number_of_threads(tmp_path, monkeypatch):
     """To the last byte, though segments are simulated in several parts."""
-    monkeypatch.setattr(rollouts, "TOGETHER", 32)
-    swing, said = record(FRICTION, **SMALL), set()
+    monkeypatch.setattr(rollouts, "TOGETHER", 8)
+    swing, said = record(FRICTION, panels=3, duration=1.5, rate=60), set()
     for threads in (1, 2):
         found = diagnose(subject(3), [swing], Options(threads=threads), catalogue=("crease_friction", "angle_offset"))
         found.seconds, found.settings["threads"] = {}, None
@@ -96,6 +96,7 @@ def test_a_large_error_of_the_scale_is_the_measurement():
     assert abs(scale.value + 0.3) < 3.0 * (scale.high - scale.low) / 3.92  # one draw of the noise
 
 
+@pytest.mark.slow
 def test_an_alignment_within_what_is_known_is_the_measurement():
     aligned = subject(3).beside(alignments({"angle_scale.angle_scale": 0.02}))
     found = diagnose(aligned, [record(scale=0.96, **SMALL)], catalogue=LOOPS[:3])
@@ -168,6 +169,7 @@ def test_two_that_do_the_same_are_a_tie_with_an_experiment():
     assert told == sorted(told, reverse=True) and 0.0 <= told[0] <= found.experiments[0].entropy
 
 
+@pytest.mark.slow
 def test_what_the_catalogue_lacks_is_unknown_and_described():
     found = diagnose(subject(3), [record(FRICTION, **SMALL)], catalogue=("crease_stiffening", "crease_offset"))
     assert found.verdict == "UNKNOWN"

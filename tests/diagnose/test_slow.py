@@ -224,6 +224,7 @@ def test_what_was_concealed_is_found(effect, truth):
     assert found.error_after[0] < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_nothing_is_missing():
     made = recording(angles(times(), END and 0.1))
     found = diagnose(flap(), made, ONE, catalogue=SOME[:3])

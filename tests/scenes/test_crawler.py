@@ -78,6 +78,7 @@ def finer(parts):
     return 1e3 * strides(motion, s.frequency)[1]
 
 
+@SLOW
 def test_half_the_step_walks_alike(coarse):
     """25.374, 25.442, 25.460 mm with the step, half and a quarter of it: the step costs 0.3 to 0.4 %.
 
@@ -186,6 +187,7 @@ def test_turned_device_walks_the_other_way(coarse):
     assert np.abs(motion.x[..., 1] - motion.x[:1, ..., 1]).max() < 1e-12
 
 
+@SLOW
 def test_reversed_field_gives_the_same_stride(coarse):
     reversed_, _ = walk(5, polarity=-1.0, cell=0.0038)  # the moments turn, which is the same as turning the field
     assert reversed_[3:].mean() == pytest.approx(coarse[2:].mean(), rel=0.02)
@@ -197,7 +199,7 @@ def test_no_friction_no_drift():
     assert np.abs(x - x[0]).max() < 1e-6
 
 
-@pytest.mark.parametrize("field", [0.1, 0.2])
+@pytest.mark.parametrize("field", [0.1, pytest.param(0.2, marks=SLOW)])
 def test_equal_patches_and_isotropic_feet_do_not_walk(field):
     s = read_calibration("crawler")
     even = {"big_length": s.small_length, "big_width": s.small_width, "big_moment": 1.0, "rear_width": 0.0115,
@@ -206,6 +208,7 @@ def test_equal_patches_and_isotropic_feet_do_not_walk(field):
     assert abs(stride[2:].mean()) < 0.1
 
 
+@SLOW
 def test_printed_set_snaps_and_repeats_but_is_ill_conditioned():
     # -44.2 mm per cycle, and -26.9 on ground and feet four times as stiff (docs/paper/crawler.md)
     stride, _ = walk(8, "crawler_printed")

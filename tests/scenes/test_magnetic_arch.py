@@ -111,6 +111,7 @@ def test_perfect_arch_has_the_limit_point_of_the_shallow_one(beam):
     assert lost < path.limits[0], "it loses stability before the limit point"
 
 
+@pytest.mark.slow
 def test_hysteresis_loop(loop):
     assert loop.path.reached
     assert len(loop.limits) == 2
@@ -150,6 +151,7 @@ def test_fields_are_proportional_to_the_modulus(settings):
 # motion --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_ramp_snaps_and_keeps_its_energy(ramp):
     motion, displacement = ramp
     assert not motion.failures
@@ -194,6 +196,7 @@ def test_mesh_of_the_motion(settings, ramp):
 # 1.7 mrad the field of the snap is 1.6 % lower and a step of 5 mT snaps the arch.
 
 
+@pytest.mark.slow
 def test_recorded_ramp(settings, ramp):
     """Snap, displacement before it and stroke. What the ramp is worth: its stroke drifts by 5 % after the snap."""
     real = needs_recording("ramp")
@@ -263,6 +266,7 @@ def test_recorded_step_of_5_mt_swings_faster_than_a_pressed_arch(settings):
     assert simulated(LEVEL_AS_RAMP) - recorded > 4 * doubt
 
 
+@pytest.mark.slow
 def test_published_step_of_7_mt(settings, loop):
     motion, d = arch.move(settings.replace(mode="step", step_field=7e-3, step_time=0.1, rows=2.0))
     when, _ = arch.snap(motion.times, d, arch.midspan(motion.model, motion.x[0, :, 0]))

@@ -86,6 +86,7 @@ def test_electric_field_makes_an_accordion(settings, shapes):
     assert on.size[2] == pytest.approx(pitch * np.sin(on.rows[1]), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_accordion_is_the_bending_of_a_free_stack(settings, shapes):
     """theta = p H a L / D without thinning, quadratic and even in the voltage; thinning adds to it."""
     s = settings.replace(thinning=False)
