@@ -35,7 +35,7 @@ def table(
                 log_odds(p, key),
                 errors[key].tolist(),
                 fit_percent(forward, node.fit).tolist(),
-                why=_why(key, p, judged),
+                why=_why(forward, key, p, judged),
                 distrust=_distrust(f),
             )
         )
@@ -47,7 +47,7 @@ def table(
     return sorted(out, key=lambda c: -c.probability)
 
 
-def _why(key: Key, p: Posterior, judged: Judgement) -> str:
+def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
     """Why a row won or lost, in words."""
     f = p.nodes[key].fit
     if f.hypothesis is judged.best.hypothesis:
@@ -57,10 +57,15 @@ def _why(key: Key, p: Posterior, judged: Judgement) -> str:
     if not key:
         return "the simplest"
     best = next(k for k, n in p.nodes.items() if n.fit.hypothesis is judged.best.hypothesis)
-    misses = f.cost - p.nodes[best].fit.cost
+    misses = _squares(forward, f) - _squares(forward, p.nodes[best].fit)
     if misses < LITTLE:
         return "no better for its further numbers"
     return f"misses the recordings by {misses:.3g} more in squares over the noise"
+
+
+def _squares(forward: Predictor, f: Fit) -> float:
+    """Squares of what a fit misses of the recordings over the noise; gaps between its segments are no data."""
+    return float(sum(np.nansum(np.square(r / forward.blocks[0].noise)) for r in f.residuals))
 
 
 def _distrust(f: Fit) -> str:

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -218,11 +219,29 @@ def _run(command: list[str]) -> str | None:
     home = str(Path(__file__).resolve().parents[1])
     path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
     single = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
+    if _STOPPED.is_set():
+        raise KeyboardInterrupt
+    # in a session of its own: Ctrl-C in a terminal would reach it too, and its last words would pass for a failure
+    ran = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=single, start_new_session=True
+    )
+    _CHILDREN.add(ran)
     try:
-        ran = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, env=single)
+        _, said = ran.communicate(timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
+        ran.kill()
+        ran.communicate()
         return f"longer than {TIMEOUT:.0f} s"
-    return (ran.stderr.strip().splitlines() or ["no message"])[-1] if ran.returncode else None
+    finally:
+        _CHILDREN.discard(ran)
+    if _STOPPED.is_set():
+        raise KeyboardInterrupt
+    return (said.strip().splitlines() or ["no message"])[-1] if ran.returncode else None
+
+
+_CHILDREN: set[subprocess.Popen] = set()
+_STOPPED = threading.Event()
+"""Processes under way, and whether they were ended because the battery was interrupted: that is no result of theirs."""
 
 
 # --- who works
@@ -240,8 +259,16 @@ def workers(cluster: str | None, jobs: int) -> Iterator[Callable[[Sequence[Work]
         InputError: dask.distributed is not installed, no such cluster, or no scheduler answers.
     """
     if cluster is None:
+        _STOPPED.clear()
         with ThreadPoolExecutor(max(1, jobs)) as pool:
-            yield lambda works: _pooled(pool, works)
+            try:
+                yield lambda works: _pooled(pool, works)
+            except BaseException:
+                _STOPPED.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+                for child in list(_CHILDREN):
+                    child.kill()
+                raise
         return
     distributed = dask(cluster)
     local = LOCAL.fullmatch(cluster)
@@ -283,7 +310,4 @@ def dask(cluster: str):
 
 def _pooled(pool: ThreadPoolExecutor, works: Sequence[Work]) -> Iterator[str]:
     futures = [pool.submit(do, w) for w in works]
-    try:
-        yield from (f.result() for f in as_completed(futures))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    yield from (f.result() for f in as_completed(futures))

@@ -2,7 +2,10 @@
 
 import json
 import sys
+import threading
+import time
 from collections import Counter
+from contextlib import suppress
 
 import pytest
 
@@ -131,6 +134,31 @@ def test_a_dask_cluster_draws(tmp_path):
         assert one.read_bytes() == other.read_bytes()
     with pytest.raises(InputError, match="no scheduler answers"), battery.workers("tcp://127.0.0.1:9", 1):
         pass
+
+
+def test_what_is_interrupted_is_no_failure_of_the_case(monkeypatch):
+    sleeper = [sys.executable, "-c", "import time; print('awake', flush=True); time.sleep(60)"]
+    started, results = threading.Event(), []
+
+    def do(work):
+        started.set()
+        results.append(battery._run(sleeper))
+
+    def all_of(each):
+        with suppress(KeyboardInterrupt):
+            list(each([battery.Work(0, "", "{}", False, False, False)]))
+
+    monkeypatch.setattr(battery, "do", do)
+    began = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt), battery.workers(None, 2) as each:
+        threading.Thread(target=all_of, args=(each,)).start()
+        started.wait()
+        while not battery._CHILDREN:
+            time.sleep(0.01)
+        raise KeyboardInterrupt
+    assert time.perf_counter() - began < 30 and not results and not battery._CHILDREN
+    with battery.workers(None, 1):  # and the next battery runs
+        assert battery._run([sys.executable, "-c", "raise SystemExit('words')"]) == "words"
 
 
 def test_a_verdict_counts_that_stood_when_its_process_ended(tmp_path, monkeypatch):
