@@ -36,11 +36,19 @@ EFFECT = Effect(
     force=force,
     parameters=(
         Parameter("air_density", "rho", "kg/m^3", 1.2, (0.0, 10.0), "density of the air", typical=1.2),
-        Parameter("drag_coefficient", "Cd", "-", 0.0, (0.0, 5.0), "about 1.2 for a plate across the flow", typical=1.2),
+        Parameter(
+            "drag_coefficient",
+            "Cd",
+            "-",
+            0.0,
+            (0.0, 20.0),  # plates that swing by less than their width: up to about 10 (Keulegan & Carpenter 1958)
+            "about 1.2 for a plate across a steady flow, several times as much in swings smaller than its width",
+            typical=1.2,
+        ),
     ),
     fitted=("drag_coefficient",),
     formula="f = -(1/2) rho Cd A |vn| vn n, a third at the middle of each side",
-    source="drag equation for a flat plate",
+    source="drag equation for a flat plate; small swings: Keulegan & Carpenter 1958, J. Res. NBS 60, 423",
     matters="0.07 % of the crawler's weight; first-order for light paper",
     confused_with="crease viscosity (linear in rate)",
     separated_by="decay against amplitude; vacuum",
