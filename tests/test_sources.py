@@ -413,6 +413,7 @@ def flap(*effects, panels="rigid"):
 ABOVE = {"radius": "5 mm", "length": "10 mm", "position": (0.012, 0.005, 0.035), "axis": (0, 0, 1)}
 
 
+@pytest.mark.slow
 def test_a_flap_under_a_magnet_is_found_by_every_solver():
     """The energy of a crease and of magnets in the middles of the four triangles, minimised by itself."""
     model, parameters = flap("field_gradient").build()

@@ -136,6 +136,7 @@ def test_linear_crease_without_noise_is_exact():
     assert (found["stiffness"], found["rest_angle"]) == pytest.approx((0.02, 0.7), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_table_basis_is_the_effect_of_the_simulator():
     knots = np.random.default_rng(2).normal(size=33)
     angles = np.linspace(-3.6, 3.6, 41)

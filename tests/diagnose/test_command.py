@@ -228,6 +228,7 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeyp
     assert keep.cache.computed == len(asked) + 2
 
 
+@pytest.mark.slow
 def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypatch):
     import warp as wp
 
@@ -417,6 +418,7 @@ def test_priors_come_in_the_settings_unit_with_a_unit_or_as_a_share(recorded):
     assert not aligned
 
 
+@pytest.mark.slow
 def test_an_alignment_is_a_number_of_the_model_and_comes_into_the_patch(recorded, tmp_path):
     """A scale that is known to 1 %, on the command line over the sidecar; beside it friction is found as without."""
     sidecar = recorded.with_suffix(".toml").read_text() + '"angle_scale.angle_scale" = 0.5\n'

@@ -73,6 +73,7 @@ def test_an_offset_of_one_encoder_is_the_measurement():
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_offset at channel fold1"
 
 
+@pytest.mark.slow
 def test_wrong_zeros_of_two_encoders_are_found_beside_each_other():
     r = record(**SMALL)
     for name, zero in (("fold1", 0.03), ("fold2", -0.02)):
@@ -88,6 +89,7 @@ def test_wrong_zeros_of_two_encoders_are_found_beside_each_other():
     assert set(found.patch) >= {"angle_offset.angle_offset@0", "angle_offset.angle_offset@1"}
 
 
+@pytest.mark.slow
 def test_a_large_error_of_the_scale_is_the_measurement():
     found = diagnose(subject(3), [record(scale=0.7, **SMALL)], catalogue=(*LOOPS, "angle_scale"))
     assert found.verdict == "MEASUREMENT" and found.chosen[0] == "angle_scale at the measurement"

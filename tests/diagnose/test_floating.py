@@ -91,7 +91,7 @@ def test_frames_in_contact_are_left_out_of_the_flight():
     assert len(low) and np.abs(found.times[:, None] - low).min() > found.half / RATE
 
 
-@pytest.mark.parametrize("restitution", [0.9, 0.125])
+@pytest.mark.parametrize("restitution", [pytest.param(0.9, marks=pytest.mark.slow), 0.125])
 def test_impulses_are_the_momentum_that_blows_give(restitution):
     """The recorded impulse is what the motion took up, whatever the model says; the model's differs if its law does."""
     made, recording = toss(0.32, restitution=0.9, spin=2.0)
@@ -118,6 +118,7 @@ def test_what_touches_is_near_or_about_to_be():
 # --- free panels with a crease
 
 
+@pytest.mark.slow
 def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
     """Coordinates of a free device begin with its shift and turn; none of them has a moment that is missing here."""
     sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1.5e-3, modulus=1.5e6, triangulation="center")

@@ -61,7 +61,10 @@ def test_a_law_that_no_other_imitates_is_more_probable_than_all_and_at_its_creas
     assert left.rest > 0.5 and left.named == 0.0
 
 
-@pytest.mark.parametrize("effects", [{}, {"crease_friction": {"friction_moment": (2e-5, [1])}}])
+RUBS = {"crease_friction": {"friction_moment": (2e-5, [1])}}
+
+
+@pytest.mark.parametrize("effects", [{}, pytest.param(RUBS, marks=pytest.mark.slow)], ids=["nothing", "friction"])
 def test_a_law_of_the_catalogue_is_no_other(effects):
     """Dry friction, or nothing: a moment of as many coefficients does not explain enough beside it."""
     *_, found = searched(record(effects, **SMALL), "crease_friction")

@@ -411,6 +411,7 @@ def everything(seed=7, *, rates=True):
     return model, parameters, the_drive(gradient=0.1 * np.eye(3)), moved(state, rng)
 
 
+@pytest.mark.slow
 def test_forces_by_effect_add_up_to_the_force_that_moves_the_nodes():
     model, parameters, drive, state = everything()
     batch = Batch(model, parameters, drive, state)

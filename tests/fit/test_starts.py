@@ -77,6 +77,7 @@ def delayed(forward: BarRollouts, delay: float) -> np.ndarray:
     return forward.predict(Hypothesis((one,)), np.array([[delay]]), starts, [0])[0][0]
 
 
+@pytest.mark.slow
 def test_a_late_camera_sees_rest_before_the_motion_and_an_early_one_more_of_it():
     seen, longer = delayed(driven("rest"), 0.0), delayed(driven("rest", duration=3.5), 0.0)
     assert np.ptp(seen) > 0.02

@@ -140,6 +140,7 @@ def test_a_bridge_without_finite_elements_is_refused(settings):
         box.build(settings.replace(crease_law="finite_elements", gap=3.81e-3))
 
 
+@pytest.mark.slow
 def test_a_small_box_closes_until_its_patches_meet(settings):
     """Below the angle at which they meet nothing changes; above, it stands there but for what contact gives way."""
     small = settings.replace(base=0.022)

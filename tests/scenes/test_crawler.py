@@ -45,18 +45,26 @@ def coarse():
     return walk(4, cell=0.0038)[0]
 
 
+def test_gait_is_steady_on_coarse_cells(coarse):
+    assert coarse[3] == pytest.approx(coarse[2], rel=5e-3)
+    assert coarse[2:].mean() == pytest.approx(25.0, abs=1.0)
+
+
+@SLOW
 def test_default_gait_is_steady_and_near_the_paper(default):
     assert default[3:].std() < 1e-3 * default[3:].mean()
     assert default[3:].mean() == pytest.approx(25.0, abs=1.0)
 
 
+@SLOW
 def test_regression_reference_is_reproduced(default):
     report = check("crawler", default / 1e3, settings=read_calibration("crawler"))
     assert report.same_settings
     assert report.passed, report.text()
 
 
-@pytest.mark.parametrize("field", [0.05, pytest.param(0.1, marks=SLOW), pytest.param(0.2, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("field", [0.05, 0.1, 0.2])
 def test_independent_planar_model(field):
     stride, _ = walk(3, "crawler_reference", field=field)
     assert stride[2] == pytest.approx(PLANAR[field], rel=0.03)
@@ -181,6 +189,7 @@ def test_finer_cells_stretch_no_more(meshes):
         assert (1 / pairs).sum() == pytest.approx((border / axial).sum(), rel=1e-9)
 
 
+@SLOW
 def test_turned_device_walks_the_other_way(coarse):
     turned, motion = walk(4, heading=-1.0, cell=0.0038)
     assert turned[2:].mean() == pytest.approx(-coarse[2:].mean(), rel=2e-3)
@@ -199,7 +208,8 @@ def test_no_friction_no_drift():
     assert np.abs(x - x[0]).max() < 1e-6
 
 
-@pytest.mark.parametrize("field", [0.1, pytest.param(0.2, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("field", [0.1, 0.2])
 def test_equal_patches_and_isotropic_feet_do_not_walk(field):
     s = read_calibration("crawler")
     even = {"big_length": s.small_length, "big_width": s.small_width, "big_moment": 1.0, "rear_width": 0.0115,

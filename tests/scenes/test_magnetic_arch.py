@@ -218,6 +218,7 @@ def _first_rise(times, values):
     return high, times[: len(high)]
 
 
+@pytest.mark.slow
 def test_recorded_step(settings, step):
     """In 5 mT the arch swings and stays; with loss in bending alone, or none, it would snap.
 
@@ -289,6 +290,7 @@ def test_published_swing_after_a_blow(settings):
     assert (swing[-1] / swing[0]) ** (1 / (len(turns) - 1)) == pytest.approx(FURTHER["kept"], abs=0.03)
 
 
+@pytest.mark.slow
 def test_loss_in_stretching_keeps_the_arch_from_snapping(settings, step):
     """The same loss in bending alone does not."""
     s = settings.replace(mode="step")
@@ -303,7 +305,7 @@ def test_loss_in_stretching_keeps_the_arch_from_snapping(settings, step):
 # the scene -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", ["ramp", "step"])
+@pytest.mark.parametrize("mode", ["ramp", pytest.param("step", marks=pytest.mark.slow)])
 def test_run_without_recording(settings, mode, monkeypatch, tmp_path):
     monkeypatch.setenv("ORIGAMI_RECORDINGS", str(tmp_path))
     outcome = arch.run(settings.replace(mode=mode, cells=10.0, rows=2.0, rise_time=1.0, step_time=0.2))
@@ -312,6 +314,7 @@ def test_run_without_recording(settings, mode, monkeypatch, tmp_path):
     assert arch.draw(settings.replace(mode=mode), outcome, tmp_path).stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path, monkeypatch):
     folder = tmp_path / "arch"
     given = ["mode=quasistatic", "loop_time=2", "cells=10", "rows=2"]

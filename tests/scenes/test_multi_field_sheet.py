@@ -134,6 +134,7 @@ def test_opposite_fields_fold_the_other_way(shapes):
     np.testing.assert_allclose(thermal.along_y / shapes["thermal"]["on"].along_y, -10 / 60, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_cold_mirrors_the_roll_and_a_reversed_voltage_changes_nothing(settings, shapes):
     cold, notes = sheet.settle(settings.replace(temperature=-60.0), "thermal")
     assert not notes
@@ -163,6 +164,7 @@ def test_the_three_fields_in_sequence(settings, outcome):
         assert fold == pytest.approx(table["fold_deg"][k], abs=0.3), field
 
 
+@pytest.mark.slow
 def test_one_field_alone_folds_and_returns(settings):
     alone = sheet.run(settings.replace(mode="electric"))
     table, motion = alone.tables["shapes"], alone.trajectory

@@ -103,6 +103,7 @@ def pinched(n, parts):
     return np.array(errors)
 
 
+@pytest.mark.slow
 def test_a_hemisphere_is_pinched_far_on_a_coarse_mesh():
     """4 cells per quarter: 1.6 to 3.7 % too soft."""
     errors = pinched(4, (0.05, 0.2, 0.5, 1.0))

@@ -54,7 +54,7 @@ def swinging_hinge():
     return model, p, start(model, v=0.3 * np.random.default_rng(4).normal(size=(4, 3)))
 
 
-@pytest.mark.parametrize("fraction", [0.2, 0.8])
+@pytest.mark.parametrize("fraction", [pytest.param(0.2, marks=pytest.mark.slow), 0.8])
 def test_energy_error_has_no_trend_over_1e5_steps(fraction):
     """The drift of a linear fit over the whole run is a small part of the oscillation that it is fitted through."""
     model, p, state = swinging_hinge()

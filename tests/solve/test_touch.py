@@ -219,6 +219,7 @@ def closed_form(gap, height, thickness):
     return 2 * (math.acos(0.5 * thickness / math.hypot(across, up)) - math.atan2(up, across))
 
 
+@pytest.mark.slow
 def test_patches_inside_a_fold_close_to_their_stop(tmp_path):
     expected = closed_form(1.2 * MM, 1 * MM, 1.6 * MM)
     model, parameters = patched()

@@ -85,6 +85,7 @@ def command(*arguments: str) -> int:
     return e.value.code
 
 
+@pytest.mark.slow
 def test_command_writes_tables_figure_and_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(ps, "WIDTHS", {r: w[1:2] for r, w in ps.WIDTHS.items()})
     monkeypatch.setattr(ps, "THICKNESS", {s: t[1:2] for s, t in ps.THICKNESS.items()})
