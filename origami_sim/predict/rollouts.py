@@ -327,18 +327,18 @@ class Rollouts(Worlds, ABC):
         worlds, path = [worlds[k] for k in some], motion.positions[:, :, None]
         step = float(np.median(np.diff(self.recordings[r].times)))
         out: dict[int, np.ndarray] = {}
-        last, batch = -LEAD - 1, None
-        for first in map(int, every[every <= max(b.first for b in wanted)]):
-            if batch is None or first - last > LEAD:
-                last = max(first - LEAD, 0)
-                batch = self._rested(r, worlds, last, path[last])
-            if first > last:
-                batch.carry(path[last : first + 1], step)
-            carried = batch.remembered()
-            if first in motion.memory:
-                carried = carried + (motion.memory[first][:, None] - carried[:, :1])
-                carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
-            last, out[first] = first, carried[:, of]
+        asked = every[every <= max(b.first for b in wanted)]
+        for near in np.split(asked, np.flatnonzero(np.diff(asked) > LEAD) + 1):  # carried from one to the next
+            begin = max(int(near[0]) - LEAD, 0)
+            batch = self._rested(r, worlds, begin, path[begin])
+            rested = batch.remembered()[None]
+            later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
+            found = np.concatenate([rested, later])[-len(near) :]
+            for first, carried in zip(near.tolist(), found, strict=True):
+                if first in motion.memory:
+                    carried = carried + (motion.memory[first][:, None] - carried[:, :1])
+                    carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
+                out[first] = carried[:, of]
         return out
 
     def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:

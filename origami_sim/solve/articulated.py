@@ -227,8 +227,6 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
         put_vec(s, o + tree.force + 3 * b, zero)
         put_vec(s, o + tree.moment + 3 * b, zero)
-    for n in range(X.shape[0]):
-        F[n & NATURAL, w] = zero
     body = int(-1)
     own = turn
     place = zero
@@ -244,6 +242,7 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         x = own * vec_at(s, o + tree.reference + 3 * n) + place
         X[n, w] = x
         V[n, w] = speed + wp.cross(omega, x - origin)
+        F[n, w] = zero
 
 
 @wp.func

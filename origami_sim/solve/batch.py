@@ -169,6 +169,7 @@ class Batch:
         self._status = self._upload(state.status, wp.int32)
         self._nothing = wp.zeros((0, 1, 1), dtype=wp.vec3d, device=self.device)
         self._no_angles = wp.zeros((0, 1, 1), dtype=wp.float64, device=self.device)
+        self._no_notes = [wp.zeros(0, dtype=wp.int32, device=self.device), self._no_angles]
 
     def _acting(self, parameters: Parameters) -> np.ndarray:
         """[words, W] bits of the program's effects that have a strength anywhere in a world."""
@@ -307,7 +308,7 @@ class Batch:
         else:  # asked many times over, and a recorded launch costs a tenth
             if self._led is None:
                 rest = [self._a, self._f, self._work, self._power, self._status, 0, 0, 1, wp.float64(dt)]
-                rest += [wp.float64(np.inf), 0, self._nothing, self._no_angles, self._nothing]
+                rest += [wp.float64(np.inf), 0, self._nothing, self._no_angles, self._nothing, *self._no_notes]
                 inputs = [*self._constants, self._x, self._v, self._angles, self._memory, *rest]
                 self._led = wp.launch(
                     self.program.rollout, dim=self.worlds, inputs=inputs, device=self.device, record_cmd=True
@@ -336,15 +337,19 @@ class Batch:
             x[first:, :, w], turned[first:, :, w] = np.nan, np.nan
         return x, turned
 
-    def carry(self, path: np.ndarray, dt: float):
+    def carry(self, path: np.ndarray, dt: float, noted: Sequence[int] = ()) -> np.ndarray:
         """Carries the nodes that are held along positions path [F + 1, N, S, 3], one step of dt [s] each.
 
-        World w follows column w modulo S.
+        World w follows column w modulo S. Returns what laws remember after each of so many steps, [R, M, W].
         """
         rates = wp.array(np.ascontiguousarray(np.diff(path, axis=0) / dt), dtype=wp.vec3d, device=self.device)
-        self._run(len(path) - 1, dt, np.inf, 0, self._nothing, self._no_angles, rates)
+        rows = sum(size for *_, size in self.model.memories)
+        when = wp.array(np.asarray(noted, np.int32), dtype=wp.int32, device=self.device)
+        notes = self._room(len(noted), rows, dtype=wp.float64)
+        self._run(len(path) - 1, dt, np.inf, 0, self._nothing, self._no_angles, rates, [when, notes])
+        return notes.numpy()[:, :, : self.worlds]
 
-    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
+    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried, notes=()):
         self._launch(
             "rollout",
             [
@@ -362,6 +367,7 @@ class Batch:
                 film,
                 angles,
                 carried,
+                *(notes or self._no_notes),
             ],
         )
         self.step = max(self.step, 0) + steps

@@ -191,7 +191,7 @@ class RigidBatch(Batch):
         tree.restarts = wp.zeros(0, dtype=wp.int32, device=self.device)
         return filmed, kept
 
-    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried):
+    def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried, notes=()):
         fixed = self.tolerance == 0.0
         self._launch(
             "rigid",
@@ -217,7 +217,7 @@ class RigidBatch(Batch):
         self._fresh = 0
         self.step = max(self.step, 0) + steps
 
-    def carry(self, path: np.ndarray, dt: float):
+    def carry(self, path: np.ndarray, dt: float, noted: Sequence[int] = ()) -> np.ndarray:
         """Refused: rigid panels that are carried along a path are held; see `batch_of`."""
         raise InputError("only held panels can be carried", field="carry", allowed="a model that is held everywhere")
 

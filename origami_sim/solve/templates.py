@@ -44,11 +44,13 @@ def rollout({arguments}
     power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
     every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar), carried: wp.array3d(dtype=vec3),
+    noted: wp.array(dtype=wp.int32), notes: wp.array3d(dtype=scalar),
 ):
     w = (first_world + wp.tid()) & NATURAL
     if status[0, w] >= 0:
         return
     frame = int(0)
+    note = int(0)
     wait = every
 {hoist}
     half_dt = scalar(0.5) * dt
@@ -101,6 +103,11 @@ def rollout({arguments}
                     film_angles[frame, row, w] = angles[row, w]
                 frame += 1
                 wait = every
+        if note < noted.shape[0] and s >= 0:
+            if noted[note] == s + 1:  # what laws remember after so many steps
+                for row in range(notes.shape[1]):
+                    notes[note, row, w] = memory[row, w]
+                note += 1
 """
 
 EVALUATE = """
