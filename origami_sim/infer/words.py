@@ -30,14 +30,17 @@ def distinct(fits: Sequence[Fit]) -> list[str]:
 
 
 def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> str:
-    """The effects of a fit, all or `only` some, with their sites, if asked, strengths and intervals."""
+    """The effects of a fit, all or `only` some, with their sites, if asked, and strengths: those of the device first.
+
+    Intervals are left to the table where there are more than two: a headline has to be read at a glance.
+    """
     out = []
+    every = [s for s in f.hypothesis.suspects if only is None or s.effect in only]
+    every.sort(key=lambda s: s.kind == "measurement")
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
     ends = dict(zip((id(n) for n in f.free), zip(*f.intervals(), strict=True), strict=True))
-    for s in f.hypothesis.suspects:
-        if only is not None and s.effect not in only:
-            continue
+    for s in every:
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
         t, d = value[id(n)], deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
@@ -47,7 +50,8 @@ def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> s
             what = f"{'more' if t > 0 else 'less'} {what} than stated"
         strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
         where = f" at {s.site}" if sites else ""
-        out.append(f"{what}{where} ({strength}, 95 %: {low} to {high})")
+        interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
+        out.append(f"{what}{where} ({strength}{interval})")
     return joined(out)
 
 

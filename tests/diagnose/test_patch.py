@@ -87,6 +87,24 @@ def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
     assert "stated" not in say(other)  # type: ignore[arg-type]
 
 
+def test_a_headline_of_many_effects_has_the_devices_first_and_leaves_intervals_to_the_table():
+    model, parameters = hanging(3)
+    every = suspects(model, [record(panels=3, duration=1.0)], Drive(), parameters)
+    names = ("angle_offset", "crease_friction", "air_drag")
+    mine = tuple(next(s for s in every if s.effect == n) for n in names)
+
+    def said(count: int) -> str:
+        free = tuple(n for s in mine[:count] for n in s.free)
+        theta = np.array([n.start + n.scale for n in free])
+        known = {"deviations": lambda: 0.01 * theta, "intervals": lambda: (0.98 * theta, 1.02 * theta)}
+        f = SimpleNamespace(hypothesis=Hypothesis(mine[:count]), free=free, theta=theta, **known)
+        return say(f)  # type: ignore[arg-type]
+
+    places = [said(3).index(words) for words in ("dry friction", "drag of the air", "zero of the angle")]
+    assert places == sorted(places) and "95 %" not in said(3)
+    assert said(2).startswith("dry friction") and said(2).count("95 %: ") == 2
+
+
 def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_model(tmp_path):
     """No model has channels, so that it could not be read back; it is named in the file."""
     numbers = {"crease_friction.friction_moment@1": 1e-4, "angle_offset.angle_offset@1": 0.02}
