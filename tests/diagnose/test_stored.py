@@ -56,7 +56,7 @@ def test_the_same_posterior_and_verdict_follow(kept, tmp_path):
     "changed",
     [
         {"effects": 0.1},
-        {"flaws": (1.0, 4.0)},
+        {"flaws": (2.0, 8.0)},
         {"slabs": (8.0, 24.0, 80.0)},
         {"smooth": (0.0, 30.0)},
         {"gaps": HYPER.gaps[1:]},
