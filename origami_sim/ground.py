@@ -119,7 +119,8 @@ class Grounds(Masses):
                 their plane, and turns with that. Otherwise it turns with its own triangle, the more the finer the mesh.
 
         Raises:
-            InputError: no such panel or node, a point outside of the panel or the pad, a pad in one line.
+            InputError: no such panel or node, a point outside of the panel or the pad, a pad in one line or on rigid
+                panels.
         """
         if pad is None:
             return self._touch(panel, np.asarray(point, float), axis, offset=float(offset), name=name)
@@ -287,6 +288,8 @@ class Grounds(Masses):
         self, panel: int, point: np.ndarray, axis: ArrayLike, pad: Sequence[int], *, offset: float, name: str | None
     ) -> int:
         """Adds a contact point that a pad carries, and returns its index."""
+        if self.panels == "rigid":
+            raise InputError("a point turns with its rigid panel", field=f"pad of panel {panel}", allowed="left out")
         nodes = [int(n) for n in self._index("node", [*pad])]
         at = self.mesh.vertices[nodes] if len(nodes) == 3 else np.zeros((3, 3))
         upward = float(np.cross(at[1] - at[0], at[2] - at[0]) @ self._normal(panel))

@@ -203,5 +203,7 @@ def test_what_a_quadrature_or_a_pad_cannot_be_is_said():
         plate().ground(points=3, nodes=[0])
     with pytest.raises(InputError, match="a pad has three nodes, not in one line"):
         plate().contact(0, (0, 0, 0), pad=(0, 1, 1))
+    with pytest.raises(InputError, match="turns with its rigid panel"):
+        plate(panels="rigid").contact(0, (0, 0, 0), pad=(0, 1, 4))
     with pytest.raises(InputError, match="lies outside its pad"):
         plate().contact(0, (0.03, 0.03, 0), pad=(0, 1, 4))
