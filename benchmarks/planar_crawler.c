@@ -25,6 +25,7 @@ typedef struct {
     double belly, foot;                           /* depths below the line [m] */
     double mu, mu_forward, mu_back;               /* friction of the belly, of the feet */
     double field, frequency, gravity, decay;
+    double relaxation;                            /* of the losses' Maxwell branch [s]; 0: they are viscous */
 } Device;
 
 typedef struct { double x, z; } V;
@@ -99,11 +100,15 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
 {
     static _Thread_local V f[MOST];
     static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[POINTS * MOST], ends[2], a[2 * MOST][BAND];
+    static _Thread_local double before[MOST], lost[MOST];
     const int n = d->cells;
     V *p = (V *)state, *v = p + n + 1;
     double total = 0;
     memset(bristle, 0, sizeof bristle);
     ends[0] = ends[1] = 0;
+    memset(before, 0, sizeof before);
+    memset(lost, 0, sizeof lost);
+    const double kept = d->relaxation > 0 ? exp(-dt / d->relaxation) : 0;
     for (int i = 0; i <= n; i++) total += d->mass[i];
     for (long k = 0; k < steps; k++) {
         memset(a, 0, 2 * (n + 1) * sizeof *a);
@@ -122,7 +127,12 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
         }
         for (int i = 1; i < n; i++) {
             const double angle = atan2(ux[i - 1] * uz[i] - uz[i - 1] * ux[i], ux[i - 1] * ux[i] + uz[i - 1] * uz[i]);
-            const double m = d->rigidity[i] * angle;
+            double m = d->rigidity[i] * angle;
+            if (d->relaxation > 0) { /* exact for an even rate; the branch's stiffness times its time is the loss */
+                lost[i] = kept * lost[i] + (1 - kept) / dt * d->loss[i] * (angle - before[i]);
+                before[i] = angle;
+                m += lost[i];
+            }
             c[i] -= m; c[i - 1] += m;
         }
         for (int j = 0; j < n; j++) {
@@ -148,7 +158,7 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
             const double g[4] = {-ux[j], -uz[j], ux[j], uz[j]};
             lose(a, 2 * j, 4, g, dt * d->dashpot[j]);
         }
-        for (int i = 1; i < n; i++) {
+        for (int i = 1; i < n && d->relaxation <= 0; i++) {
             const double hx = -uz[i - 1] / len[i - 1], hz = ux[i - 1] / len[i - 1];
             const double qx = -uz[i] / len[i], qz = ux[i] / len[i];
             const double g[6] = {hx, hz, -hx - qx, -hz - qz, qx, qz};

@@ -17,7 +17,8 @@ import numpy as np
 
 MOST, POINTS = 512, 16
 ARRAYS = ("rigidity", "loss", "axial", "dashpot", "length", "couple", "lift", "mass", "kn", "cn")
-NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay")
+NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay",
+           "relaxation")  # fmt: skip
 MAE = 0.78e6
 """Young's modulus of the patches [Pa]; their Poisson's ratio is 0.49."""
 FRACTION = 0.25
@@ -53,7 +54,7 @@ def library() -> ctypes.CDLL:
         return ctypes.CDLL(str(out))
 
 
-def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, float]:
+def chain(s: dict, cell: float, relaxing: bool) -> tuple[dict[str, np.ndarray], np.ndarray, float]:
     """Numbers of the device, its first state (2, stations, 2), and the shortest step of its springs [s]."""
     length, patch = [], []
     for name, width in (("overhang", 0.0), ("big_length", s["big_width"]), ("span", 0.0),
@@ -78,6 +79,9 @@ def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, floa
     part = half * bare * width / rigidity  # of the turn squared, over the whole's, that bends the sheet
     c[1:n] = s["loss_time"] * (k[1:n] if s["patch_loss"] else k[1:n] ** 2 * (part[1:] + part[:-1]))
 
+    time = s["relaxation_time"] if relaxing else 0.0
+    fast = k + c / time if relaxing else k
+
     weight = s["patch_density"] * t * patch * length
     mass = np.zeros(n + 1)
     for side in (mass[1:], mass[:-1]):
@@ -98,10 +102,13 @@ def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, floa
         "belly": h / 2, "foot": h / 2 + s["foot_height"], "mu": s["belly_friction"],
         "mu_forward": s["foot_friction"], "mu_back": s["foot_friction_back"], "field": s["field"],
         "frequency": s["frequency"], "gravity": s["gravity"], "decay": s["decay_rate"],
+        "relaxation": time,
     }  # fmt: skip
 
     near = np.minimum(np.append(length[0], length), np.append(length, length[-1]))
-    hinge, rod = (np.maximum.reduce([a, np.append(a[1:], 0), np.append(0, a[:-1])]) for a in (k, np.append(axial, 0)))
+    hinge, rod = (
+        np.maximum.reduce([a, np.append(a[1:], 0), np.append(0, a[:-1])]) for a in (fast, np.append(axial, 0))
+    )
     lever = (1 + 2 * values["foot"] / near) ** 2
     ground = (np.append(kn, 0) + np.append(0, kn)) / 2
     ground[[0, -1]] += foot
@@ -111,9 +118,11 @@ def chain(s: dict, cell: float) -> tuple[dict[str, np.ndarray], np.ndarray, floa
     return values, state, step
 
 
-def walk(lib: ctypes.CDLL, s: dict, *, cell: float, cycles: int = 6, fraction: float = FRACTION) -> np.ndarray:
-    """Strides by cycle [m]."""
-    values, state, step = chain(s, cell)
+def walk(
+    lib: ctypes.CDLL, s: dict, *, cell: float, cycles: int = 6, fraction: float = FRACTION, relaxing: bool = False
+) -> np.ndarray:
+    """Strides by cycle [m]; with `relaxing`, losses are the Maxwell branch of a free strip."""
+    values, state, step = chain(s, cell, relaxing)
     device = Device()
     for name, v in values.items():
         if np.ndim(v):
@@ -138,11 +147,13 @@ def main(argv=None):
     parser.add_argument("--cell", type=float, nargs="+", default=[3.8, 1.9, 0.95], help="[mm]")
     parser.add_argument("--cycles", type=int, default=6)
     parser.add_argument("--fraction", type=float, default=FRACTION)
+    parser.add_argument("--relaxing", action="store_true", help="losses as those of a free strip, not viscous")
     args = parser.parse_args(argv)
     settings = read_calibration(args.calibration).override(args.set, "--set")
     values, lib = {n: settings[n].value for n in settings.as_dict()}, library()
     for cell in args.cell:
-        found = walk(lib, values, cell=1e-3 * cell, cycles=args.cycles, fraction=args.fraction)
+        found = walk(lib, values, cell=1e-3 * cell, cycles=args.cycles, fraction=args.fraction,
+                     relaxing=args.relaxing)  # fmt: skip
         print(f"cells of {cell:g} mm: " + " ".join(f"{1e3 * x:.2f}" for x in found) + " mm per cycle", flush=True)
 
 

@@ -407,6 +407,7 @@ class Sheet(Grounds, Electrodes, Thick):
             ]
         contacts, shares = self._grounded()
         tri = np.array([c.triangle for c in contacts], int)
+        carriers = [c.pad or mesh.triangles[c.triangle] for c in contacts]
         model = Model(
             position=mesh.vertices,
             free=self._free,
@@ -415,7 +416,7 @@ class Sheet(Grounds, Electrodes, Thick):
             bends=mesh.bends.reshape(-1, 4).astype(np.int32),
             triangles=mesh.triangles.astype(np.int32),
             triangle_panel=mesh.triangle_face.astype(np.int32),
-            contacts=mesh.triangles[tri].reshape(-1, 3).astype(np.int32),
+            contacts=np.array(carriers, np.int32).reshape(-1, 3),
             contact_weights=np.array([c.weights for c in contacts]).reshape(-1, 3),
             contact_offsets=np.array([c.offset for c in contacts], float),
             contact_axes=np.array([c.axis for c in contacts]).reshape(-1, 3),

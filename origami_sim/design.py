@@ -46,7 +46,8 @@ _ANGLES = ("gamma", "twist", "fold_angle", "fold_angles", "target_angle")
 _EDGES = ("fold_angles", "stiffness", "rest_angles")
 _STATEMENTS = (
     *("on", "set", "crease", "yields", "shell", "panel", "patch", "magnetise", "soften", "fix", "name"),
-    *("gravity", "body", "mass", "point_mass", "contact", "feet", "ground", "touch", "electrode", "hinge", "mitre"),
+    *("gravity", "body", "mass", "point_mass", "contact", "underside", "feet", "ground", "touch"),
+    *("electrode", "hinge", "mitre"),
 )
 
 

@@ -33,6 +33,21 @@ ON_EDGE = 1e-6
 nothing."""
 
 
+def _orbits(*orbits: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Barycentric places [n, 3] and weights [n] of orbits: a weight, and the share of two of the corners."""
+    places = [np.roll([1 - 2 * a, a, a], k) for a, _ in orbits for k in range(3 if a != 1 / 3 else 1)]
+    return np.array(places), np.array([w for a, w in orbits for _ in range(3 if a != 1 / 3 else 1)])
+
+
+QUADRATURES = {
+    1: _orbits((1 / 3, 1.0)),
+    3: _orbits((1 / 6, 1 / 3)),
+    6: _orbits((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)),
+}
+"""Points of a triangle by their number, exact for degrees 1, 2 and 4 (Strang & Fix 1973; Cowper 1973, Int. J. Numer.
+Meth. Eng. 7, 405)."""
+
+
 @dataclass(frozen=True)
 class Contact:
     """A point of a sheet that can touch the ground.
@@ -42,6 +57,7 @@ class Contact:
         offset: height above the mid-plane [m], or with `below` under the panel's underside [m], patches counted.
         axis: weights (3,) of the corners that give the body's forward direction. panel: of the triangle.
         foot: whether it is to bear the device with the other feet alone.
+        pad: three nodes that carry it in place of the triangle's corners.
     """
 
     triangle: int
@@ -52,6 +68,7 @@ class Contact:
     panel: int
     below: bool = False
     foot: bool = False
+    pad: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +76,7 @@ class Ground:
     """The ground as it was stated, see `Grounds.ground`."""
 
     nodes: np.ndarray | None
+    points: int
     friction: float
     both_sides: bool
     sink: float | None
@@ -66,6 +84,10 @@ class Ground:
     lift: bool
     tilt: float
     azimuth: float
+
+
+Place = tuple[int, np.ndarray, str, float]
+"""Triangle, barycentric weights (3,), name, and share of the sheet, of a place where it touches."""
 
 
 class Grounds(Masses):
@@ -85,6 +107,7 @@ class Grounds(Masses):
         offset: float = 0.0,
         axis: ArrayLike = (1, 0, 0),
         name: str | None = None,
+        pad: Sequence[int] | None = None,
     ) -> int:
         """Adds a point that can touch the ground and returns its index.
 
@@ -92,11 +115,45 @@ class Grounds(Masses):
             panel: face that carries it. point: position in the reference state [m], in the panel's plane.
             offset: height above the mid-plane along the panel's normal [m]; negative below.
             axis: the body's forward direction in the reference state, for directional friction.
+            pad: three nodes that carry it, such as those of a stiff block that is bonded to several cells: it lies off
+                their plane, and turns with that. Otherwise it turns with its own triangle, the more the finer the mesh.
 
         Raises:
-            InputError: no such panel, a point outside it.
+            InputError: no such panel or node, a point outside of the panel or the pad, a pad in one line or on rigid
+                panels.
         """
-        return self._touch(panel, np.asarray(point, float), axis, offset=float(offset), name=name)
+        if pad is None:
+            return self._touch(panel, np.asarray(point, float), axis, offset=float(offset), name=name)
+        return self._on_pad(panel, np.asarray(point, float), axis, pad, offset=float(offset), name=name)
+
+    @statement(offset="m")
+    def underside(
+        self, *, points: int = 3, offset: float = 0.0, axis: ArrayLike = (1, 0, 0)
+    ) -> tuple[list[int], np.ndarray]:
+        """Adds the points of a quadrature of every triangle that can touch the ground.
+
+        A law per area is integrated over the sheet by giving each point that law times its area.
+
+        Args:
+            points: of each triangle: 1, 3 or 6, exact for a pressure of degree 1, 2 or 4.
+            offset, axis: as in `contact`.
+
+        Returns:
+            their indices, and the area for which each stands [m^2].
+
+        Raises:
+            InputError: no such number of points.
+        """
+        places, weights = _quadrature(points)
+        found, area = [], []
+        for t, panel in enumerate(self.mesh.triangle_face.tolist()):
+            forward = self._forward(self._corners(t), np.asarray(axis, float))
+            for k, (at, weight) in enumerate(zip(places, weights, strict=True)):
+                name = f"triangle {t}, point {k}"
+                self._contacts.append(Contact(t, at, float(offset), forward, name, panel))
+                found.append(len(self._contacts) - 1)
+                area.append(float(weight * self.area[t]))
+        return found, np.array(area)
 
     @statement(at="m", height="m", mass="kg")
     def feet(
@@ -153,6 +210,7 @@ class Grounds(Masses):
         self,
         *,
         nodes: Sequence[int] | None = None,
+        points: int = 0,
         friction: float = 0.5,
         both_sides: bool = False,
         sink: float | None = None,
@@ -170,6 +228,9 @@ class Grounds(Masses):
 
         Args:
             nodes: only these can touch besides feet and contacts (default: all; () for feet alone).
+            points: of a quadrature of each triangle, 1, 3 or 6, that touch in place of the nodes, with 1, 2 or 3 Gauss
+                points to an edge of the outline. What lands on an edge over less than a cell needs them: nodes alone
+                make it land elsewhere on each mesh.
             friction: coefficient of all points that are no feet.
             both_sides: let the upper side touch as well, for what turns over. Twice as many points.
             sink: depth [m] (default: SINK times the longest side).
@@ -179,8 +240,14 @@ class Grounds(Masses):
             tilt, azimuth: rise of the ground [rad], and the horizontal direction from x in which it rises [rad].
 
         Raises:
-            InputError: no such node, a coefficient, damping or depth that is negative, a tilt of a right angle or more.
+            InputError: no such node or number of points, both, a coefficient, damping or depth that is negative, a tilt
+                of a right angle or more.
         """
+        if points:
+            _quadrature(points)
+            if nodes is not None:
+                allowed = "nodes that touch, or points of every triangle"
+                raise InputError("a sheet touches at nodes or between them", field="nodes, points", allowed=allowed)
         if not (friction >= 0 and damping_ratio >= 0 and (sink is None or positive(sink))):
             raise InputError(
                 "the ground's numbers are positive",
@@ -191,7 +258,7 @@ class Grounds(Masses):
         if not abs(tilt) < np.pi / 2:
             raise InputError("the ground is no wall", field="tilt", value=tilt, allowed="-pi/2 to pi/2 rad")
         chosen = None if nodes is None else self._index("node", [*nodes])
-        self._ground = Ground(chosen, friction, both_sides, sink, damping_ratio, lift, tilt, azimuth)
+        self._ground = Ground(chosen, points, friction, both_sides, sink, damping_ratio, lift, tilt, azimuth)
         if self._gravity is None:
             self.gravity()
         self.on("ground", "friction", "coulomb")
@@ -208,11 +275,43 @@ class Grounds(Masses):
         # at a corner, or on an edge, of several the widest one there carries, and not the one that rounding prefers
         level = [(t, w) for t, w in candidates if w.min() > inside - ON_EDGE]
         best, weights = max(level, key=lambda c: round(self._angle_at(c[0], point), 9))
-        a, b = self._edge_weights(best, np.asarray(axis, float))
-        forward = np.array([-a - b, a, b])
+        forward = self._forward(self._corners(best), np.asarray(axis, float))
         label = name or f"contact {len(self._contacts)}"
         self._contacts.append(Contact(best, weights, axis=forward, name=label, panel=panel, **options))
         return len(self._contacts) - 1
+
+    def _corners(self, triangle: int) -> np.ndarray:
+        """Places of a triangle's corners [3, 3]."""
+        return self.mesh.vertices[self.mesh.triangles[triangle]]
+
+    def _on_pad(
+        self, panel: int, point: np.ndarray, axis: ArrayLike, pad: Sequence[int], *, offset: float, name: str | None
+    ) -> int:
+        """Adds a contact point that a pad carries, and returns its index."""
+        if self.panels == "rigid":
+            raise InputError("a point turns with its rigid panel", field=f"pad of panel {panel}", allowed="left out")
+        nodes = [int(n) for n in self._index("node", [*pad])]
+        at = self.mesh.vertices[nodes] if len(nodes) == 3 else np.zeros((3, 3))
+        upward = float(np.cross(at[1] - at[0], at[2] - at[0]) @ self._normal(panel))
+        if not abs(upward) > ON_EDGE * np.ptp(at, axis=0).max(initial=1e-300) ** 2:
+            raise InputError("a pad has three nodes, not in one line", field=f"pad of panel {panel}", value=nodes)
+        if upward < 0:
+            nodes, at = nodes[::-1], at[::-1]
+        weights = _barycentric(at, point)
+        if not weights.min() >= -ON_EDGE:
+            raise InputError("a contact point lies outside its pad", field=f"panel {panel}", value=point.tolist())
+        forward = self._forward(at, np.asarray(axis, float))
+        label, first = name or f"contact {len(self._contacts)}", int(self._triangles_of(panel)[0])
+        self._contacts.append(
+            Contact(first, weights, offset, forward, label, panel, pad=(nodes[0], nodes[1], nodes[2]))
+        )
+        return len(self._contacts) - 1
+
+    @staticmethod
+    def _forward(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """Weights (3,) of corners [3, 3] that give the part of a direction in their plane."""
+        (a, b), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, axis, rcond=None)
+        return np.array([-a - b, a, b])
 
     def _angle_at(self, triangle: int, point: np.ndarray) -> float:
         """Angle of a triangle around a point on it [rad]: that of a corner, else none."""
@@ -249,15 +348,12 @@ class Grounds(Masses):
             return out, np.zeros(len(out))
         feet = max(sum(c.foot for c in out) or len(out), 1)
         shares = [1.0 / feet] * len(out)
-        for panel, node, share in self._shares():
-            if self._ground.nodes is None or node in self._ground.nodes:
-                t = int(next(t for t in self._triangles_of(panel) if node in self.mesh.triangles[t]))
-                at = (self.mesh.triangles[t] == node).astype(float)
-                for side in (-1, 1) if self._ground.both_sides else (-1,):
-                    axis = np.zeros(3)
-                    where = f"node {node}" + (", above" if side > 0 else "")
-                    out.append(Contact(t, at, side * 0.5 * float(self.thickness[panel]), axis, where, panel))
-                    shares.append(share)
+        for t, at, name, share in self._touching_places(self._ground):
+            panel = int(self.mesh.triangle_face[t])
+            for side in (-1, 1) if self._ground.both_sides else (-1,):
+                where = name + (", above" if side > 0 else "")
+                out.append(Contact(t, at, side * 0.5 * float(self.thickness[panel]), np.zeros(3), where, panel))
+                shares.append(share)
         for panel, patch in enumerate(self._patches):
             if self._ground.nodes is not None or not patch or (patch["side"] > 0 and not self._ground.both_sides):
                 continue
@@ -270,6 +366,48 @@ class Grounds(Masses):
                     shares.append(float(patch["size"].prod() / self.area.sum() / 4))
         return out, np.array(shares)
 
+    def _touching_places(self, ground: Ground) -> list[Place]:
+        """Where a sheet touches the ground, besides contacts that were stated."""
+        return self._at_points(ground.points) if ground.points else self._at_nodes(ground.nodes)
+
+    def _at_nodes(self, nodes: np.ndarray | None) -> list[Place]:
+        """Where a sheet touches at its nodes, or at some of them."""
+        out: list[Place] = []
+        for panel, node, share in self._shares():
+            if nodes is None or node in nodes:
+                t = int(next(t for t in self._triangles_of(panel) if node in self.mesh.triangles[t]))
+                out.append((t, (self.mesh.triangles[t] == node).astype(float), f"node {node}", share))
+        return out
+
+    def _at_points(self, points: int) -> list[Place]:
+        """Where a sheet touches by the quadratures of its triangles and of its outline."""
+        places, weights = _quadrature(points)
+        total, outline = float(self.area.sum()), self._outline()
+        around = sum(length for _, length in outline.values())
+        whole = 0.5 if around else 1.0
+        out: list[Place] = [
+            (t, at, f"triangle {t}, point {k}", whole * float(weight * self.area[t]) / total)
+            for t in range(len(self.area))
+            for k, (at, weight) in enumerate(zip(places, weights, strict=True))
+        ]
+        along, parts = np.polynomial.legendre.leggauss((points + 3) // 3)
+        for (a, b), (t, length) in outline.items():
+            nodes = self.mesh.triangles[t]
+            for x, part in zip((1 + along) / 2, parts / 2, strict=True):
+                at = (1 - x) * (nodes == a) + x * (nodes == b)
+                out.append((t, at, f"edge {a} {b}", 0.5 * float(part) * length / around))
+        return out
+
+    def _outline(self) -> dict[tuple[int, int], tuple[int, float]]:
+        """Triangle and length [m] of every edge of one triangle only."""
+        edges: dict[tuple[int, int], list[int]] = {}
+        for t, nodes in enumerate(self.mesh.triangles.tolist()):
+            for k in range(3):
+                a, b = sorted((nodes[k], nodes[(k + 1) % 3]))
+                edges.setdefault((a, b), []).append(t)
+        x = self.mesh.vertices
+        return {e: (t[0], float(np.linalg.norm(x[e[1]] - x[e[0]]))) for e, t in edges.items() if len(t) == 1}
+
     def _shares(self) -> list[tuple[int, int, float]]:
         """Panel, node and the share of the sheet that touches there: half by area, half by length of its outline.
 
@@ -277,21 +415,17 @@ class Grounds(Masses):
         """
         mesh, total = self.mesh, float(self.area.sum())
         share: dict[tuple[int, int], float] = {}
-        edges: dict[tuple[int, int], list[int]] = {}
         for t, nodes in enumerate(mesh.triangles.tolist()):
-            for k in range(3):
-                key = int(mesh.triangle_face[t]), nodes[k]
+            for node in nodes:
+                key = int(mesh.triangle_face[t]), node
                 share[key] = share.get(key, 0.0) + 0.5 * float(self.area[t]) / 3 / total
-                edge = sorted((nodes[k], nodes[(k + 1) % 3]))
-                edges.setdefault((edge[0], edge[1]), []).append(int(mesh.triangle_face[t]))
-        outline = {e: panels[0] for e, panels in edges.items() if len(panels) == 1}
-        length = {e: float(np.linalg.norm(np.diff(mesh.vertices[list(e)], axis=0))) for e in outline}
-        around = sum(length.values())
+        outline = self._outline()
+        around = sum(length for _, length in outline.values())
         if not around:  # a closed surface
             return sorted(((p, n, 2 * s) for (p, n), s in share.items()), key=lambda i: (i[1], i[0]))
-        for e, panel in outline.items():
+        for e, (t, length) in outline.items():
             for node in e:
-                share[panel, node] += 0.25 * length[e] / around
+                share[int(mesh.triangle_face[t]), node] += 0.25 * length / around
         return [(panel, node, s) for (panel, node), s in sorted(share.items(), key=lambda i: (i[0][1], i[0][0]))]
 
     def _stand(self, model: Model, parameters: Parameters, shares: np.ndarray, lifts: np.ndarray) -> Model:
@@ -328,6 +462,18 @@ class Grounds(Masses):
             centre = parameters["body", f"centre_{axis}"]
             parameters.set("body", f"centre_{axis}", centre[:, 0] + by)
         return replace(model, position=model.position + shift)
+
+
+def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
+    if points not in QUADRATURES:
+        allowed = ", ".join(map(str, QUADRATURES))
+        raise InputError("no such number of points to a triangle", field="points", value=points, allowed=allowed)
+    return QUADRATURES[points]
+
+
+def _barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    (a, b), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, point - corners[0], rcond=None)
+    return np.array([1 - a - b, a, b])
 
 
 def upward(tilt: float, azimuth: float) -> np.ndarray:

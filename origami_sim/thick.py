@@ -77,11 +77,11 @@ class Thick(Touches):
         self,
         panels,
         *,
-        rigidity: float | None = None,
-        thickness: float | None = None,
-        offset: float | None = None,
+        rigidity: ArrayLike | None = None,
+        thickness: ArrayLike | None = None,
+        offset: ArrayLike | None = None,
     ) -> Self:
-        """Properties of some panels.
+        """Properties of some panels: one for all, or one per panel.
 
         Args:
             rigidity: bending rigidity per width [N m], instead of E h^3 / 12 (1 - nu^2).

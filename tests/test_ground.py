@@ -157,3 +157,53 @@ def test_a_corner_of_several_triangles_stands_on_the_widest_whatever_rounding_sa
                 nodes = s.mesh.triangles[c.triangle]
                 assert node in nodes
                 assert sum(n % 2 == node % 2 for n in nodes) == 2  # its own side of the strip, along which it lies
+
+
+@pytest.mark.parametrize(("points", "error"), [(3, 0.035), (6, 0.02)])
+def test_a_quadrature_lands_on_an_edge_as_a_continuous_ground_does(points, error):
+    """A plate pressed in along one edge over 0.5 to 1.2 cells: wedges of area and of outline, in closed form."""
+    length, width, tilt = 0.06, 0.04, 0.01
+
+    def off(n, **options):
+        """Largest error of the force, over the force."""
+        model, parameters = plate(n, thickness=1e-6).ground(**options).build()
+        stiffness, found = parameters["ground", "stiffness"][:, 0], []
+        for deep in np.linspace(0.01, 0.024, 8):
+            x = model.position.copy()
+            x[:, 2] = (x[:, 0] - deep) * np.tan(tilt)
+            force = stiffness @ np.maximum(-gaps(model, parameters, x[:, None])[:, 0], 0.0)
+            wedge = 0.5 * deep**2 * np.tan(tilt)
+            outline = (width * deep * np.tan(tilt) + 2 * wedge) / (2 * (length + width))
+            found.append(force / (0.5 * stiffness.sum() * (wedge / length + outline)) - 1)
+        return np.abs(found).max()
+
+    assert off(1, points=points) < error
+    assert off(2, points=points) < error / 2
+    assert off(1) > 0.2  # at nodes
+
+
+def test_points_over_an_underside_stand_for_its_area():
+    sheet = plate(2)
+    total, square = 0.06 * 0.04, 0.06 * 0.04**3 / 3
+    for points in (1, 3, 6):
+        index, area = sheet.underside(points=points, offset=-0.5e-3)
+        model, _ = sheet.build()
+        assert len(index) == points * len(model.triangles)
+        y = (model.contact_weights[index, :, None] * model.position[model.contacts[index]]).sum(axis=1)[:, 1]
+        assert area.sum() == pytest.approx(total)
+        if points > 1:
+            assert area @ y**2 == pytest.approx(square, rel=1e-9)
+    assert np.all(model.contact_offsets == -0.5e-3)
+
+
+def test_what_a_quadrature_or_a_pad_cannot_be_is_said():
+    with pytest.raises(InputError, match="no such number of points to a triangle"):
+        plate().ground(points=4)
+    with pytest.raises(InputError, match="at nodes or between them"):
+        plate().ground(points=3, nodes=[0])
+    with pytest.raises(InputError, match="a pad has three nodes, not in one line"):
+        plate().contact(0, (0, 0, 0), pad=(0, 1, 1))
+    with pytest.raises(InputError, match="turns with its rigid panel"):
+        plate(panels="rigid").contact(0, (0, 0, 0), pad=(0, 1, 4))
+    with pytest.raises(InputError, match="lies outside its pad"):
+        plate().contact(0, (0.03, 0.03, 0), pad=(0, 1, 4))
