@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
-from origami_sim.masses import Masses, positive
+from origami_sim.masses import Masses, barycentric, in_plane, positive
 from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
 from origami_sim.statements import statement
@@ -297,7 +297,7 @@ class Grounds(Masses):
             raise InputError("a pad has three nodes, not in one line", field=f"pad of panel {panel}", value=nodes)
         if upward < 0:
             nodes, at = nodes[::-1], at[::-1]
-        weights = _barycentric(at, point)
+        weights = barycentric(at, point)
         if not weights.min() >= -ON_EDGE:
             raise InputError("a contact point lies outside its pad", field=f"panel {panel}", value=point.tolist())
         forward = self._forward(at, np.asarray(axis, float))
@@ -310,7 +310,7 @@ class Grounds(Masses):
     @staticmethod
     def _forward(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """Weights (3,) of corners [3, 3] that give the part of a direction in their plane."""
-        (a, b), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, axis, rcond=None)
+        a, b = in_plane(corners, axis)
         return np.array([-a - b, a, b])
 
     def _angle_at(self, triangle: int, point: np.ndarray) -> float:
@@ -348,7 +348,8 @@ class Grounds(Masses):
             return out, np.zeros(len(out))
         feet = max(sum(c.foot for c in out) or len(out), 1)
         shares = [1.0 / feet] * len(out)
-        for t, at, name, share in self._touching_places(self._ground):
+        ground = self._ground
+        for t, at, name, share in self._at_points(ground.points) if ground.points else self._at_nodes(ground.nodes):
             panel = int(self.mesh.triangle_face[t])
             for side in (-1, 1) if self._ground.both_sides else (-1,):
                 where = name + (", above" if side > 0 else "")
@@ -365,10 +366,6 @@ class Grounds(Masses):
                     out.append(Contact(t, weights, height, np.zeros(3), f"patch on panel {panel}", panel))
                     shares.append(float(patch["size"].prod() / self.area.sum() / 4))
         return out, np.array(shares)
-
-    def _touching_places(self, ground: Ground) -> list[Place]:
-        """Where a sheet touches the ground, besides contacts that were stated."""
-        return self._at_points(ground.points) if ground.points else self._at_nodes(ground.nodes)
 
     def _at_nodes(self, nodes: np.ndarray | None) -> list[Place]:
         """Where a sheet touches at its nodes, or at some of them."""
@@ -469,11 +466,6 @@ def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
         allowed = ", ".join(map(str, QUADRATURES))
         raise InputError("no such number of points to a triangle", field="points", value=points, allowed=allowed)
     return QUADRATURES[points]
-
-
-def _barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    (a, b), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, point - corners[0], rcond=None)
-    return np.array([1 - a - b, a, b])
 
 
 def upward(tilt: float, azimuth: float) -> np.ndarray:

@@ -418,14 +418,22 @@ class Masses(Statements):
 
     def _edge_weights(self, triangle: int, direction: np.ndarray) -> tuple[float, float]:
         """a, b with the in-plane part of `direction` = a (x2 - x1) + b (x3 - x1)."""
-        x1, x2, x3 = self.mesh.vertices[self.mesh.triangles[triangle]]
-        (a, b), *_ = np.linalg.lstsq(np.stack([x2 - x1, x3 - x1], axis=1), direction, rcond=None)
-        return float(a), float(b)
+        return in_plane(self.mesh.vertices[self.mesh.triangles[triangle]], direction)
 
     def _barycentric(self, triangle: int, point: np.ndarray) -> np.ndarray:
-        x1 = self.mesh.vertices[self.mesh.triangles[triangle, 0]]
-        a, b = self._edge_weights(triangle, point - x1)
-        return np.array([1 - a - b, a, b])
+        return barycentric(self.mesh.vertices[self.mesh.triangles[triangle]], point)
+
+
+def in_plane(corners: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
+    """a, b with the part of a direction (3,) in the plane of corners x1, x2, x3 = a (x2 - x1) + b (x3 - x1)."""
+    (a, b), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, direction, rcond=None)
+    return float(a), float(b)
+
+
+def barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Barycentric weights (3,) of a point by corners [3, 3]."""
+    a, b = in_plane(corners, point - corners[0])
+    return np.array([1 - a - b, a, b])
 
 
 def positive(value) -> np.ndarray:

@@ -77,8 +77,7 @@ class Strip:
         plane = s.modulus / (1 - s.poisson**2)
         mae = material("mae")
         bare = plane * s.thickness**3 / 12
-        bonded = layered_rigidity([(s.thickness, plane), (s.patch_thickness, mae.plane_modulus)])
-        rigidity = bare * np.maximum(middle - patch, 0) + bonded * patch
+        rigidity = bare * np.maximum(middle - patch, 0) + _bonded(s) * patch
         half = 0.5 * length / rigidity
         border = (patch[1:] > 0) != (patch[:-1] > 0)  # there the sheet bends on for c h under the patch
         ends = np.where(border, s.end_correction * s.thickness / (bare * width[1:-1]), 0.0)

@@ -27,8 +27,8 @@ class Hyper:
         smooth: sizes of a discrepancy of the channels, in deviations of the noise.
         flaws: root of the sum of squares of what all suspects together do in a device of which none is at fault, in d'.
             Given the truth it is between 2 and 4 in the battery: nearly all is given to 1 and 4, the rest to devices
-            that a model follows less well. Half of them lose 0.04 +- 0.03 of log score (nulls 0.07), double 0.09 +-
-            0.03 (effects of d' 5: 0.28, as flaws of 8 take up all of one).
+            that a model follows less well. Half of them lose 0.04 +- 0.03 of log score (nulls 0.07), 2 and 8 (double,
+            without 32) 0.09 +- 0.03 (effects of d' 5: 0.28, as flaws of 8 take up all of one).
         fewer: probability of each size over that of the next smaller one: of smooth, and of flaws.
         unlisted: odds that what one effect of the catalogue explains is done by a law that the catalogue lacks.
         imitated: times as large for each further effect that it takes: several laws together can look like most others.
