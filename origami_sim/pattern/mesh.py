@@ -39,12 +39,11 @@ def read_mesh(path, *, unit="m", size=None, scale=None) -> Pattern:
     """
     suffix = _suffix(path)
     stated = metres_per(unit)
-    read_bytes(path)
+    data = read_bytes(path)
+    if not (suffix == ".stl" and _binary_stl(data)):
+        _check_text(data, path, suffix)  # trimesh would guess another encoding, where a package for that is installed
     try:
         mesh = trimesh.load(str(path), file_type=suffix[1:], process=False, force="mesh", skip_materials=True)
-    except ImportError:  # what would guess the encoding of text that is not UTF-8
-        kind = {".stl": "neither binary nor ASCII STL", ".obj": "not text in UTF-8"}[suffix]
-        raise InputError(f"cannot read the mesh: it is {kind}", file=path) from None
     except Exception as error:  # a third-party parser: whatever it trips over is the file's fault
         raise InputError(f"cannot read the mesh ({type(error).__name__}: {str(error)[:120]})", file=path) from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
@@ -78,6 +77,24 @@ def _suffix(path) -> str:
     if suffix not in FORMATS:
         raise InputError("unknown mesh format", file=path, field="suffix", value=suffix, allowed=", ".join(FORMATS))
     return suffix
+
+
+def _binary_stl(data: bytes) -> bool:
+    """Whether bytes are as long as a binary STL file of as many triangles as they state."""
+    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+
+
+def _check_text(data: bytes, path, suffix: str):
+    """Refuses bytes that are no text in UTF-8.
+
+    Raises:
+        InputError: names the file.
+    """
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        kind = {".stl": "neither binary nor ASCII STL", ".obj": "not text in UTF-8"}[suffix]
+        raise InputError(f"cannot read the mesh: it is {kind}", file=path) from None
 
 
 def _merged(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
