@@ -15,6 +15,9 @@ setup: .venv/ready
 demo: setup
 	$(BIN)/origami-sim demo --out runs/demo
 
+# tests share the cores already: threads of the linear algebra would only wait for each other
+test test-all: export OPENBLAS_NUM_THREADS = 1
+
 test: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 

@@ -1,11 +1,19 @@
 """Work that the cores of the machine share."""
 
+import multiprocessing
 import os
+import signal
+import sys
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
 from typing import TypeVar
 
 T = TypeVar("T")
+
+FORKS = sys.platform == "linux"
+"""Whether a process may be copied while it runs: elsewhere system libraries do not outlive it."""
 
 
 def default_threads() -> int:
@@ -14,12 +22,50 @@ def default_threads() -> int:
 
 
 def side_by_side(jobs: Sequence[Callable[[], T]], threads: int | None) -> list[T]:
-    """What jobs return, in their order, made by so many threads (default: all cores).
+    """What jobs return, in their order, made on so many cores (default: all) by this process and by copies of it.
 
-    Jobs run at once as far as they leave the interpreter: in kernels, and in numpy over long arrays.
+    Copies (forks) share the interpreter's work too, not only that of kernels. Jobs have to be pure: what a copy changes
+    is lost, but for what it returns, which has to be picklable. What a copy does not deliver (it was killed, or out of
+    memory) this process does itself. Without forks threads do the jobs, in a worker of a pool one after the other.
     """
     count = min(threads or default_threads(), len(jobs))
-    if count <= 1:
+    if count <= 1 or multiprocessing.current_process().daemon:  # which may have no copies
         return [job() for job in jobs]
-    with ThreadPoolExecutor(count) as pool:
-        return [made.result() for made in [pool.submit(job) for job in jobs]]
+    if not FORKS:
+        with ThreadPoolExecutor(count) as pool:
+            return [made.result() for made in [pool.submit(job) for job in jobs]]
+    context = multiprocessing.get_context("fork")
+    shares = [range(k, len(jobs), count) for k in range(count)]
+    found: dict[int, T] = {}
+    copies = []
+    try:
+        for share in shares[1:]:
+            here, there = context.Pipe(duplex=False)
+            copy = context.Process(target=_deliver, args=(there, [jobs[n] for n in share]), daemon=True)
+            with warnings.catch_warnings():  # threads of libraries wait for work, and hold no lock meanwhile
+                warnings.simplefilter("ignore", DeprecationWarning)
+                copy.start()
+            there.close()
+            copies.append((copy, here, share))
+        found = {n: jobs[n]() for n in shares[0]}
+        for _, here, share in copies:
+            try:
+                found.update(zip(share, here.recv(), strict=True))
+            except EOFError:
+                found.update({n: jobs[n]() for n in share})
+    finally:
+        for copy, here, _ in copies:
+            here.close()
+            copy.terminate()
+            copy.join()
+    return [found[n] for n in range(len(jobs))]
+
+
+def _deliver(there: Connection, jobs: Sequence[Callable[[], T]]) -> None:
+    """What a copy does: its share of the jobs; what goes wrong, goes wrong again where it is reported."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that was copied hears it, and ends its copies
+    try:
+        there.send([job() for job in jobs])
+    except Exception:
+        os._exit(1)
+    os._exit(0)  # what libraries would do at an exit is not a copy's to do

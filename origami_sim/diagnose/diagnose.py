@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
@@ -41,6 +42,7 @@ from origami_sim.recording import Recording, read_dataset
 from origami_sim.scene import scene_module
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
 def diagnose(
     subject: Source,
     recordings: Sequence[Recording | str | Path] | Recording | str | Path,

@@ -10,7 +10,7 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.channels import stacked
-from origami_sim.predict.rollouts import Rollouts, Shots, film
+from origami_sim.predict.rollouts import Rollouts, Shots, Simulated, film
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import gradient_norms, stable_step
 
@@ -89,7 +89,7 @@ class BarRollouts(Rollouts):
             return 0.0
         return min(frame, stable_step(*world).dt)
 
-    def _filmed(self, shots: Shots) -> tuple[np.ndarray, None]:
+    def _filmed(self, shots: Shots) -> Simulated:
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         drive, state, step = self._driven(shots, model, parameters), self._state(shots), shots.step
@@ -106,7 +106,7 @@ class BarRollouts(Rollouts):
         raw += film(batch, recording, shots.frames - sum(map(len, raw)), substeps, step, first=not calm)
         out = np.concatenate(raw)
         out[:, :, batch.status() >= 0] = np.nan
-        return out, None
+        return Simulated(out)
 
 
 def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:

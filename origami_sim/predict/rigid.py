@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from threading import Lock
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Parameters, State, node_mass
-from origami_sim.predict.rollouts import Motion, Rollouts, Shots, film, joined_poses
+from origami_sim.predict.rollouts import Motion, Rollouts, Shots, Simulated, film, joined_poses
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
 from origami_sim.solve.rigid import RigidBatch, Topology, check_inertia
@@ -67,7 +66,6 @@ class RigidRollouts(Rollouts):
         self._tree = Topology(self.model)
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         self._films: dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]] = {}
-        self._filming = Lock()
         check_tree(self._tree, self.articulation.floating)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
@@ -107,7 +105,7 @@ class RigidRollouts(Rollouts):
             return 0.0
         return float(np.median(np.diff(self.recordings[0].times)))
 
-    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
+    def _filmed(self, shots: Shots) -> Simulated:
         """See `Rollouts._filmed`; not again of the first world, if it was filmed a short while ago.
 
         It is the point about which derivatives are taken, where a fit has just been. Worlds are the same to the last
@@ -115,7 +113,7 @@ class RigidRollouts(Rollouts):
         """
         keys = [] if np.any(shots.late) else self._film_keys(shots)
         known = [self._films[k] for k in keys if k in self._films]
-        count, drive = len(shots.blocks), self.drives[shots.recording]
+        count = len(shots.blocks)
         some = bool(keys) and len(known) == len(keys)
         if not some:
             raw, arrived = self._simulated(shots)
@@ -134,13 +132,16 @@ class RigidRollouts(Rollouts):
             more, beyond = self._simulated(others)
             raw = np.concatenate([raw, more], axis=2)
             arrived = None if arrived is None or beyond is None else np.concatenate([arrived, beyond], axis=2)
-        with self._filming:
-            for n, (key, block) in enumerate(zip(keys, shots.blocks, strict=False)):
-                end = None if arrived is None else arrived[:, :, n].copy()
-                self._films.setdefault(key, (block, drive, raw[:, :, n].copy(), end))
-            while len(self._films) > POINTS * len(self.blocks):
-                del self._films[next(iter(self._films))]
-        return raw, arrived
+        ends = [None if arrived is None else arrived[:, :, n].copy() for n in range(count)]
+        first = [(key, raw[:, :, n].copy(), end) for n, (key, end) in enumerate(zip(keys, ends, strict=False))]
+        return Simulated(raw, arrived, [] if some else first)
+
+    def _keep(self, r: int, blocks: Sequence[Block], first: list[tuple[tuple, np.ndarray, np.ndarray | None]]) -> None:
+        """See `Rollouts._keep`."""
+        for block, (key, raw, end) in zip(blocks, first, strict=False):
+            self._films.setdefault(key, (block, self.drives[r], raw, end))
+        while len(self._films) > POINTS * len(self.blocks):
+            del self._films[next(iter(self._films))]
 
     def _film_keys(self, shots: Shots) -> list[tuple]:
         """For each block, all that a film of the first world depends on."""

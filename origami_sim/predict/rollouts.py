@@ -79,6 +79,22 @@ class Shots:
 
 
 @dataclass(frozen=True, eq=False)
+class Simulated:
+    """What rollouts do, before anything measures it.
+
+    Attributes:
+        raw: [frames, D + k, K B] channels and depths. arrived: [1, L, K B] ends of tied blocks, or None. If
+            `Shots.clocked`, [3, L, K B]: a frame before, where the next begins as recorded, and a frame after.
+        first: what may be asked for again, of the first world in each block: what it depends on, [frames, D + k] and
+            [1 or 3, L] or None.
+    """
+
+    raw: np.ndarray
+    arrived: np.ndarray | None = None
+    first: list[tuple[tuple, np.ndarray, np.ndarray | None]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
 class Motion:
     """What laws remember where segments start.
 
@@ -179,11 +195,12 @@ class Rollouts(Worlds, ABC):
             most = max(1, TOGETHER // len(worlds))
             for group in _by_length(self.blocks, mine):  # into parts, the same on any number of threads
                 for part in (group[k : k + most] for k in range(0, len(group), most)):
-                    parts.append((part, impossible))
+                    parts.append((r, part, impossible))
                     jobs.append(partial(self._roll, r, part, worlds, local, memories))
         cores = -(-(self.threads or default_threads()) // max(len(jobs), 1))
         rolled = side_by_side([partial(job, cores) for job in jobs], self.threads)
-        for (part, impossible), (made, arrived) in zip(parts, rolled, strict=True):
+        for (r, part, impossible), (made, arrived, first) in zip(parts, rolled, strict=True):
+            self._keep(r, [self.blocks[b] for b in part], first)
             for n, b in enumerate(part):
                 values[b] = np.ascontiguousarray(made[n])  # as stored ones are: sums depend on it in their last digit
                 ends[b] = None if arrived is None else np.ascontiguousarray(arrived[n])
@@ -202,7 +219,10 @@ class Rollouts(Worlds, ABC):
         """See `Predictor.step`."""
 
     def _roll(self, r: int, group: list[int], worlds: list[World], local, memories, threads: int):
-        """Per block values [K, n, D] and ends [K, L] of the worlds; batches run over these, then blocks."""
+        """Per block values [K, n, D] and ends [K, L] of the worlds, and what `_keep` keeps of their rollouts.
+
+        Batches run over worlds, then blocks.
+        """
         recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
         k, count = len(worlds), len(blocks)
         model, times = worlds[0][0], blocks[0].times
@@ -231,7 +251,8 @@ class Rollouts(Worlds, ABC):
         chosen = [worlds[m] for m in moves]
         frames = max(frames, ends + 2 if clocked else ends + 1)
         shots = Shots(r, blocks, chosen, late[moves], some, memory, step, frames, ends, clocked, threads)
-        raw, arrived = self._filmed(shots)
+        simulated = self._filmed(shots)
+        raw, arrived = simulated.raw, simulated.arrived
         turning = angle_mask(recording)
         begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
         continuous(raw[:, : len(turning)], turning, begun)
@@ -255,14 +276,15 @@ class Rollouts(Worlds, ABC):
         return (
             [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
             None if tied is None else [tied[:, :, b].T for b in range(count)],
+            simulated.first,
         )
 
     @abstractmethod
-    def _filmed(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
-        """Channels and depths [frames, D + k, K B] before anything measures them, and ends [1, L, K B] of tied blocks.
+    def _filmed(self, shots: Shots) -> Simulated:
+        """What rollouts do; `_keep` keeps what of it may be asked for again."""
 
-        If `Shots.clocked`, ends [3, L, K B]: a frame before, where the next begins as recorded, and a frame after.
-        """
+    def _keep(self, r: int, blocks: Sequence[Block], first: list[tuple[tuple, np.ndarray, np.ndarray | None]]) -> None:
+        """Keeps what rollouts of the first world did in blocks of a recording, see `Simulated.first`."""
 
     def _driven(self, shots: Shots, model: Model, parameters: Parameters) -> Drive:
         """The drive that reaches every rollout."""
