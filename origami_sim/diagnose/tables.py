@@ -192,6 +192,8 @@ def patch(best: Fit) -> dict[str, float]:
     """Numbers of the best explanation, by "effect.parameter@entities" or the setting's name."""
     out = {}
     for n, t in zip(best.free, best.theta, strict=True):
+        if n.recording is not None:
+            continue
         where = "" if n.entities is None else "@" + ",".join(map(str, n.entities))
         out[n.label + where] = float(t)
     return out

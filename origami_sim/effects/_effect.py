@@ -97,12 +97,17 @@ class Memory:
     Args:
         base: so many numbers more in each world, of a law whose pairs share the room.
         own: whether a vector's components are in the entity's own axes, so that they stay when the device turns.
+        begun: parameter that says what it is at the first frame of a recording that begins in the midst of a motion,
+            over the most that the recorded motion makes of it. No law asks for it.
+        by: parameter without which it stays zero.
     """
 
     name: str
     size: int = 1
     base: int = 0
     own: bool = False
+    begun: str = ""
+    by: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,13 +42,21 @@ EFFECT = Effect(
     name="crease_relaxation",
     family="crease",
     force=moment,
-    memory=(Memory("q1"), Memory("q2"), Memory("q3")),
+    memory=tuple(Memory(f"q{i}", begun=f"begun_{i}", by=f"stiffness_{i}") for i in (1, 2, 3)),
     parameters=tuple(
         p
         for i, first in ((1, 3e-4), (2, 0.0), (3, 0.0))
         for p in (
             Parameter(f"stiffness_{i}", f"K{i}", "N m/rad", 0.0, (0.0, math.inf), f"spring {i}", typical=first),
             Parameter(f"time_{i}", f"tau{i}", "s", 1.0, (1e-6, math.inf), f"relaxation time {i}", typical=1.0),
+            Parameter(
+                f"begun_{i}",
+                f"xi{i}",
+                "-",
+                0.0,
+                (-math.inf, math.inf),
+                f"q{i} at a recording's first frame over the most later",
+            ),
         )
     ),
     fitted=("stiffness_1", "time_1"),

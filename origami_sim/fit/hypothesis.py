@@ -28,7 +28,7 @@ class Free:
         owner: NOMINAL for a setting of the model, else the effect. name: the setting or parameter.
         start: where fits begin. scale: a change that is noticeable. lower, upper: physical bounds.
         spread: standard deviation of what was known before; infinite if nothing was.
-        entities: entities of the effect's family that share the number; None for all.
+        entities: entities of the effect's family that share the number; None for all. recording: likewise (index).
         aligned: whether it says how recorder or supply are aligned, named "effect.parameter"; see `Subject.beside`.
     """
 
@@ -42,10 +42,12 @@ class Free:
     spread: float = np.inf
     entities: tuple[int, ...] | None = None
     aligned: bool = False
+    recording: int | None = None
 
     @property
     def label(self) -> str:
-        return f"{self.owner}.{self.name}" if self.owner else self.name
+        own = f"{self.owner}.{self.name}" if self.owner else self.name
+        return own if self.recording is None else f"{own} of recording {self.recording + 1}"
 
 
 @dataclass(frozen=True)
@@ -325,7 +327,8 @@ def apply(
                 index += 1
                 continue
             value = float(np.clip(values[index], *bounds))
-            out.set(s.effect, f.name, value, None if s.entities is None else np.array(s.entities))
+            mine = s.entities if f.recording is None else f.entities
+            out.set(s.effect, f.name, value, None if mine is None else np.array(mine))
             index += 1
     return out
 

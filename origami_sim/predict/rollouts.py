@@ -12,6 +12,7 @@ from origami_sim.articulation import Articulation, Pose
 from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
+from origami_sim.fit.begun import begins, with_begins
 from origami_sim.fit.hypothesis import (
     Hypothesis,
     Subject,
@@ -212,7 +213,10 @@ class Rollouts(Worlds, ABC):
         frame = float(np.median(np.diff(self.recordings[0].times)))
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
         every = along_every_axis(told_apart(every, len(self.components)))
-        return at_several_times(every, FASTEST * frame, longest)
+        every = at_several_times(every, FASTEST * frame, longest)
+        moving = [n for n, r in enumerate(self.recordings) if r.start is None or r.start.state == "moving"]
+        moving = [n for n in moving if self.start == "fit" and self.recorded(n) is not None]
+        return with_begins(every, moving, self.articulation.creases.tolist())
 
     @abstractmethod
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
@@ -338,7 +342,9 @@ class Rollouts(Worlds, ABC):
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
         every = np.union1d(every, [b.first for b in wanted])
-        if not len(State.at_rest(model).memory) or not np.any(every):
+        if not len(State.at_rest(model).memory):
+            return None
+        if not np.any(every) and not begins(model, Parameters.join([p for _, p in worlds])):
             return None
         motion = self._motion(r, worlds[0], local)
         if motion is None:
@@ -354,8 +360,10 @@ class Rollouts(Worlds, ABC):
             begin = max(int(near[0]) - LEAD, 0)
             batch = self._rested(r, worlds, begin, path[begin])
             rested = batch.remembered()[None]
-            later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
-            found = np.concatenate([rested, later])[-len(near) :]
+            found = rested
+            if near[-1] > begin:
+                later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
+                found = np.concatenate([rested, later])[-len(near) :]
             for first, carried in zip(near.tolist(), found, strict=True):
                 if first in motion.memory:
                     carried = carried + (motion.memory[first][:, None] - carried[:, :1])
@@ -364,7 +372,10 @@ class Rollouts(Worlds, ABC):
         return out
 
     def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:
-        """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on."""
+        """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on.
+
+        At the first frame with what `begins` says beside.
+        """
         model, parameters = worlds[0][0], Parameters.join([p for _, p in worlds])
         times = self.recordings[r].times - self.recordings[r].times[0]
         step = float(np.median(np.diff(times)))
@@ -374,7 +385,16 @@ class Rollouts(Worlds, ABC):
         state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
         batch = self._batch(held, parameters, drive.held(0.0), state, supports=model)
         batch.carry(np.stack([x, x]), LEAD * step)
-        return self._batch(held, parameters, drive, replace(state, memory=batch.remembered()), supports=model)
+        rested, motion = batch.remembered(), self.recorded(r)
+        moved = begins(model, parameters) if not frame and motion is not None else []
+        if moved:  # as unknown as the start's angles are
+            assert motion is not None
+            batch = self._batch(held, parameters, drive, replace(state, memory=rested), supports=model)
+            path = motion.positions[:, :, None]
+            usual = batch.carry(path, step, range(1, len(path)))
+            for rows, given in moved:
+                rested[rows] += given * np.abs(usual[:, rows]).max(axis=0)
+        return self._batch(held, parameters, drive, replace(state, memory=rested), supports=model)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, among=self.shared, **{"threads": self.threads, **options})

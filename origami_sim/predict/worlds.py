@@ -10,6 +10,7 @@ import numpy as np
 from origami_sim.articulation import Articulation
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.fit.begun import within
 from origami_sim.fit.hypothesis import Hypothesis, Subject, apply, suspects
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.model import Model, Parameters
@@ -108,7 +109,7 @@ class Worlds(ABC):
         worlds, impossible, gravity = [], [], self.recordings[r].gravity
         for k, (h, t) in enumerate(zip(each, theta, strict=True)):
             try:
-                world = self.world(h, t, effects)
+                world = self.world(*within(h, t, len(self.subject.nominals), r), effects)
             except InputError:  # such as an inertia that no masses give
                 impossible.append(k)
                 world = self.world(Hypothesis(), self._given, effects)

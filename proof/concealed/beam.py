@@ -28,7 +28,8 @@ class Beam:
     """What the effects change of a beam; strengths are in the numbers of the catalogue where it has them.
 
     Attributes:
-        cubic: moment over the cube of the turn of one cell [N m/rad^3]. offset: moment that acts without load [N m].
+        cubic: moment over the cube of the turn of one cell [N m/rad^3]. offset: moment that acts without load [N m],
+            towards +z.
         compliance: of the dipoles [1/T]. stiffening: relative, in a strong field. tilt: of the field [rad].
         stray: field (x, z) without command [T]. loop: half width of the field's hysteresis [T].
         saturation: of the field [1/T]. taper: relative difference of stiffness from root to tip. clamp: turn of the
@@ -412,5 +413,5 @@ def enthalpy(s: dict, k: float, voltage: float, beam: Beam, cell: float) -> tupl
         e += move
         if abs(move) < 1e-12:
             break
-    extra = 0.25 * beam.cubic * cell**3 * k**4 - beam.offset * k
+    extra = 0.25 * beam.cubic * cell**3 * k**4 + beam.offset * k  # which bends towards +z, k away from it
     return e, total(e) + extra

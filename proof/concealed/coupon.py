@@ -30,7 +30,8 @@ class Bridge:
 
     Attributes:
         cubic: moment over the cube of the fold [N m/rad^3]. valley: stiffness added to valleys [N m/rad].
-        offset: moment that acts without a fold [N m]. lasting: stiffness times the part of a fold that stays [N m/rad].
+        offset: moment by which it folds itself, without a test's [N m]. lasting: stiffness times the part of a fold
+            that stays [N m/rad].
         virgin: stiffness that folding destroys [N m/rad], half of it at the fold `half` [rad].
         dry: moment of dry layers [N m]. plastic: moment of layers that yield at the turn `yields` [N m, rad].
         play: of the grip [rad]. wear: part of the stiffness lost at each reversal. tear: part that is lost at once.
@@ -211,7 +212,7 @@ def section(turn: np.ndarray, known: Fibres, b: Bridge, stiffness: float) -> tup
     u = turn[:, None] * HEIGHT
     most, least = np.maximum(known.most, u), np.minimum(known.least, u)
     far = np.maximum(most, -least)
-    stress = stiffness * u + b.cubic / 0.6 * u**3 + b.offset * HEIGHT - b.lasting * (most + least)
+    stress = stiffness * u + b.cubic / 0.6 * u**3 - b.offset * HEIGHT - b.lasting * (most + least)
     slope = stiffness + 3 * b.cubic / 0.6 * u**2 - b.lasting * ((u >= known.most) | (u <= known.least))
     carries = u * HEIGHT > 0  # coats whose cracks close, on both faces, in a valley
     stress, slope = stress + b.valley * u * carries, slope + b.valley * carries

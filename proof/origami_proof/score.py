@@ -213,7 +213,7 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
     if kind == "single" and answer["site"]:
         row["placed"] = row["where"] == answer["site"]
         row["found_site"] = row["placed"] if row["top1"] else None
-    if kind == "single" and row["top1"]:
+    if kind == "single" and row["top1"] and row["found_site"] is not False:  # elsewhere it is another number
         _strength(row, answer, found)
     return row
 

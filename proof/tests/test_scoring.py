@@ -65,6 +65,12 @@ def test_a_right_answer():
     assert row["removed"] == pytest.approx(1.0)
 
 
+def test_the_strength_at_another_site_is_another_number():
+    """A foot that rubs less and one that rubs more look alike, with opposite numbers."""
+    row = judge(ANSWER, diagnosis("MECHANISM", ["crease_friction at fold1"], 0.97))
+    assert row["top1"] and row["found_site"] is False and row["covered"] is None and row["value"] is None
+
+
 def test_what_the_screening_sees_of_an_effect_is_its_score_over_what_was_concealed():
     seen = [("crease_friction", "fold2", -8.1), ("crease_friction", "all creases", 9.0), ("air_drag", "fold2", 20.0)]
     screening = [dict(zip(("effect", "site", "z"), s, strict=True)) for s in seen]
