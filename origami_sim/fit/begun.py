@@ -2,10 +2,11 @@
 
 A recording does not tell what was before it. Where a law forgets linearly, its memory at the first frame is as unknown
 as angles and rates are there, and a number of its own in each recording and at each crease: normal, with the most that
-the recorded motion, from rest, makes of that memory as its standard deviation. A motion that decays was larger before.
+the recorded motion, from rest, makes of that memory as its standard deviation if it is under way at the first frame. A
+motion that decays was larger before; what begins slower than it usually is has less behind it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,11 +19,11 @@ Rows = list[tuple[slice, np.ndarray]]
 """Rows of the memory, and what they are over the most that a recorded motion makes of them [entities, W]."""
 
 
-def with_begins(every: Sequence[Suspect], recordings: Sequence[int], entities: Sequence[int]) -> list[Suspect]:
+def with_begins(every: Sequence[Suspect], recordings: Mapping[int, float], entities: Sequence[int]) -> list[Suspect]:
     """The suspects; those that remember, with what they do at the first frame of each of these recordings.
 
     Args:
-        entities: creases that move.
+        recordings: how far each is under way at its first frame, 0 to 1. entities: creases that move.
     """
     out = []
     for s in every:
@@ -30,10 +31,11 @@ def with_begins(every: Sequence[Suspect], recordings: Sequence[int], entities: S
         names = [m.begun for m in get(s.effect).memory if m.begun and m.by in fitted and not s.more]
         mine = [e for e in entities if s.entities is None or e in s.entities]
         more = [
-            Free(s.effect, n, "-", 0.0, 1.0, spread=1.0, entities=(e,), recording=r)
+            Free(s.effect, n, "-", 0.0, way, spread=way, entities=(e,), recording=r)
             for n in names
-            for r in recordings
+            for r, way in recordings.items()
             for e in mine
+            if way
         ]
         out.append(replace(s, free=(*s.free, *more)) if more else s)
     return out

@@ -214,9 +214,22 @@ class Rollouts(Worlds, ABC):
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
         every = along_every_axis(told_apart(every, len(self.components)))
         every = at_several_times(every, FASTEST * frame, longest)
-        moving = [n for n, r in enumerate(self.recordings) if r.start is None or r.start.state == "moving"]
-        moving = [n for n in moving if self.start == "fit" and self.recorded(n) is not None]
-        return with_begins(every, moving, self.articulation.creases.tolist())
+        return with_begins(every, self._unsettled(), self.articulation.creases.tolist())
+
+    def _unsettled(self) -> dict[int, float]:
+        """Recordings before which the device may have moved, and how fast it does at the first frame, over its most.
+
+        What is let go moves no faster than its first frames tell. A swing that is recorded at its turning point would
+        look the same, but few are.
+        """
+        out: dict[int, float] = {}
+        for n, r in enumerate(self.recordings):
+            if self.start != "fit" or (r.start and r.start.state != "moving") or self.recorded(n) is None:
+                continue
+            first = next(b for b in self.blocks if b.recording == n)
+            speed = float(np.max(np.abs(first.rates) / np.maximum(self.usual_rates(n), 1e-12), initial=0.0))
+            out[n] = 1.0 if r.start else min(1.0, speed)
+        return out
 
     @abstractmethod
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
