@@ -4,7 +4,6 @@ Every hypothesis is judged by its own (empirical Bayes), so that what one of the
 """
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import residual_process
 from origami_sim.fit.weights import Weights, recast
-from origami_sim.threads import side_by_side
 
 ROUNDS = 4
 """Times that gaps and levels follow each other, at most."""
@@ -30,7 +28,7 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
     """A fit judged by what it leaves itself: no simulation, all that is fitted moves linearly."""
     for _ in range(ROUNDS):
         assert f.weights is not None
-        before, gap = f.weights, best_gap(f, hyper, forward.threads)
+        before, gap = f.weights, best_gap(f, hyper)
         f = f.reweighted(left_by(forward, smoothed(forward, f, replace(before, gap=gap)), gap))
         if _settled(before, f.weights):
             break
@@ -53,7 +51,7 @@ def left_by(forward: Predictor, residuals: list[np.ndarray], gap: float) -> Weig
     return Weights(np.array([d for d, *_ in found]), colour if coloured else (), gap, sum(p for *_, p in found))
 
 
-def best_gap(f: Fit, hyper: Hyper, threads: int | None = None) -> float:
+def best_gap(f: Fit, hyper: Hyper) -> float:
     """The size of the gaps between segments under which a fit is most probable."""
     line = f.linear
     assert line is not None and f.weights is not None
@@ -63,14 +61,12 @@ def best_gap(f: Fit, hyper: Hyper, threads: int | None = None) -> float:
     line, none = line.condensed([np.zeros((r.count, 0)) for r in line.rows])
     effects = [t[:, own.columns] for t in line.tangent]
     laid = own.sets(len(own.columns))
-    weights = f.weights
-
-    def judged(gap: float) -> float:
-        now, theirs = regapped(line, effects, weights, gap)
+    log = []
+    for gap in hyper.gaps:
+        now, theirs = regapped(line, effects, f.weights, gap)
         cell = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, 0.0)
-        return float(cell.of(laid, hyper)[0][0] - np.log(gap))
-
-    return hyper.gaps[int(np.argmax(side_by_side([partial(judged, gap) for gap in hyper.gaps], threads)))]
+        log.append(cell.of(laid, hyper)[0][0] - np.log(gap))
+    return hyper.gaps[int(np.argmax(log))]
 
 
 class OwnColumns:

@@ -314,7 +314,7 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
         own = OwnColumns(node.fit)
         coloured = node.fit.weights is not None and node.fit.weights.colour
         node.foresight = Foresight.of(forward, node.fit, own, effects, out.hyper) if coloured else None
-        place(out, node, prior, forward.threads)
+        place(out, node, prior)
     else:
         enter(out, node, prior)
 
@@ -337,7 +337,7 @@ def enter(out: Posterior, node: Node, prior: np.ndarray) -> None:
     out.estimates.pop(key, None)
 
 
-def place(out: Posterior, node: Node, prior: np.ndarray, threads: int | None = None) -> None:
+def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     """Enters a judged set, and all that add one or two effects to it, into a posterior."""
     hyper, key, f = out.hyper, node.key, node.fit
     cells = hyper.log_cells
@@ -354,9 +354,9 @@ def place(out: Posterior, node: Node, prior: np.ndarray, threads: int | None = N
 
     _judge(out, node, fewer, prior, cells)
     for s in fewer:
-        _judge(out, node, joined(s), prior, cells, threads=threads)
+        _judge(out, node, joined(s), prior, cells)
     more = joined(own)
-    singles = _judge(out, node, more, prior, cells, foresee=True, threads=threads)
+    singles = _judge(out, node, more, prior, cells, foresee=True)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
     if not key:
         alone = {k: out.promise[k] for n in node.others if (k := frozenset((n,))) in out.promise}
@@ -367,7 +367,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray, threads: int | None = N
         if len(own) + 2 > hyper.most:
             break
         pairs += [(*own, one, n) for n in ranked[a + 1 :] if _compatible(out, first, node.others[n - len(own)])]
-    _judge(out, node, pairs, prior, cells, foresee=True, threads=threads)
+    _judge(out, node, pairs, prior, cells, foresee=True)
     node.foresight = None  # it is large
 
 
@@ -393,7 +393,6 @@ def _judge(
     cells: np.ndarray,
     *,
     foresee: bool = False,
-    threads: int | None = None,
 ) -> np.ndarray:
     """Judges sets of groups by a node, and keeps that where no other node is nearer; how they rank (n,)."""
     if not sets:
@@ -410,15 +409,12 @@ def _judge(
     count = next(len(c.gram) for c in node.grid if c is not None) - 1
     laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
     log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
-    many = len(sets) > MANY
-    grid = {int(c): cell for c in order[: CELLS if many else None] if (cell := node.grid[c]) is not None}
-
-    def judged(cell: Summed) -> list[tuple[np.ndarray, np.ndarray]]:
-        return [cell.of(rows, out.hyper) for _, rows in laid]
-
-    each = side_by_side([partial(judged, cell) for cell in grid.values()], threads if many else 1)
-    for c, of in zip(grid, each, strict=True):
-        for (mine, _), (log, value) in zip(laid, of, strict=True):
+    for c in order[: CELLS if len(sets) > MANY else None]:
+        cell = node.grid[c]
+        if cell is None:
+            continue
+        for mine, rows in laid:
+            log, value = cell.of(rows, out.hyper)
             found[mine, c] = log + cells[c] + log_prior[mine]
             for n in np.flatnonzero(found[mine, c] > peak[mine]):
                 peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
