@@ -24,10 +24,10 @@ def default_threads() -> int:
 def side_by_side(jobs: Sequence[Callable[[], T]], threads: int | None) -> list[T]:
     """What jobs return, in their order, made on so many cores (default: all) by this process and by copies of it.
 
-    Copies (forks) share the interpreter's work too, not only that of kernels; each costs some 70 ms. Jobs have to be
-    pure: what a copy changes is lost, but for what it returns, which has to be picklable. What a copy does not deliver
-    (it was killed, or out of memory) this process does itself. Without forks threads do the jobs; in a worker of a pool
-    they are done one after the other.
+    Copies (forks) share the interpreter's work too, not only that of kernels; each costs some 0.1 s of processor time,
+    for pages that both write. Jobs have to be pure: what a copy changes is lost, but for what it returns, which has to
+    be picklable. What a copy does not deliver (it was killed, or out of memory) this process does itself. Without forks
+    threads do the jobs; in a worker of a pool they are done one after the other.
     """
     count = min(threads or default_threads(), len(jobs))
     if count <= 1 or multiprocessing.current_process().daemon:  # which may have no copies

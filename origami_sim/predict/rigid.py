@@ -132,9 +132,11 @@ class RigidRollouts(Rollouts):
             more, beyond = self._simulated(others)
             raw = np.concatenate([raw, more], axis=2)
             arrived = None if arrived is None or beyond is None else np.concatenate([arrived, beyond], axis=2)
+        if some:
+            return Simulated(raw, arrived)
         ends = [None if arrived is None else arrived[:, :, n].copy() for n in range(count)]
         first = [(key, raw[:, :, n].copy(), end) for n, (key, end) in enumerate(zip(keys, ends, strict=False))]
-        return Simulated(raw, arrived, [] if some else first)
+        return Simulated(raw, arrived, first)
 
     def _keep(self, r: int, blocks: Sequence[Block], first: list[tuple[tuple, np.ndarray, np.ndarray | None]]) -> None:
         """See `Rollouts._keep`."""
