@@ -139,7 +139,7 @@ class World:
 
         def panel(p: int, origin: np.ndarray, joint: str = "", pos: np.ndarray | None = None) -> str:
             mass = o["density"] * o["thickness"] * self.areas[p] * self.numbers.mass[p]
-            extent = np.ptp(self.corners[p], axis=0) + 1e-5 * np.abs(self.normals[p])  # a thin plate
+            extent = np.ptp(self.corners[p], axis=0) + o["thickness"] * np.abs(self.normals[p])
             inertia = mass / 12 * (np.sum(extent**2) - extent**2)
             centre = self.centres[p] + self.numbers.lift[p] * self.normals[p] - origin
             below = "".join(

@@ -1,7 +1,8 @@
-"""Each effect that the catalogue has does in the truth what a diagnosis would say of it: its sign and its size.
+"""Truth and simulator under test mean the same: by an object without effects, and by each effect's sign and size.
 
-A number that is found is compared with the one that was concealed, which holds only if both mean the same. Recordings
-without noise, from one start, with the effect and without it: by the truth and by the simulator under test.
+What they differ in without an effect would be an effect that nobody conceals. A number that is found is compared with
+the one that was concealed, which holds only if both mean the same. Recordings are without noise, from one start, with
+the effect and without it: by the truth and by the simulator.
 """
 
 import json
@@ -13,7 +14,9 @@ import pytest
 
 from origami_proof import case
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
+from origami_sim.fit.least_squares import fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.prescribed import curves
 from origami_sim.predict.rigid import RigidRollouts
@@ -40,6 +43,9 @@ UNLIKE = {
     "eccentric_weight": "the patch has a mass of its own here; its inertia is left out",
 }
 """Effects whose size means something else: only the sign is compared."""
+
+SEGMENT, GAP = 0.25, 1e-4
+"""Of motions of rigid panels, as diagnoses have them: length of a segment [s], and gaps between them."""
 
 PARTS = {"rest_angle": "offset_moment", "misalignment": "turn_y"}
 """Numbers that stand for the strength where the truth names none."""
@@ -98,6 +104,21 @@ def numbers(suspect: Suspect, mechanism: str, strength: float, number: str, extr
 def predicted(forward: Predictor, hypothesis: Hypothesis, values: np.ndarray) -> np.ndarray:
     theta = np.concatenate([[n.start for n in forward.subject.nominals], values])
     return np.concatenate([v[0] for v in forward.predict(hypothesis, theta[None])])
+
+
+@pytest.mark.parametrize(
+    "structure", ["mae_cantilever", "de_bender", "crease_coupon", "hanging_strip", "magnetic_strip", "bi_fold", "box"]
+)
+def test_without_effects_both_do_the_same(truth, tmp_path, structure):
+    o = truth["draw"].drawn_object(structure, np.random.default_rng(2))
+    made = truth["draw"].case_of(o, {})
+    made.write(tmp_path, [], EXACT | {"stated": o["noise"]}, np.random.default_rng(0))
+    (tmp_path / "object.json").write_text(json.dumps(made.known()))
+    recordings = [read_recording(p) for p in sorted(tmp_path.glob("recording*.csv"))]
+    subject = case.subject(tmp_path)
+    forward = curves(subject, recordings) or RigidRollouts(subject, recordings, segment=SEGMENT)
+    left = fit(forward, Hypothesis(), Weights(forward.blocks[0].noise, gap=GAP))
+    assert np.sqrt(left.cost) < truth["draw"].NUISANCE  # d' of what no number and no start takes up
 
 
 @pytest.mark.parametrize(
