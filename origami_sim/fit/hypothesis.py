@@ -515,17 +515,17 @@ def _in_kilograms(effect) -> bool:
 def _free(effect: str, name: str, entities) -> Free:
     p = get(effect).parameter(name)
     assert p.typical is not None
-    strength = name == get(effect).fitted[0]
-    scale = abs(p.typical) or abs(get(effect).parameter(get(effect).fitted[0]).typical or 1.0)
+    first = get(effect).parameter(get(effect).fitted[0])
+    scale = abs(p.typical) or abs(first.typical or 1.0)
     return Free(
         effect,
         name,
         p.unit,
-        start=0.0 if strength else p.typical,
+        start=0.0 if p.unit == first.unit else p.typical,  # other components of a strength are absent as well
         scale=scale,
         lower=p.bounds[0],
         upper=p.bounds[1],
-        spread=np.inf if strength else PLAUSIBLE * scale,
+        spread=np.inf if name == first.name else PLAUSIBLE * scale,
         entities=entities,
     )
 

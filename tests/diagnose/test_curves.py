@@ -65,10 +65,10 @@ def relaxing(time_constant: float, share: float, seed=0) -> list[Recording]:
     return out
 
 
-def flap_curve(*, tilt=0.0, valley=0.0, loop=0.0, seed=0) -> Recording:
+def flap_curve(*, tilt=0.0, valley=0.0, loop=0.0, stray=0.0, seed=0) -> Recording:
     """Fold angle of the magnetic flap against a field of both signs: (k + ka [th > 0]) th = m B cos(th + tilt).
 
-    The field that reaches it is up to `loop` [T] behind the one commanded.
+    The field that reaches it is up to `loop` [T] behind the one commanded, and `stray` [T] more.
     """
     s = scene_settings(FLAP)
     dipole = s.remanence * s.length * s.width * s.thickness / MU0
@@ -81,7 +81,7 @@ def flap_curve(*, tilt=0.0, valley=0.0, loop=0.0, seed=0) -> Recording:
     for field in fields:
         last = min(max(last, field - loop), field + loop)
         reaching.append(last)
-    angles = np.array([brentq(balance, -2.0, 2.0, args=(b,), xtol=1e-14) for b in reaching])
+    angles = np.array([brentq(balance, -2.0, 2.0, args=(b + stray,), xtol=1e-14) for b in reaching])
     angles += ANGLE_NOISE * np.random.default_rng(seed).normal(size=len(angles))
     return curve({"fold": Channel("fold", "crease_angle", angles, "rad", ANGLE_NOISE, {"crease": 0})}, field=fields)
 
@@ -329,3 +329,10 @@ def test_tilted_field_or_asymmetry(truth, made):
     d = diagnose(flap(), [flap_curve(**made)], catalogue=suspects)
     assert d.verdict in ("MECHANISM", "TIE")
     assert any(label.startswith(truth) for label in d.chosen)
+
+
+@pytest.mark.slow
+def test_a_stray_field_is_no_weight_and_no_rest_angle():
+    """One component of three shows: the others cost nothing."""
+    found = diagnose(flap(), [flap_curve(stray=2e-3)])
+    assert found.verdict == "MECHANISM" and found.candidates[0].label == "field_offset at the drive"

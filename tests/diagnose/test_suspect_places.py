@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim.bodies import rigid
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.hypothesis import Hypothesis, apply, suspects, told_apart
+from origami_sim.fit.hypothesis import Hypothesis, along_every_axis, apply, suspects, told_apart
 from origami_sim.model import node_mass
 from origami_sim.places import across, along, points, stretches
 from origami_sim.recording import Channel, Recording
@@ -118,6 +118,17 @@ def test_a_field_that_grows_is_one_for_all_panels_and_knows_the_plane_of_motion(
     values = apply(parameters, Hypothesis((slope,)), [0.5, 0.0, 0.0, 0.5], model.with_effects("field_slope"))
     assert np.abs(values["field_slope", "across_y"]) == pytest.approx(1.0)
     assert values["field_slope", "volume"] == pytest.approx(parameters["magnetic_torque", "volume"])
+
+
+def test_what_has_a_direction_is_absent_in_all_its_components(scenes):
+    """Or what is screened would be what the others do; where none of them shows it is no number of the evidence."""
+    every = [s for name in ("box", "mae_cantilever") for s in asked(*scenes[name])]
+    assert {"field_offset", "field_misalignment", "gravity_tilt", "poling_error"} <= {s.effect for s in every}
+    for s in every:
+        alike = [f for f in s.free if f.unit == s.free[0].unit]
+        assert not any(f.start for f in alike) and list(s.strengths) == alike, s.label
+    (stray,) = (s for s in asked(*scenes["mae_cantilever"]) if s.effect == "field_offset")
+    assert [s.free[0].name[-1] for s in along_every_axis([stray])] == ["x", "y", "z"], "each is screened by itself"
 
 
 def test_uneven_effects_are_those_of_families_with_stretches():
