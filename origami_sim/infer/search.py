@@ -231,22 +231,30 @@ def _most(gains: Sequence[float]) -> float:
 
 
 def _alone(out: Posterior) -> Key | None:
-    """A single effect to fit that may be best, if it is better than it promised by as much as other sets were.
+    """A single effect to fit that may be best: as it would stand in the best set's place, or as it promised at first.
 
-    About a model that is far from what was recorded what is linear promises too little, or too much; about a fit that
-    leaves white noise it tells which effects could stand in its place. Of an effect that was fitted alone, or is in the
-    best set, there is no need to know more.
+    About a model that is far from what was recorded what is linear promises too little, or too much, so that others may
+    gain what those that were fitted did; about a fit that leaves white noise it tells of all effects whether they could
+    stand in its place. Of an effect that was fitted alone, or is in the best set, there is no need to know more.
     """
     best = max(out.total, key=lambda k: out.total[k])
     near, bonus = out.total[best] + np.log(UNFITTED), _most(out.gains.get(frozenset(), []))
-    instead = _in_place_of(out, best)
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
-    singles = [k for k, promise in out.ranked.items() if k in out.estimates and promise + bonus >= near][:LEADING]
-    unknown = [k for k in singles if not known & {out.suspect(n).effect for n in k}]
-    if not instead or not unknown:
-        return next(iter(unknown), None)
+
+    def unknown(keys: Iterable[Key]) -> list[Key]:
+        return [k for k in keys if k in out.estimates and not known & {out.suspect(n).effect for n in k}]
+
+    judged = out.nodes[best].alone if best in out.nodes else {}
+    alike = unknown(k for k, total in judged.items() if total >= near)
+    if alike:
+        return max(alike, key=lambda k: judged[k])
+    singles = [k for k, p in out.ranked.items() if k in out.estimates and p + bonus >= near][:LEADING]
+    singles = unknown(singles)
+    instead = _in_place_of(out, best)
+    if not instead or not singles:
+        return next(iter(singles), None)
     # to leave a strong effect out is not quite linear: the first one tells by how much others are underestimated
-    key = max(unknown, key=lambda k: instead.get(k, np.inf))
+    key = max(singles, key=lambda k: instead.get(k, np.inf))
     return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
 
 
