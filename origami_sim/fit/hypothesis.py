@@ -86,8 +86,8 @@ class Suspect:
 def usual(suspect: Suspect, numbers: Sequence["Free"]) -> np.ndarray:
     """Strengths that an effect usually has, over their scales; infinite where that depends on the device.
 
-    Moments and forces depend on how large and stiff a device is. Ratios and angles do not, nor do recorders and
-    supplies; numbers that are no strengths have priors of their own.
+    Moments, forces, masses, lengths and rates depend on how large, stiff and fast a device is. Ratios, angles, voltages
+    and fields do not, nor do recorders and supplies; numbers that are no strengths have priors of their own.
     """
     effect, strong = get(suspect.effect), suspect.strengths
     common = effect.family in ("measurement", "drive")
@@ -95,7 +95,7 @@ def usual(suspect: Suspect, numbers: Sequence["Free"]) -> np.ndarray:
 
     def size(f: Free) -> float:
         typical = abs(effect.parameter(f.name).typical or first)
-        known = f in strong and typical and (common or f.unit in ("-", "rad"))
+        known = f in strong and typical and (common or not set(f.unit) & set("Nkgms"))
         return typical / f.scale if known else np.inf
 
     return np.array([size(f) for f in numbers])
