@@ -172,30 +172,36 @@ class Sets:
 
 @dataclass(frozen=True, eq=False)
 class Summed:
-    """A problem with flaws and discrepancy summed out: Gram matrix of effects and residual, and what it is about.
+    """Problems with flaws and discrepancy summed out: Gram matrices of effects and residual, and what they are about.
 
     Attributes:
-        gram: [C + 1, C + 1]. log: constant of the log evidence.
+        gram: [..., C + 1, C + 1]. log: [...] constants of the log evidence.
     """
 
     gram: np.ndarray
-    log: float
+    log: np.ndarray | float
+
+    @classmethod
+    def join(cls, each: "Sequence[Summed]") -> "Summed":
+        """Several that are judged together."""
+        return cls(np.stack([one.gram for one in each]), np.stack([one.log for one in each]))
 
     def of(self, sets: Sets, hyper: Hyper = HYPER) -> tuple[np.ndarray, np.ndarray]:
-        """Log evidence (n,) of sets, and values [n, k] of their columns."""
+        """Log evidence [..., n] of sets, and values [..., n, k] of their columns."""
         # what the residual would be without what a set lacks
-        right, square = self.gram[:-1, -1], self.gram[-1, -1]
-        if np.any(sets.back):
-            right = right + sets.back @ self.gram[:-1, :-1]
-            square = square + np.einsum("nc,nc->n", sets.back, self.gram[:-1, -1] + right)
-        else:
-            right = np.broadcast_to(right, sets.back.shape)
+        gram, right, square = self.gram[..., :-1, :-1], self.gram[..., :-1, -1], self.gram[..., -1, -1, None]
+        known = np.asarray(self.log)[..., None]
         n, k = sets.columns.shape
+        if np.any(sets.back):
+            lacking = sets.back @ gram
+            square = square + np.sum(sets.back * (2.0 * right[..., None, :] + lacking), axis=-1)
+            b = right[..., sets.columns] + lacking[..., np.arange(n)[:, None], sets.columns]
+        else:
+            b = right[..., sets.columns]
         if not k:
-            return np.full(n, self.log) - 0.5 * square, np.zeros((n, 0))
-        a = self.gram[sets.columns[:, :, None], sets.columns[:, None, :]]
-        b = np.take_along_axis(right, sets.columns, axis=1)
-        norm = np.sqrt(np.maximum(a[:, range(k), range(k)], 1e-12))
+            return known - 0.5 * square + np.zeros(n), b
+        a = gram[..., sets.columns[:, :, None], sets.columns[:, None, :]]
+        norm = np.sqrt(np.maximum(a[..., range(k), range(k)], 1e-12))
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
         wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         tight = np.where(sets.strength, norm / hyper.slabs[-1], 1.0 / wide)
@@ -204,23 +210,23 @@ class Summed:
             if turn:  # as narrow as the normals are that a strength of this size may come from
                 slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
                 tight = np.where(sets.strength, slab, tight)
-            full = a + np.eye(k) * (tight**2)[:, None, :]
+            full = a + np.eye(k) * (tight**2)[..., None, :]
             inverse = np.linalg.inv(full)
-            move = np.einsum("nkl,nl->nk", inverse, b - sets.at * tight**2)
+            move = (inverse @ (b - sets.at * tight**2)[..., None])[..., 0]
             value = sets.at + move
-        sd = np.sqrt(np.maximum(inverse[:, range(k), range(k)], 1e-300))
+        sd = np.sqrt(np.maximum(inverse[..., range(k), range(k)], 1e-300))
         sided = np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0)
         # what lies beyond a bound explains nothing
         value = np.clip(value, sets.low, sets.high)
         move = value - sets.at
-        left = square - 2.0 * np.sum(b * move, axis=1) + np.einsum("nk,nkl,nl->n", move, a, move)
-        out = self.log - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
+        left = square + np.sum(move * ((a @ move[..., None])[..., 0] - 2.0 * b), axis=-1)
+        out = known - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
         slab = log_slab(value * norm, hyper) + np.log(norm)
         shape = -0.5 * np.log(2 * np.pi) + np.log(tight) - 0.5 * (value * tight) ** 2
-        out += np.sum(np.where(sets.strength, slab, shape), axis=1)
+        out += np.sum(np.where(sets.strength, slab, shape), axis=-1)
         # what is far beyond the usual is less probable: a Cauchy density times the one on the scale of detectability
         far = np.log1p((value / sets.usual) ** 2) + log_usual(sets.usual * norm, hyper)
-        return out + np.sum(sided - far, axis=1), value
+        return out + np.sum(sided - far, axis=-1), value
 
 
 def summed(p: Problem, smooth: float, flaws: float) -> Summed:

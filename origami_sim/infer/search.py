@@ -408,24 +408,21 @@ def _judge(
     members = _members(node.fit.hypothesis, out)
     own = len(members)
     keys = [frozenset(members[c] if c < own else node.others[c - own] for c in s) for s in sets]
-    found, peak = np.full((len(sets), len(cells)), -np.inf), np.full(len(sets), -np.inf)
+    found = np.full((len(sets), len(cells)), -np.inf)
     values: dict[int, np.ndarray] = {}
-    order = np.argsort(-(node.evidence + cells))
+    order = [c for c in np.argsort(-(node.evidence + cells))[: CELLS if len(sets) > MANY else None] if node.grid[c]]
+    every = Summed.join([cell for c in order if (cell := node.grid[c])])
     width: dict[tuple[int, int], list[int]] = {}
     for n, s in enumerate(sets):
         width.setdefault((len(s), sum(len(node.groups[g].columns) for g in s)), []).append(n)
-    count = next(len(c.gram) for c in node.grid if c is not None) - 1
+    count = every.gram.shape[-1] - 1
     laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
     log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
-    for c in order[: CELLS if len(sets) > MANY else None]:
-        cell = node.grid[c]
-        if cell is None:
-            continue
-        for mine, rows in laid:
-            log, value = cell.of(rows, out.hyper)
-            found[mine, c] = log + cells[c] + log_prior[mine]
-            for n in np.flatnonzero(found[mine, c] > peak[mine]):
-                peak[mine[n]], values[mine[n]] = found[mine[n], c], value[n]
+    for mine, rows in laid:
+        log, value = every.of(rows, out.hyper)
+        found[np.ix_(mine, order)] = (log + cells[order, None] + log_prior[mine]).T
+        peak = np.argmax(log + cells[order, None], axis=0)
+        values.update((n, value[peak[k], k]) for k, n in enumerate(mine) if log[peak[k], k] > -np.inf)
     rank = promise = logsumexp(found, axis=1)
     totals: list[float] = rank.tolist()
     if foresee and node.foresight is not None:
@@ -500,9 +497,10 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
 
     gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
     found = dict(zip(gaps, side_by_side([partial(judged, gap) for gap in gaps], forward.threads), strict=True))
-    grid: list[Summed | None] = [cell for _, cells in found.values() for cell in cells]
-    grid += [None] * (len(hyper.cells) - len(grid))
-    evidence = np.array([-np.inf if cell is None else cell.of(laid, hyper)[0][0] for cell in grid])
+    cells = [cell for _, cells in found.values() for cell in cells]
+    evidence = np.full(len(hyper.cells), -np.inf)
+    evidence[: len(cells)] = Summed.join(cells).of(laid, hyper)[0][:, 0]
+    grid: list[Summed | None] = [*cells, *[None] * (len(evidence) - len(cells))]
     problems = {gap: made for gap, (made, _) in found.items()}
     return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
 
