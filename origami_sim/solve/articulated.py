@@ -67,6 +67,7 @@ class Tree:
     mass: int  # [B]
     centre: int  # [B, 3]
     inertia: int  # [B, 9] about the centre
+    steady: int  # [B, 12] sum of forces on nodes that never change, and of the nodes' places times them
     # coordinates and rates, now and at the step's begin; their derivatives at the stages; length of the next step
     y: int  # [7 + J]
     u: int  # [m]
@@ -109,9 +110,9 @@ class Tree:
 
 
 PARTS = tuple(
-    "reference middle axis pivot start mass centre inertia y u y0 u0 dy du span angles0 memory0 feet feet0 power0 "
-    "spent turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor jacobian "
-    "solved gram pull".split()
+    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du span angles0 memory0 feet feet0 "
+    "power0 spent turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor "
+    "jacobian solved gram pull".split()
 )
 """Parts of a world's stretch, in order."""
 
@@ -174,8 +175,24 @@ def along_root(tree: Tree, k: int, origin: vec3):
 
 
 @wp.func
-def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), w: int):
-    """Places and velocities of all nodes from coordinates and rates; clears what forces are added to."""
+def unload(tree: Tree, w: int):
+    """Clears the forces that never change."""
+    for k in range(12 * tree.bodies):
+        tree.data[(w * tree.width + tree.steady + k) & NATURAL] = scalar(0.0)
+
+
+@wp.func
+def load(tree: Tree, n: int, force: vec3, w: int):
+    """Adds a force on a node that never changes to those of its body."""
+    k = w * tree.width + tree.steady + 12 * tree.body_of[n]
+    place = vec_at(tree.data, w * tree.width + tree.reference + 3 * n)
+    put_vec(tree.data, k, vec_at(tree.data, k) + force)
+    put_mat(tree.data, k + 3, mat_at(tree.data, k + 3) + wp.outer(place, force))
+
+
+@wp.func
+def pose(tree: Tree, w: int):
+    """Places and velocities of all bodies from coordinates and rates; clears what forces are added to."""
     s = tree.data
     o = w * tree.width
     zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
@@ -227,36 +244,41 @@ def pose(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp
         s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
         put_vec(s, o + tree.force + 3 * b, zero)
         put_vec(s, o + tree.moment + 3 * b, zero)
+
+
+@wp.func
+def place(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), w: int):
+    """Places and velocities of the nodes that bodies carry; clears what forces are added to."""
+    s = tree.data
+    o = w * tree.width
+    origin = vec_at(s, o + tree.y)
+    zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
     body = int(-1)
-    own = turn
-    place = zero
+    own = mat_at(s, o + tree.turned)
+    there = zero
+    omega = zero
+    speed = zero
     for row in range(tree.moving.shape[0]):
         n = tree.moving[row & NATURAL] & NATURAL
         b = tree.body_of[n]
         if b != body:
             body = b
             own = mat_at(s, o + tree.turned + 9 * b)
-            place = vec_at(s, o + tree.placed + 3 * b)
+            there = vec_at(s, o + tree.placed + 3 * b)
             omega = vec_at(s, o + tree.omega + 3 * b)
             speed = vec_at(s, o + tree.speed + 3 * b)
-        x = own * vec_at(s, o + tree.reference + 3 * n) + place
+        x = own * vec_at(s, o + tree.reference + 3 * n) + there
         X[n, w] = x
         V[n, w] = speed + wp.cross(omega, x - origin)
         F[n, w] = zero
 
 
 @wp.func
-def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3), stage: int, w: int):
-    """Derivatives of coordinates and rates at a stage, from the forces on nodes and the moments at joints."""
+def gather(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3), w: int):
+    """Adds the forces on nodes to those on their bodies."""
     s = tree.data
     o = w * tree.width
-    roots = tree.roots
-    m = tree.rates
-    du = o + tree.du + stage * m
-    factor = o + tree.factor
     origin = vec_at(s, o + tree.y)
-    for k in range(m * m):
-        s[(factor + k) & NATURAL] = scalar(0.0)
     body = int(0)
     pull = vec_at(s, o + tree.force)
     torque = vec_at(s, o + tree.moment)
@@ -274,6 +296,20 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
         torque = torque + wp.cross(X[n, w] - origin, f)
     put_vec(s, o + tree.force + 3 * body, pull)
     put_vec(s, o + tree.moment + 3 * body, torque)
+
+
+@wp.func
+def accelerate(tree: Tree, stage: int, w: int):
+    """Derivatives of coordinates and rates at a stage, from the forces on bodies and the moments at joints."""
+    s = tree.data
+    o = w * tree.width
+    roots = tree.roots
+    m = tree.rates
+    du = o + tree.du + stage * m
+    factor = o + tree.factor
+    origin = vec_at(s, o + tree.y)
+    for k in range(m * m):
+        s[(factor + k) & NATURAL] = scalar(0.0)
     for b in range(tree.first_body, tree.bodies):
         turn = mat_at(s, o + tree.turned + 9 * b)
         c = turn * vec_at(s, o + tree.centre + 3 * b) + vec_at(s, o + tree.placed + 3 * b) - origin
@@ -282,9 +318,13 @@ def accelerate(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3),
         omega = vec_at(s, o + tree.omega + 3 * b)
         swing = vec_at(s, o + tree.alpha + 3 * b)
         a = vec_at(s, o + tree.gain + 3 * b) + wp.cross(swing, c) + wp.cross(omega, wp.cross(omega, c))
-        put_vec(s, o + tree.force + 3 * b, vec_at(s, o + tree.force + 3 * b) - mass * a)
+        pull = vec_at(s, o + tree.steady + 12 * b)
+        arms = turn * mat_at(s, o + tree.steady + 12 * b + 3)  # sum of products of arm and force
+        torque = vec3(arms[1, 2] - arms[2, 1], arms[2, 0] - arms[0, 2], arms[0, 1] - arms[1, 0])
+        torque = torque + wp.cross(vec_at(s, o + tree.placed + 3 * b) - origin, pull)
+        put_vec(s, o + tree.force + 3 * b, vec_at(s, o + tree.force + 3 * b) + pull - mass * a)
         spin = own * swing + wp.cross(omega, own * omega) + mass * wp.cross(c, a)
-        put_vec(s, o + tree.moment + 3 * b, vec_at(s, o + tree.moment + 3 * b) - spin)
+        put_vec(s, o + tree.moment + 3 * b, vec_at(s, o + tree.moment + 3 * b) + torque - spin)
         s[(o + tree.heavy + b) & NATURAL] = mass
         put_vec(s, o + tree.first + 3 * b, mass * c)
         put_mat(s, o + tree.second + 9 * b, own + outer_inertia(mass, c))

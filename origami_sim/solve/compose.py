@@ -17,6 +17,7 @@ import warp as wp
 from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
 from origami_sim.solve import articulated, plates, runge_kutta, sources, templates, touching
+from origami_sim.solve.compose_rigid import Rigid, is_steady
 from origami_sim.solve.compose_sheets import Sheets, Text
 from origami_sim.solve.compose_touch import Touching, pair_value
 from origami_sim.solve.wave import wave
@@ -38,9 +39,6 @@ FIXED_SLOTS = (
     ("drive", "scale"),
 )
 """Parameters that every model has besides those of its effects."""
-
-NATURAL = wp.constant(0x7FFFFFFF)
-"""Masked with this, an index is seen to be no negative one, and every access to an array is spared that test."""
 
 MOVING = ("rollout", "rigid")
 """Kernels with a time loop: of nodes, and of rigid panels."""
@@ -135,7 +133,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "shells": plates,
         "touching": touching,
         "fields": sources,
-        "NATURAL": NATURAL,
+        "NATURAL": articulated.NATURAL,
     }
     for e in effects:
         scope[f"{e.name}_force"] = e.force
@@ -147,7 +145,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
     return scope[name]
 
 
-class _Composer(Sheets, Touching):
+class _Composer(Rigid, Sheets, Touching):
     def __init__(self, effects: tuple[Effect, ...], shared: bool = False):
         self.effects, self.shared = effects, shared
         self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
@@ -216,14 +214,18 @@ class _Composer(Sheets, Touching):
 
     def acting(self, t: Text, effect: Effect):
         """Begins a block that worlds in which an effect has no strength pass over, so that it costs next to nothing."""
-        if not (self.shared and effect.strengths):
-            return nullcontext()
+        acts = self.acts(effect)
+        return nullcontext() if acts == "True" else t.block(f"if {acts}:")
+
+    def acts(self, effect: Effect) -> str:
+        """Whether an effect has any strength in a world."""
         word, bit = divmod(self.number(effect), BITS)
-        return t.block(f"if (on{word} & wp.int64({1 << bit})) != wp.int64(0):")
+        told = self.shared and effect.strengths
+        return f"(on{word} & wp.int64({1 << bit})) != wp.int64(0)" if told else "True"
 
     def alike(self, effects: list[Effect]) -> list[list[Effect]]:
         """Effects that share a loop; each has its own where a world is to pass over at once what does not act in it."""
-        return [[e] for e in effects] if self.shared else [effects]
+        return [[e] for e in effects] if self.shared or not effects else [effects]
 
     def apply_law(self, t: Text, effect: Effect, entity: str, mode: str, result: str):
         """Calls a force law with its memory read before and, in a rollout, written after."""
@@ -304,9 +306,7 @@ class _Composer(Sheets, Touching):
         return str(t)
 
     def _nodes(self, t: Text, mode: str):
-        effects = self.family("node")
-        if not effects:
-            return
+        effects = [e for e in self.family("node") if mode != "rigid" or not is_steady(e)]
         for group in self.alike(effects):
             rows, n = ("tree.moving", "tree.moving[row & NATURAL]") if mode == "rigid" else ("mask", "row")
             with self.acting(t, group[0]), t.block(f"for row in range({rows}.shape[0]):"):
@@ -576,12 +576,12 @@ class _Composer(Sheets, Touching):
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
-        mass = self.value("inertia", "total", "n")
+        mass, rigid = self.value("inertia", "total", "n"), {"steady": self.steady(), "nodal": self.nodal()}
         texts = (templates.HALT, templates.HALT_RIGID, templates.SWEPT_RIGID)
         halt, stop, swept = ("\n" + s if self.family("pair") else "" for s in texts)
         return {
             "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass, halt=halt),
-            "rigid": templates.RIGID.format(**given, body=self.body("rigid"), halt=stop, swept=swept),
+            "rigid": templates.RIGID.format(**given, **rigid, body=self.body("rigid"), halt=stop, swept=swept),
             "evaluate": templates.EVALUATE.format(**given, body=self.body("evaluate")),
             "total": templates.TOTAL.format(**given, body=self.body("total")),
         }

@@ -111,7 +111,14 @@ class RigidBatch(Batch):
             **dict.fromkeys(("hinge", "joint"), 3 * joints),
             **dict.fromkeys(("power0", "spent"), tree.effects),
             **dict.fromkeys(("jacobian", "solved"), tree.rows * rates),
-            **{"y0": 7 + joints, "u0": rates, "dy": 7 * (7 + joints), "du": 7 * rates, "torque": joints},
+            **{
+                "steady": 12 * tree.bodies,
+                "y0": 7 + joints,
+                "u0": rates,
+                "dy": 7 * (7 + joints),
+                "du": 7 * rates,
+                "torque": joints,
+            },
             **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
             **{"heavy": tree.bodies, "factor": rates**2, "gram": tree.rows**2, "pull": tree.rows},
         }

@@ -150,6 +150,8 @@ def rigid({arguments}
     frame = int(0)
     wait = every
 {hoist}
+{steady}
+    nodal = {nodal}
     final = int(articulated.STAGES - 1)
     anew = int(0)
     # one pass more than steps: at first only the accelerations are found
@@ -184,9 +186,13 @@ def rigid({arguments}
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
                 weighs = tree.tableau[final, 1 + stage]
                 last = stage == final
-                articulated.pose(tree, X, V, F, w)
+                articulated.pose(tree, w)
+                if nodal or still == 1 or (last and ends == 1):  # a film needs them where a frame ends
+                    articulated.place(tree, X, V, F, w)
 {body}
-                articulated.accelerate(tree, F, X, stage, w)
+                if nodal:
+                    articulated.gather(tree, F, X, w)
+                articulated.accelerate(tree, stage, w)
             allowed = tolerance
             if tolerance == scalar(0.0):
                 allowed = scalar(1.0)  # a step as given only may not turn anything by radians more than it should
@@ -211,6 +217,7 @@ def rigid({arguments}
                     longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
             if longer <= finest:
                 status[0, w] = first_step + s + 1
+                articulated.place(tree, X, V, F, w)
                 status[1, w] = runge_kutta.fastest(V, w)
                 going = int(0)
         if status[0, w] >= 0:
