@@ -9,8 +9,8 @@ import numpy as np
 from origami_sim.fit.correlated import divided, factor, multiplied
 
 DENSE = 256
-"""Numbers of a segment up to which one matrix weighs them anew: 110 columns in an eighth of the time that banded factors
-take, which move more memory; with twice as many numbers in the same time."""
+"""Numbers of a segment up to which one matrix weighs them anew: in an eighth to a half of the time that banded factors
+take, which move more memory."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,14 +1,15 @@
 """Channels as they would have been measured: clocks that are late or fast, lags, scales and offsets of a recorder."""
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from origami_sim.effects import get
+from origami_sim.effects import Effect, get
 from origami_sim.model import Model, Parameters
 from origami_sim.predict.channels import angle_mask, marked
-from origami_sim.recording import Recording
+from origami_sim.recording import Channel, Recording
 
 ROUNDING = 1e-9
 """Lateness [s] that is due to rounding; worlds without any share one drive."""
@@ -86,13 +87,17 @@ def measured(
             rows, deep = [*rows, deep], deep + 1
         if get(distort[0]).on_body and channel in marked(recording):
             rows, axes = [*rows, *range(axes, axes + 9)], axes + 9
-        reader = _reader(grid, channels[:, rows], shown, rested=rested)
-        for name in distort:
-            effect = get(name)
-            if effect.channels and channel.kind not in effect.channels:
-                continue
-            reader = _wrapped(effect, reader, at_channel(parameters, name, index, worlds))
-        parts.append(reader(at)[:, :width])
+        given = {n: at_channel(parameters, n, index, worlds) for n in distort if _reads(get(n), channel)}
+        acting = np.stack([_acts(get(n), by) for n, by in given.items()] or [np.ones(worlds, bool)])
+        kinds, kind = np.unique(acting, axis=1, return_inverse=True)
+        part = np.empty((len(times), width, worlds))
+        for k, on in enumerate(kinds.T):  # a law is asked only about worlds in which it acts
+            mine = np.flatnonzero(kind.ravel() == k)
+            reader = _reader(grid, channels[:, rows][:, :, mine], shown[mine], rested=rested)
+            for name, by in compress(given.items(), on):
+                reader = _wrapped(get(name), reader, {n: v[mine] for n, v in by.items()})
+            part[:, :, mine] = reader(at[:, mine])[:, :width]
+        parts.append(part)
         row += width
     return np.concatenate(parts, axis=1)
 
@@ -105,6 +110,17 @@ def at_channel(parameters: Parameters, name: str, channel: int | None, worlds: i
     else:
         row = {n: v[channel] for n, v in values.items()}
     return {n: np.broadcast_to(v, (worlds,)) for n, v in row.items()}
+
+
+def _reads(effect: Effect, channel: Channel) -> bool:
+    """Whether an effect has to do with channels of this kind."""
+    return not effect.channels or channel.kind in effect.channels
+
+
+def _acts(effect: Effect, given: dict[str, np.ndarray]) -> np.ndarray:
+    """(W,) whether an effect of these parameters (W,) has any strength."""
+    each = [given[p.name] != 0.0 for p in effect.strengths]
+    return np.any(each, axis=0) if each else np.ones(len(next(iter(given.values()))), bool)
 
 
 def _wrapped(effect, inner, given):
