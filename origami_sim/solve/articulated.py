@@ -45,7 +45,8 @@ class Tree:
     first_number: int  # of the coordinates that changes: then the first joint's angle
     parent: wp.array(dtype=wp.int32)  # [B]
     body_of: wp.array(dtype=wp.int32)  # [N] body that carries a node
-    moving: wp.array(dtype=wp.int32)  # nodes of the bodies that move, body after body
+    moving: wp.array(dtype=wp.int32)  # nodes of the bodies that move, body after body: corners, then mass points
+    corners: int  # how many of them are corners
     joint_of: wp.array(dtype=wp.int32)  # [C] joint of a crease, -1 where it closes a loop
     # [3 d + R] angular velocities of the root for unit rates, velocities of its centre besides, points about which it
     # turns where those do not move with it; then directions in which constraints hold
@@ -247,8 +248,15 @@ def pose(tree: Tree, w: int):
 
 
 @wp.func
-def place(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: wp.array2d(dtype=vec3), w: int):
-    """Places and velocities of the nodes that bodies carry; clears what forces are added to."""
+def place(
+    tree: Tree,
+    X: wp.array2d(dtype=vec3),
+    V: wp.array2d(dtype=vec3),
+    F: wp.array2d(dtype=vec3),
+    count: int,
+    w: int,
+):
+    """Places and velocities of the first nodes that bodies carry; clears what forces are added to."""
     s = tree.data
     o = w * tree.width
     origin = vec_at(s, o + tree.y)
@@ -258,7 +266,7 @@ def place(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: w
     there = zero
     omega = zero
     speed = zero
-    for row in range(tree.moving.shape[0]):
+    for row in range(count):
         n = tree.moving[row & NATURAL] & NATURAL
         b = tree.body_of[n]
         if b != body:
@@ -274,15 +282,15 @@ def place(tree: Tree, X: wp.array2d(dtype=vec3), V: wp.array2d(dtype=vec3), F: w
 
 
 @wp.func
-def gather(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3), w: int):
-    """Adds the forces on nodes to those on their bodies."""
+def gather(tree: Tree, F: wp.array2d(dtype=vec3), X: wp.array2d(dtype=vec3), count: int, w: int):
+    """Adds the forces on the first nodes to those on their bodies."""
     s = tree.data
     o = w * tree.width
     origin = vec_at(s, o + tree.y)
     body = int(0)
     pull = vec_at(s, o + tree.force)
     torque = vec_at(s, o + tree.moment)
-    for row in range(tree.moving.shape[0]):
+    for row in range(count):
         n = tree.moving[row & NATURAL] & NATURAL
         b = tree.body_of[n]
         if b != body:

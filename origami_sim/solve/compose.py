@@ -439,6 +439,7 @@ class _Composer(Rigid, Sheets, Touching):
         for group in self.alike(effects):
             with self.acting(t, group[0]), t.block("for row in range(triangles.shape[0]):"):
                 t("c = row & NATURAL")
+                self.pass_over(t, group, mode)
                 for i in (1, 2, 3):
                     t(f"n{i} = triangles[c][{i - 1}] & NATURAL")
                     t(f"x{i} = X[n{i}, w]")
@@ -576,7 +577,7 @@ class _Composer(Rigid, Sheets, Touching):
 
     def sources(self) -> dict[str, str]:
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
-        mass, rigid = self.value("inertia", "total", "n"), {"steady": self.steady(), "nodal": self.nodal()}
+        mass, rigid = self.value("inertia", "total", "n"), {"steady": self.steady(), **self.asked()}
         texts = (templates.HALT, templates.HALT_RIGID, templates.SWEPT_RIGID)
         halt, stop, swept = ("\n" + s if self.family("pair") else "" for s in texts)
         return {

@@ -1,4 +1,4 @@
-"""Writes what is particular to the kernel of rigid panels: forces that never change, and worlds that need no nodes."""
+"""Writes what is particular to the kernel of rigid panels: forces that never change, and nodes that no law asks for."""
 
 from typing import Any
 
@@ -12,14 +12,19 @@ def is_steady(effect: Effect) -> bool:
     return effect.family == "node" and not effect.exchanges_work and {*effect.arguments} <= {"mass", *own}
 
 
-def asks_nodes(effect: Effect) -> bool:
-    """Whether a law of rigid panels asks for places of nodes, or acts on them."""
+def asks_corners(effect: Effect) -> bool:
+    """Whether a law of rigid panels asks for places of their corners, or acts on them."""
     hinges = effect.family == "crease" and not {"field", "gradient"} & {*effect.drives}
-    return not (hinges or is_steady(effect))
+    return not (hinges or effect.family == "node")
+
+
+def asks_nodes(effect: Effect) -> bool:
+    """Whether a law of rigid panels asks for places of all nodes, also of those that are but masses."""
+    return effect.family in ("node", "bar") and not is_steady(effect)
 
 
 class Rigid:
-    """Steady forces by body, and which worlds have laws of nodes; a part of the composer."""
+    """Steady forces by body, and which nodes laws ask for; a part of the composer."""
 
     effects: Any
     value: Any
@@ -41,7 +46,21 @@ class Rigid:
                         t(f"articulated.load(tree, n, {self.call(e, 'force', 'n')}, w)")
         return str(t)
 
-    def nodal(self) -> str:
-        """Whether a world has laws that need its nodes: of a closed loop they tell the angle that closes it."""
-        each = [self.acts(e) for e in self.effects if asks_nodes(e)]
-        return "True" if "True" in each else " or ".join(["tree.rows > 0", *each])
+    def asked(self) -> dict[str, str]:
+        """Whether a world has laws that need its corners, or all nodes."""
+        # corners tell the angle that closes a loop
+        return {
+            "cornered": self._any(["tree.rows > 0", *(self.acts(e) for e in self.effects if asks_corners(e))]),
+            "nodal": self._any([self.acts(e) for e in self.effects if asks_nodes(e)]),
+        }
+
+    def pass_over(self, t: Text, group: list[Effect], mode: str):
+        """Passes over an entity at which laws that remember nothing have no strength: often one of all is suspected."""
+        if mode == "rigid" and all(e.strengths and not e.memory for e in group):
+            each = [f"{self.value(e.name, p.name, 'c')} == scalar(0.0)" for e in group for p in e.strengths]
+            with t.block(f"if {' and '.join(each)}:"):
+                t("continue")
+
+    @staticmethod
+    def _any(conditions: list[str]) -> str:
+        return "True" if "True" in conditions else " or ".join(conditions) or "False"

@@ -72,8 +72,10 @@ class RigidBatch(Batch):
             return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
         tree.parent, tree.body_of = constant(t.parent, wp.int32), constant(t.body_of, wp.int32)
-        order = np.argsort(t.body_of, kind="stable")
+        points = np.arange(len(t.body_of)) >= len(t.body_of) - len(model.carriers)  # after the corners
+        order = np.lexsort((t.body_of, points))
         tree.moving = constant(order[t.body_of[order] >= tree.first_body].astype(np.int32), wp.int32)
+        tree.corners = int(np.sum(~points & (t.body_of >= tree.first_body)))
         tree.joint_of = constant(t.joint_of, wp.int32)
         tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)

@@ -151,7 +151,11 @@ def rigid({arguments}
     wait = every
 {hoist}
 {steady}
-    nodal = {nodal}
+    asked = int(0)  # nodes that laws ask for
+    if {cornered}:
+        asked = tree.corners
+    if {nodal}:
+        asked = tree.moving.shape[0]
     final = int(articulated.STAGES - 1)
     anew = int(0)
     # one pass more than steps: at first only the accelerations are found
@@ -187,11 +191,12 @@ def rigid({arguments}
                 weighs = tree.tableau[final, 1 + stage]
                 last = stage == final
                 articulated.pose(tree, w)
-                if nodal or still == 1 or (last and ends == 1):  # a film needs them where a frame ends
-                    articulated.place(tree, X, V, F, w)
+                laid = asked
+                if still == 1 or (last and ends == 1):  # a film needs them where a frame ends
+                    laid = tree.moving.shape[0]
+                articulated.place(tree, X, V, F, laid, w)
 {body}
-                if nodal:
-                    articulated.gather(tree, F, X, w)
+                articulated.gather(tree, F, X, asked, w)
                 articulated.accelerate(tree, stage, w)
             allowed = tolerance
             if tolerance == scalar(0.0):
@@ -217,7 +222,7 @@ def rigid({arguments}
                     longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
             if longer <= finest:
                 status[0, w] = first_step + s + 1
-                articulated.place(tree, X, V, F, w)
+                articulated.place(tree, X, V, F, tree.moving.shape[0], w)
                 status[1, w] = runge_kutta.fastest(V, w)
                 going = int(0)
         if status[0, w] >= 0:
