@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import TypeVar
@@ -21,17 +21,23 @@ def default_threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def side_by_side(jobs: Sequence[Callable[[], T]], threads: int | None) -> list[T]:
+def side_by_side(
+    jobs: Sequence[Callable[[], T]], threads: int | None, progress: Callable[[float], None] | None = None
+) -> list[T]:
     """What jobs return, in their order, made on so many cores (default: all) by this process and by copies of it.
 
     Copies (forks) share the interpreter's work too, not only that of kernels; each costs some 0.1 s of processor time,
     for pages that both write. Jobs have to be pure: what a copy changes is lost, but for what it returns, which has to
     be picklable. What a copy does not deliver (it was killed, or out of memory) this process does itself. Without forks
     threads do the jobs; in a worker of a pool they are done one after the other.
+
+    Args:
+        progress: called with the part of this process' own jobs that is done.
     """
+    done = progress or (lambda part: None)
     count = min(threads or default_threads(), len(jobs))
     if count <= 1 or multiprocessing.current_process().daemon:  # which may have no copies
-        return [job() for job in jobs]
+        return list(_one_by_one(jobs, done))
     if not FORKS:
         with ThreadPoolExecutor(count) as pool:
             return [made.result() for made in [pool.submit(job) for job in jobs]]
@@ -48,7 +54,7 @@ def side_by_side(jobs: Sequence[Callable[[], T]], threads: int | None) -> list[T
                 copy.start()
             there.close()
             copies.append((copy, here, share))
-        found = {n: jobs[n]() for n in shares[0]}
+        found = dict(zip(shares[0], _one_by_one([jobs[n] for n in shares[0]], done), strict=True))
         for _, here, share in copies:
             try:
                 found.update(zip(share, here.recv(), strict=True))
@@ -60,6 +66,12 @@ def side_by_side(jobs: Sequence[Callable[[], T]], threads: int | None) -> list[T
             copy.terminate()
             copy.join()
     return [found[n] for n in range(len(jobs))]
+
+
+def _one_by_one(jobs: Sequence[Callable[[], T]], done: Callable[[float], None]) -> Iterator[T]:
+    for n, job in enumerate(jobs):
+        yield job()
+        done((n + 1) / len(jobs))
 
 
 def _deliver(there: Connection, jobs: Sequence[Callable[[], T]]) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from origami_sim.fit.hypothesis import Suspect, scaled, usual
 from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.threads import side_by_side
 
 SILENT = 0.3
 """Norm of a signature [standard deviations] below which a suspect at its largest admissible strength is not excited.
@@ -26,8 +28,8 @@ field of 0.6 ms then promises 23 less, in log evidence, than its fit has. Half a
 probability of four swings by more than 0.010.
 """
 
-CHUNK = 24
-"""Suspects that are simulated together, so that progress shows."""
+CHUNK = 12
+"""Suspects that are simulated together, so that progress shows and cores share them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +88,9 @@ def screen(
     """
     single = [s for s in suspects if not _together(s, suspects)]
     groups = [single[k : k + CHUNK] for k in range(0, len(single), CHUNK)]
-    found: dict[int, Signature] = {}
-    for n, group in enumerate(groups):
-        for s, signature in zip(group, _signatures(forward, group, base, weights), strict=True):
-            found[id(s)] = signature
-        if progress:
-            progress((n + 1) / len(groups))
+    jobs = [partial(_signatures, forward, group, base, weights) for group in groups]
+    each = side_by_side(jobs, forward.threads, progress)
+    found = {id(s): one for group, mine in zip(groups, each, strict=True) for s, one in zip(group, mine, strict=True)}
     for s in suspects:
         if not _together(s, suspects):
             continue
