@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from origami_sim.fit.evidence import Group, Sets, problem, summed
+from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows
@@ -191,6 +191,19 @@ def test_a_shape_beside_a_strength_has_its_own_prior():
     prior = slab(strength * norm) + np.log(norm) - 0.5 * (shapes / spread) ** 2 - np.log(spread * np.sqrt(2 * np.pi))
     cell = np.log((strength[1, 0] - strength[0, 0]) * (shapes[0, 1] - shapes[0, 0]))
     assert out == pytest.approx(log + logsumexp(prior - 0.5 * square) + cell, abs=LAPLACE)
+
+
+@pytest.mark.parametrize("own", [0, 1], ids=["about none", "about one"])
+def test_problems_are_judged_together_as_one_by_one(own):
+    toy, rng = Toy([1.0, 2.0, 0.5]), np.random.default_rng(8)
+    each = [toy.summed(toy.drawn(rng, [3.0, 0.0, 1.0])) for _ in range(3)]
+    made = groups([0, 1, 0], at=[0.4, 0.0, 0.0])
+    for sets in ([()], [(0,), (1,), (2,)], [(0, 1), (1, 2)]):
+        laid = Sets.of(sets, made, own, 3)
+        log, values = Summed.join(each).of(laid)
+        for n, one in enumerate(each):
+            assert log[n] == pytest.approx(one.of(laid)[0], rel=1e-12)
+            assert values[n] == pytest.approx(one.of(laid)[1], rel=1e-9)
 
 
 def test_larger_flaws_excuse_more():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import lstsq
 
+from origami_sim.fit import weights
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows, Weights, recast
 
@@ -172,3 +173,21 @@ def test_coloured_residuals_are_whitened_exactly_in_the_frames_that_were_seen():
     assert w.restored(white, rows) == pytest.approx(np.nan_to_num(values))
     other = Weights(np.array([1.0, 1.0]), gap=2.0)
     assert recast([white[0]], [rows], w, other)[0] == pytest.approx(np.nan_to_num(values[0]).ravel())
+
+
+def test_short_segments_are_weighed_anew_as_long_ones_are(monkeypatch):
+    """One matrix does what banded factors do, frame by frame, also where values are missing."""
+    rng = np.random.default_rng(2)
+    seen = rng.uniform(size=(9, 2)) > 0.2
+    rows = [Rows(18, 0, 2), Rows(18, 2, 0, seen=seen)]
+    old = Weights(np.array([0.5, 2.0]), (np.array([1.0, 0.4, 0.1]), np.array([1.0])), gap=0.1)
+    new = Weights(np.array([0.7, 1.0]), (np.array([1.0, -0.2]), np.array([1.0, 0.3])), gap=0.3)
+    for shape in ((), (3,)):
+        columns = [rng.normal(size=(r.count, *shape)) for r in rows]
+        columns[1][:18] *= seen.reshape(-1, *[1] * len(shape))
+        short = recast(columns, rows, old, new)
+        with monkeypatch.context() as m:
+            m.setattr(weights, "DENSE", 0)
+            long = recast(columns, rows, old, new)
+        for one, other in zip(short, long, strict=True):
+            assert one == pytest.approx(other, abs=1e-12)
