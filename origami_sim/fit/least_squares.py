@@ -300,7 +300,8 @@ def fit(
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
         blocks: fit these only. fixed: keep theta and fit the starts only.
-        known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too.
+        known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too, and
+            steps of the first numbers, or of all, that are small enough.
         begin: residuals and all derivatives of the point where the fit begins; `exact` if none is of a point before.
     """
     blocks = tuple(range(len(forward.blocks)) if blocks is None else blocks)
@@ -313,7 +314,7 @@ def fit(
     line: Linearisation | None = begin
 
     def derived(theta, local, near: Linearisation | None, residual) -> Linearisation:
-        steps = line.steps if line else known.steps[:kept] if known and known.steps is not None else None
+        steps = line.steps if line else known.steps if known else None
         also = {"known": near, "kept": kept if near else 0, "residual": residual, "steps": steps}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 

@@ -20,7 +20,7 @@ from scipy.stats import t as student
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
-from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed
+from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed, small
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, recast
 from origami_sim.infer.budget import FAR, over_noise
@@ -510,30 +510,39 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     estimate = out.estimates[key]
     node = out.nodes[estimate.parent]
     members = _members(node.fit.hypothesis, out)
-    begin, suspects = [node.fit.theta[: len(forward.subject.nominals)]], []
-    own = np.cumsum([len(begin[0]), *(len(s.free) for s in node.fit.hypothesis.suspects)])
+    line, count = node.fit.linear, len(forward.subject.nominals)
+    assert line is not None and line.steps is not None and node.fit.weights is not None
+    by = level(forward, node.fit)  # white, and with gaps that are no obstacle on the way
+    begin, steps, suspects = [node.fit.theta[:count]], [line.steps[:count]], []
+    own = np.cumsum([count, *(len(s.free) for s in node.fit.hypothesis.suspects)])
+    # of a signature, the part that changes little enough for a derivative, in the weights of the fit
+    told = 0.5 * small(forward, by, node.fit.blocks) / float(np.max(out.weights.deviation / by.deviation))
     column = 0
     for g in estimate.groups:
         if g < len(members):
             suspects.append(node.fit.hypothesis.suspects[g])
             begin.append(node.fit.theta[own[g] : own[g + 1]])
+            steps.append(line.steps[own[g] : own[g + 1]])
         else:
             signature = out.signatures[node.others[g - len(members)]]
             first, *rest = signature.suspect.free
             strength = np.clip(first.start + estimate.values[column] * signature.size, first.lower, first.upper)
             suspects.append(signature.suspect)
             begin.append(np.array([strength, *(f.start for f in rest)]))
+            strong, part = signature.suspect.strengths, told / signature.raw
+            steps.append(
+                np.array([first.scale * part if n in strong else n.scale * forward.nudge for n in (first, *rest)])
+            )
         column += len(node.groups[g].columns)
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
-    assert parent.linear is not None and parent.weights is not None
-    by = level(forward, parent)  # white, and with gaps that are no obstacle on the way
     given = out.begun.get(key)
     if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
         return _elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local))
     # derivatives by the numbers of the model and by starts hardly change with an effect
-    near = {"known": parent.linear.reweighted(parent.weights, by), "kept": len(forward.subject.nominals)}
+    known = replace(line.reweighted(node.fit.weights, by), steps=np.concatenate(steps))
+    near = {"known": known, "kept": count}
     return _elsewhere(forward, fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near))
 
 
