@@ -77,6 +77,7 @@ def _one_by_one(jobs: Sequence[Callable[[], T]], done: Callable[[float], None]) 
 def _deliver(there: Connection, jobs: Sequence[Callable[[], T]]) -> None:
     """What a copy does: its share of the jobs; what goes wrong, goes wrong again where it is reported."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that was copied hears it, and ends its copies
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which it does at once, whatever that process would do
     try:
         there.send([job() for job in jobs])
     except Exception:

@@ -32,6 +32,21 @@ def test_jobs_run_at_once_in_processes():
 
 
 @pytest.mark.skipif(not FORKS, reason="no forks here")
+def test_a_copy_that_is_ended_says_nothing():
+    """What the process does when it is told to end is not a copy's to do."""
+    before = signal.signal(signal.SIGTERM, lambda *_: print("interrupted"))
+    try:
+        here, there = side_by_side([_when_told_to_end] * 2, 2)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert not here and there
+
+
+def _when_told_to_end() -> bool:
+    return signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+@pytest.mark.skipif(not FORKS, reason="no forks here")
 def test_what_a_killed_process_owes_is_done_here():
     mine = os.getpid()
 
