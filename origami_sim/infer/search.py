@@ -10,7 +10,6 @@ and no probability by more than 0.011.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -32,7 +31,6 @@ from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
-from origami_sim.threads import side_by_side
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -496,7 +494,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
         return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
 
     gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
-    found = dict(zip(gaps, side_by_side([partial(judged, gap) for gap in gaps], forward.threads), strict=True))
+    found = {gap: judged(gap) for gap in gaps}
     cells = [cell for _, cells in found.values() for cell in cells]
     evidence = np.full(len(hyper.cells), -np.inf)
     evidence[: len(cells)] = Summed.join(cells).of(laid, hyper)[0][:, 0]
