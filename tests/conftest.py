@@ -3,6 +3,31 @@
 import pytest
 import warp as wp
 
+LONG = (
+    "test_diagnoses.py",
+    "test_rigid_catalogue.py",
+    "test_catalogue.py",
+    "test_search.py",
+    "test_command.py",
+    "test_slow.py",
+    "test_crawler.py",
+    "test_unlisted.py",
+    "test_keeping.py",
+    "test_timestep.py",
+    "test_notebooks.py",
+    "test_markers.py",
+)
+"""Files that take longest: those that share the cores begin with them, so that none waits for another at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts long files first; `--no-loadscope-reorder` keeps that order."""
+
+    def rank(item: pytest.Item) -> int:
+        return LONG.index(item.path.name) if item.path.name in LONG else len(LONG)
+
+    items.sort(key=rank)
+
 
 @pytest.fixture(scope="session")
 def cuda():
