@@ -9,6 +9,8 @@
 
 #define MOST 512
 #define POINTS 16
+#define SHAPES 8
+#define STRETCHES 16
 #define BAND 6 /* a hinge joins three stations of two coordinates */
 
 typedef struct {
@@ -26,6 +28,13 @@ typedef struct {
     double mu, mu_forward, mu_back;               /* friction of the belly, of the feet */
     double field, frequency, gravity, decay;
     double relaxation;                            /* of the losses' Maxwell branch [s]; 0: they are viscous */
+    int first, last;                              /* stations between which the bridge is */
+    int shapes;                                   /* in which a bridge curves across, amplitudes c [m]; 0: plane strain */
+    double bending[SHAPES][SHAPES];               /* energy c' bending c / 2 [N/m] */
+    double poisson[MOST][SHAPES];                 /* by hinge that turns by t: t poisson . c [N] */
+    double flattening[MOST][SHAPES][SHAPES];      /* membrane: sum of t^2 c' flattening c / 2 [N/m] */
+    double relief[MOST][SHAPES][STRETCHES];       /* less |sum of t relief' c|^2 / 2, by moving within itself [(N/m)^1/2] */
+    double loss_time;                             /* of the bridge's bending across [s] */
 } Device;
 
 typedef struct { double x, z; } V;
@@ -95,12 +104,67 @@ static void solve(int n, double (*a)[BAND], double *b)
     }
 }
 
+/* curvature across the bridge, without inertia */
+typedef struct { double c[SHAPES], stress[SHAPES], lost[SHAPES]; } Across;
+
+/* adds to the couples m of the hinges, which have turned by t, what the bridge's curvature across makes of them; its
+   bending loses like that along, by branches of which `kept` is left after a step; `drag` is their stiffness over the
+   elastic one for what is new. `held` and `lost` are the couples by bending alone and by their branches. */
+static void curve(const Device *d, Across *w, const double *t, double *m, double *held, double *lost, double kept,
+                  double drag)
+{
+    const int n = d->shapes;
+    double a[SHAPES][SHAPES], b[SHAPES], load[SHAPES] = {0}, in[SHAPES][STRETCHES] = {{0}}, moved[STRETCHES] = {0};
+    for (int k = 0; k < n; k++)
+        for (int l = 0; l < n; l++) a[k][l] = (1 + drag) * d->bending[k][l];
+    for (int i = d->first; i <= d->last; i++)
+        for (int k = 0; k < n; k++) {
+            load[k] += d->poisson[i][k] * t[i];
+            for (int l = 0; l < n; l++) a[k][l] += t[i] * t[i] * d->flattening[i][k][l];
+            for (int s = 0; s < STRETCHES; s++) in[k][s] += t[i] * d->relief[i][k][s];
+        }
+    for (int k = 0; k < n; k++) {
+        b[k] = drag * w->stress[k] - kept * w->lost[k] - (1 + drag) * load[k];
+        for (int l = 0; l < n; l++)
+            for (int s = 0; s < STRETCHES; s++) a[k][l] -= in[k][s] * in[l][s];
+    }
+    for (int k = 0; k < n; k++)
+        for (int r = k + 1; r < n; r++) {
+            const double q = a[r][k] / a[k][k];
+            for (int l = k; l < n; l++) a[r][l] -= q * a[k][l];
+            b[r] -= q * b[k];
+        }
+    for (int k = n - 1; k >= 0; k--) {
+        for (int l = k + 1; l < n; l++) b[k] -= a[k][l] * w->c[l];
+        w->c[k] = b[k] / a[k][k];
+    }
+    for (int k = 0; k < n; k++) {
+        double stress = load[k];
+        for (int l = 0; l < n; l++) stress += d->bending[k][l] * w->c[l];
+        w->lost[k] = kept * w->lost[k] + drag * (stress - w->stress[k]);
+        w->stress[k] = stress;
+        for (int s = 0; s < STRETCHES; s++) moved[s] += in[k][s] * w->c[k];
+    }
+    for (int i = d->first; i <= d->last; i++) {
+        double now = 0, flat = 0;
+        for (int k = 0; k < n; k++) {
+            now += d->poisson[i][k] * w->c[k];
+            for (int l = 0; l < n; l++) flat += t[i] * w->c[k] * d->flattening[i][k][l] * w->c[l];
+            for (int s = 0; s < STRETCHES; s++) flat -= w->c[k] * d->relief[i][k][s] * moved[s];
+        }
+        lost[i] = kept * lost[i] + drag * (now - held[i]);
+        held[i] = now;
+        m[i] += now + lost[i] + flat;
+    }
+}
+
 /* runs so many steps and stores the centre of mass [x] at the end of each period of `every` steps */
 int run(const Device *d, double *state, double dt, long steps, long every, double *out)
 {
     static _Thread_local V f[MOST];
     static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[POINTS * MOST], ends[2], a[2 * MOST][BAND];
-    static _Thread_local double before[MOST], lost[MOST];
+    static _Thread_local double before[MOST], lost[MOST], m[MOST], held[MOST], own[MOST];
+    static _Thread_local Across w;
     const int n = d->cells;
     V *p = (V *)state, *v = p + n + 1;
     double total = 0;
@@ -108,6 +172,9 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
     ends[0] = ends[1] = 0;
     memset(before, 0, sizeof before);
     memset(lost, 0, sizeof lost);
+    memset(held, 0, sizeof held);
+    memset(own, 0, sizeof own);
+    memset(&w, 0, sizeof w);
     const double kept = d->relaxation > 0 ? exp(-dt / d->relaxation) : 0;
     for (int i = 0; i <= n; i++) total += d->mass[i];
     for (long k = 0; k < steps; k++) {
@@ -127,14 +194,15 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
         }
         for (int i = 1; i < n; i++) {
             const double angle = atan2(ux[i - 1] * uz[i] - uz[i - 1] * ux[i], ux[i - 1] * ux[i] + uz[i - 1] * uz[i]);
-            double m = d->rigidity[i] * angle;
+            m[i] = d->rigidity[i] * angle;
             if (d->relaxation > 0) { /* exact for an even rate; the branch's stiffness times its time is the loss */
                 lost[i] = kept * lost[i] + (1 - kept) / dt * d->loss[i] * (angle - before[i]);
-                before[i] = angle;
-                m += lost[i];
+                m[i] += lost[i];
             }
-            c[i] -= m; c[i - 1] += m;
+            before[i] = angle;
         }
+        if (d->shapes) curve(d, &w, before, m, held, own, kept, (1 - kept) / dt * d->loss_time);
+        for (int i = 1; i < n; i++) { c[i] -= m[i]; c[i - 1] += m[i]; }
         for (int j = 0; j < n; j++) {
             const double q = c[j] / len[j];
             f[j].x += q * uz[j]; f[j].z -= q * ux[j];

@@ -11,11 +11,12 @@ import os
 import shutil
 import subprocess
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-MOST, POINTS = 512, 16
+MOST, POINTS, SHAPES, STRETCHES = 512, 16, 8, 16
 ARRAYS = ("rigidity", "loss", "axial", "dashpot", "length", "couple", "lift", "mass", "kn", "cn")
 NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay",
            "relaxation")  # fmt: skip
@@ -39,6 +40,14 @@ class Device(ctypes.Structure):
         ("at", ctypes.c_double * POINTS),
         ("share", ctypes.c_double * POINTS),
         *((n, ctypes.c_double) for n in NUMBERS),
+        ("first", ctypes.c_int),
+        ("last", ctypes.c_int),
+        ("shapes", ctypes.c_int),
+        ("bending", ctypes.c_double * SHAPES * SHAPES),
+        ("poisson", ctypes.c_double * SHAPES * MOST),
+        ("flattening", ctypes.c_double * SHAPES * SHAPES * MOST),
+        ("relief", ctypes.c_double * STRETCHES * SHAPES * MOST),
+        ("loss_time", ctypes.c_double),
     ]
 
 
@@ -118,17 +127,119 @@ def chain(s: dict, cell: float, relaxing: bool) -> tuple[dict[str, np.ndarray], 
     return values, state, step
 
 
+def across(s: dict, cell: float, nodes: int = 8) -> tuple[int, int, dict[str, np.ndarray]]:
+    """Stations where the bridge begins and ends, and energies of its curvature across by shape (see planar_crawler.c).
+
+    Between the patches, where it is flat with its slope, the sheet is lifted by w(x, y) from a bend of curvature k(x)
+    and moves by u, v within itself. Energies per area are those of Kirchhoff and, for its stretching, of Donnell:
+
+        D / 2 (k_x^2 + k_y^2 + 2 nu k_x k_y + 2 (1 - nu) w_xy^2),  k_x = k + w_xx,  k_y = w_yy
+        C / 2 (e_x^2 + e_y^2 + 2 nu e_x e_y + (1 - nu) / 2 g^2),   e_x = u_x - k w,  e_y = v_y,  g = u_y + v_x
+
+    with C = E h / (1 - nu^2). What is lifted from a bend is stretched: so a bridge that bends far stiffens. w has no
+    mean over the width, which is the chain's. The shapes are polynomials; u and v are condensed.
+    """
+    h, nu, span = s["thickness"], s["poisson"], s["span"]
+    stretch = s["modulus"] * h / (1 - nu**2)
+    plate = stretch * h**2 / 12
+    counts = [max(1, round(s[n] / cell)) for n in ("overhang", "big_length", "span")]
+    first, start = sum(counts[:2]), s["overhang"] + s["big_length"]
+    total = start + span + s["small_length"] + s["overhang"]
+    at, weight = np.polynomial.legendre.leggauss(nodes)
+    half_width = 0.5 * (s["rear_width"] + (s["front_width"] - s["rear_width"]) * (start + span / 2) / total)
+
+    def along(x, power: int, derivative: int):
+        """[4, ...] shapes that vanish at the ends as the power says."""
+        rim = np.polynomial.Polynomial([1, 0, -1]) ** power
+        shapes = [rim * np.polynomial.Legendre.basis(k).convert(kind=np.polynomial.Polynomial) for k in range(4)]
+        return np.array([p.deriv(derivative)(2 * x / span - 1) * (2 / span) ** derivative for p in shapes])
+
+    def side(y, power: int, derivative: int):
+        p = np.polynomial.Polynomial.basis(power).deriv(derivative)
+        return p(y / half_width) / half_width**derivative
+
+    def product(f, g):
+        return np.concatenate([f * each for each in g])
+
+    bending, membrane = np.zeros((SHAPES, SHAPES)), np.zeros((STRETCHES, STRETCHES))
+    out = {"poisson": np.zeros((MOST, SHAPES)), "flattening": np.zeros((MOST, SHAPES, SHAPES)),
+           "relief": np.zeros((MOST, SHAPES, STRETCHES))}  # fmt: skip
+    halves = np.linspace(0.0, span, 2 * counts[2] + 1)
+    for k, (a, b) in enumerate(pairwise(halves)):  # the hinge at its one end bends half a cell
+        hinge = first + (k + 1) // 2
+        bends = b - a if k in (0, 2 * counts[2] - 1) else 2 * (b - a)
+        x = (a + b) / 2 + (b - a) / 2 * np.repeat(at, nodes)
+        width = s["rear_width"] + (s["front_width"] - s["rear_width"]) * (start + x) / total
+        y = width / 2 * np.tile(at, nodes)
+        area = (b - a) / 2 * np.repeat(weight, nodes) * width / 2 * np.tile(weight, nodes)
+        mean = {p: (width / 2 / half_width) ** p / (p + 1) for p in (2, 4)}
+        lift, along_2 = (product(along(x, 2, d), [side(y, p, 0) - mean[p] for p in mean]) for d in (0, 2))
+        across_2 = product(along(x, 2, 0), [side(y, p, 2) for p in mean])
+        twist = product(along(x, 2, 1), [side(y, p, 1) for p in mean])
+        even, odd = ((0, 2), (1, 3))
+        none = np.zeros((8, len(x)))
+        e_x = np.concatenate([product(along(x, 1, 1), [side(y, p, 0) for p in even]), none])
+        e_y = np.concatenate([none, product(along(x, 1, 0), [side(y, p, 1) for p in odd])])
+        shear = np.concatenate([product(along(x, 1, 0), [side(y, p, 1) for p in even]),
+                                product(along(x, 1, 1), [side(y, p, 0) for p in odd])])  # fmt: skip
+        d, c = plate * area, stretch * area
+        bending += (d * along_2) @ (along_2 + nu * across_2).T + (d * across_2) @ (across_2 + nu * along_2).T
+        bending += (2 * (1 - nu) * d * twist) @ twist.T
+        membrane += (c * e_x) @ (e_x + nu * e_y).T + (c * e_y) @ (e_y + nu * e_x).T
+        membrane += (0.5 * (1 - nu) * c * shear) @ shear.T
+        out["poisson"][hinge] += (along_2 + nu * across_2) @ d / bends
+        out["flattening"][hinge] += (c * lift) @ lift.T / bends**2
+        out["relief"][hinge] += (c * lift) @ (e_x + nu * e_y).T / bends
+    root = np.linalg.cholesky(membrane)
+    out["relief"] = np.linalg.solve(root, out["relief"].reshape(-1, STRETCHES).T).T.reshape(out["relief"].shape)
+    return first, first + counts[2], {"bending": bending, **out}
+
+
+def turn(s: dict, cell: float, couple: float) -> tuple[float, float]:
+    """Turn of a bridge that curves across under an even couple [N m]: [rad], and over that in plane strain."""
+    from scipy.optimize import fsolve
+
+    first, last, e = across(s, cell)
+    hinges = slice(first, last + 1)
+    stiffness = chain(s, cell, True)[0]["rigidity"][hinges]
+    poisson, flattening, relief = (e[n][hinges] for n in ("poisson", "flattening", "relief"))
+
+    def unbalanced(t):
+        moved = np.einsum("i,iks->ks", t, relief)
+        whole = e["bending"] + np.einsum("i,ikl->kl", t**2, flattening) - moved @ moved.T
+        c = np.linalg.solve(whole, -poisson.T @ t)
+        flat = t * np.einsum("k,ikl,l->i", c, flattening, c) - np.einsum("k,iks,s->i", c, relief, moved.T @ c)
+        return (stiffness * t + poisson @ c + flat) / couple - 1
+
+    plane = couple / stiffness
+    found = float(fsolve(unbalanced, plane).sum())
+    return found, found / float(plane.sum())
+
+
 def walk(
-    lib: ctypes.CDLL, s: dict, *, cell: float, cycles: int = 6, fraction: float = FRACTION, relaxing: bool = False
+    lib: ctypes.CDLL,
+    s: dict,
+    *,
+    cell: float,
+    cycles: int = 6,
+    fraction: float = FRACTION,
+    relaxing: bool = False,
+    free: bool = False,
 ) -> np.ndarray:
-    """Strides by cycle [m]; with `relaxing`, losses are the Maxwell branch of a free strip."""
-    values, state, step = chain(s, cell, relaxing)
+    """Strides by cycle [m]; with `relaxing`, losses are the Maxwell branch of a free strip; with `free` too, and its
+    bridge curves across."""
+    values, state, step = chain(s, cell, relaxing or free)
     device = Device()
     for name, v in values.items():
         if np.ndim(v):
             getattr(device, name)[: len(v)] = list(v)
         else:
             setattr(device, name, v)
+    if free:
+        device.shapes, device.loss_time = SHAPES, s["loss_time"]
+        device.first, device.last, energies = across(s, cell)
+        for name, v in energies.items():
+            ctypes.memmove(getattr(device, name), np.ascontiguousarray(v).ctypes.data, v.nbytes)
     every = int(np.ceil(1 / (s["frequency"] * step * fraction)))
     out = np.zeros(cycles + 1)
     out[0] = np.average(state[0, :, 0], weights=values["mass"])
@@ -148,12 +259,19 @@ def main(argv=None):
     parser.add_argument("--cycles", type=int, default=6)
     parser.add_argument("--fraction", type=float, default=FRACTION)
     parser.add_argument("--relaxing", action="store_true", help="losses as those of a free strip, not viscous")
+    parser.add_argument("--free", action="store_true", help="relaxing, and the bridge curves across")
+    parser.add_argument("--bend", type=float, nargs="+", metavar="N m", help="no walk: turn of a free bridge by couple")
     args = parser.parse_args(argv)
     settings = read_calibration(args.calibration).override(args.set, "--set")
     values, lib = {n: settings[n].value for n in settings.as_dict()}, library()
     for cell in args.cell:
+        for couple in args.bend or ():
+            angle, softer = turn(values, 1e-3 * cell, couple)
+            print(f"cells of {cell:g} mm, {couple:g} N m: {np.degrees(angle):.1f} deg, {softer:.4f} times plane strain")
+        if args.bend:
+            continue
         found = walk(lib, values, cell=1e-3 * cell, cycles=args.cycles, fraction=args.fraction,
-                     relaxing=args.relaxing)  # fmt: skip
+                     relaxing=args.relaxing, free=args.free)  # fmt: skip
         print(f"cells of {cell:g} mm: " + " ".join(f"{1e3 * x:.2f}" for x in found) + " mm per cycle", flush=True)
 
 
