@@ -27,9 +27,12 @@ def main(argv=None):
     parser.add_argument("--calibration", default="crawler")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--cell", type=float, nargs="+", default=[5.0, 2.5], help="[mm]")
+    parser.add_argument("--across", type=int, help="cells side by side, an even number; default: about as wide as long")
     parser.add_argument("--cycles", type=int, default=2)
     parser.add_argument("--longer", type=float, default=LONGER, help="step over the one that is taken by itself")
     args = parser.parse_args(argv)
+    if args.across:  # no setting: what a mesh is coarse across matters to convergence alone
+        crawler.Strip.across = lambda strip, s: args.across
     stated = read_calibration(args.calibration).override(args.set, "--set").replace(guided=False)
     values, lib = {n: stated[n].value for n in stated.as_dict()}, planar_crawler.library()
     for cell in args.cell:
