@@ -115,6 +115,12 @@ class Posterior:
         return dict.fromkeys(log, 0.0) | dict(zip(best.values(), np.exp(p - total).tolist(), strict=True))
 
     @property
+    def most_probable(self) -> Key:
+        """The most probable set, fitted or not."""
+        chance = self.probabilities()
+        return max(chance, key=lambda k: (chance[k], k in self.nodes))
+
+    @property
     def leader(self) -> Key:
         """The most probable set of those that were fitted."""
         return max(self.nodes, key=lambda k: self.total[k])

@@ -81,6 +81,8 @@ def search(
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
         extended(out, forward, progress=progress, most=most)
+    while (key := out.most_probable) not in out.nodes:  # what is named has to be fitted, however many were
+        _tried(out, forward, key)
     beyond_the_catalogue(out, forward)
     return out
 
@@ -167,7 +169,6 @@ def extended(
     out: Posterior, forward: Predictor, *, progress: Callable[[float], None] | None = None, most: int = FITS
 ) -> Posterior:
     """Fits sets until none that has not been fitted holds much of the posterior."""
-    prior = log_priors(out.signatures)
     for n in range(most):
         if progress:
             progress(n / most)
@@ -176,21 +177,26 @@ def extended(
             key = _alone(out) or key
         if key is None:
             break
-        labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
-        estimate = out.total[key]
-        out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
-        swapped = _in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
-        fitted = _fitted(out, forward, key)
-        if fitted.failed:
-            out.failed[key] = fitted.failed
-            out.drop(key)
-            continue
-        _add(out, forward, key, fitted, prior)
-        out.gains.setdefault(parent, []).append(out.total[key] - promise)
-        out.missed.setdefault(parent, []).append(out.total[key] - estimate)
-        if swapped is not None:
-            out.swapped.append(out.total[key] - swapped)
+        _tried(out, forward, key)
     return out
+
+
+def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
+    """Fits a set, and keeps by how much it is better than was thought."""
+    labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
+    estimate = out.total[key]
+    out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
+    swapped = _in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
+    fitted = _fitted(out, forward, key)
+    if fitted.failed:
+        out.failed[key] = fitted.failed
+        out.drop(key)
+        return
+    _add(out, forward, key, fitted, log_priors(out.signatures))
+    out.gains.setdefault(parent, []).append(out.total[key] - promise)
+    out.missed.setdefault(parent, []).append(out.total[key] - estimate)
+    if swapped is not None:
+        out.swapped.append(out.total[key] - swapped)
 
 
 def _named(out: Posterior) -> list[Key]:
@@ -207,8 +213,14 @@ def _likely(out: Posterior) -> Key | None:
     fitted = _named(out)
     others = out.estimates if len(fitted) == len(out.nodes) else [k for k in out.estimates if not out.imitates(k)]
     least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
-    doubts = {k: min(0.0, _most(gains)) for k, gains in out.gains.items() if len(gains) > 1}
-    unfitted = {k: _promise(out, k) + doubts.get(out.estimates[k].parent, 0.0) for k in others}
+    promised, estimated = (
+        {k: min(0.0, _most(off)) for k, off in each.items() if len(off) > 1} for each in (out.gains, out.missed)
+    )
+    unfitted = {
+        k: max(out.promise[k] + promised.get(parent, 0.0), out.total[k] + estimated.get(parent, 0.0))
+        for k in others
+        for parent in [out.estimates[k].parent]
+    }
     # another start of the shape of a set that was fitted has to promise more than that did
     better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
     return max(better, key=lambda k: unfitted[k], default=None)

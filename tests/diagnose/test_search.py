@@ -70,6 +70,13 @@ def test_the_effect_its_site_and_its_strength_are_found(found, rubbing):
     assert marginals(found)["crease_friction at crease 1"] > 0.5
 
 
+def test_the_most_probable_set_is_fitted_however_few_fits_are_allowed(rubbing):
+    forward, _, base, weights, signatures = rubbing
+    out = search(forward, base, list(signatures), weights, most=0)
+    chance = out.probabilities()
+    assert max(chance, key=lambda k: chance[k]) in out.nodes
+
+
 def test_another_yield_angle_is_found_about_a_fit_that_ended_with_a_wrong_one(found, rubbing):
     forward, _, _, weights, _ = rubbing
     best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
