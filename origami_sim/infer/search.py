@@ -526,7 +526,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     begin, steps, suspects = [node.fit.theta[:count]], [line.steps[:count]], []
     own = np.cumsum([count, *(len(s.free) for s in node.fit.hypothesis.suspects)])
     # of a signature, the part that changes little enough for a derivative, in the weights of the fit
-    told = 0.5 * small(forward, by, node.fit.blocks) / float(np.max(out.weights.deviation / by.deviation))
+    allowed = 0.5 * small(forward, by, node.fit.blocks) / float(np.max(out.weights.deviation / by.deviation))
     column = 0
     for g in estimate.groups:
         if g < len(members):
@@ -539,7 +539,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
             strength = np.clip(first.start + estimate.values[column] * signature.size, first.lower, first.upper)
             suspects.append(signature.suspect)
             begin.append(np.array([strength, *(f.start for f in rest)]))
-            strong, part = signature.suspect.strengths, told / signature.raw
+            strong, part = signature.suspect.strengths, allowed / signature.raw
             steps.append(
                 np.array([first.scale * part if n in strong else n.scale * forward.nudge for n in (first, *rest)])
             )
