@@ -27,7 +27,8 @@ class Node:
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
         grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
             problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
-        alone: log posterior of single effects in its place, as it judges them.
+        instead: log posterior of single effects in its place, and of sets with another effect for one of its own, as it
+            judges them.
     """
 
     key: Key
@@ -39,7 +40,7 @@ class Node:
     foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
     wide: bool = False
-    alone: dict[Key, float] = field(default_factory=dict)
+    instead: dict[Key, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,7 +174,7 @@ def extended(
             progress(n / most)
         key = _likely(out)
         if n % 2 or key is None:
-            key = _alone(out) or key
+            key = _alike(out) or _alone(out) or key
         if key is None:
             break
         _tried(out, forward, key)
@@ -241,25 +241,17 @@ def _most(gains: Sequence[float]) -> float:
 
 
 def _alone(out: Posterior) -> Key | None:
-    """A single effect to fit that may be best: as it would stand in the best set's place, or as it promised at first.
+    """A single effect to fit that may be best, if it is better than it promised by as much as other sets were.
 
-    About a model that is far from what was recorded what is linear promises too little, or too much, so that others may
-    gain what those that were fitted did; about a fit that leaves white noise it tells of all effects whether they could
-    stand in its place. Of an effect that was fitted alone, or is in the best set, there is no need to know more.
+    About a model that is far from what was recorded what is linear promises too little, or too much; about a fit that
+    leaves white noise it tells which effects could stand in its place. Of an effect that was fitted alone, or is in the
+    best set, there is no need to know more.
     """
     best = max(out.total, key=lambda k: out.total[k])
     near, bonus = out.total[best] + np.log(UNFITTED), _most(out.gains.get(frozenset(), []))
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
-
-    def unknown(keys: Iterable[Key]) -> list[Key]:
-        return [k for k in keys if k in out.estimates and not known & {out.suspect(n).effect for n in k}]
-
-    judged = out.nodes[best].alone if best in out.nodes else {}
-    alike = unknown(k for k, total in judged.items() if total >= near)
-    if alike:
-        return max(alike, key=lambda k: judged[k])
     singles = [k for k, p in out.ranked.items() if k in out.estimates and p + bonus >= near][:LEADING]
-    singles = unknown(singles)
+    singles = [k for k in singles if not known & out.effects(k)]
     instead = _in_place_of(out, best)
     if not instead or not singles:
         return next(iter(singles), None)
@@ -268,11 +260,19 @@ def _alone(out: Posterior) -> Key | None:
     return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
 
 
+def _alike(out: Posterior) -> Key | None:
+    """A set to fit that does what the best of those that may be named does, as that one's fit judges it."""
+    leader = out.nodes[max(_named(out), key=lambda k: out.total[k])]
+    near, fitted = out.total[leader.key] + np.log(UNFITTED), {out.effects(k) for k in out.nodes}
+    alike = {k: t for k, t in leader.instead.items() if t >= near and out.effects(k) not in fitted}
+    return max((k for k in alike if k in out.estimates), key=lambda k: alike[k], default=None)
+
+
 def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
     """Log posterior of single effects in the place of the best set, as its fit judges them if it leaves white noise."""
     leader = out.nodes.get(best)
     white = leader is not None and leader.fit.weights is not None and not leader.fit.weights.colour
-    return leader.alone if leader is not None and white else {}
+    return leader.instead if leader is not None and white else {}
 
 
 def polished(out: Posterior, forward: Predictor) -> bool:
@@ -447,8 +447,8 @@ def _judge(
         gains = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
         promise[leading] = total + log_prior[leading] + gains
     for n, key in enumerate(keys):
-        if len(key) == 1:
-            node.alone[key] = totals[n]
+        if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
+            node.instead[key] = totals[n]
         if key in out.nodes and key and key < node.key and key not in out.renewed:
             if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
                 out.renewed.add(key)
