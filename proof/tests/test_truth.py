@@ -27,7 +27,7 @@ def flap(truth, **crease) -> dict:
 
 
 def inertia(o: dict) -> float:
-    return o["density"] * o["thickness"] * 0.03**2 * 0.03**2 / 3
+    return o["density"] * o["thickness"] * 0.03**2 * (0.03**2 / 3 + o["thickness"] ** 2 / 12)
 
 
 def crossings(motion) -> np.ndarray:
