@@ -29,6 +29,9 @@ COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
 
 
+FOUND = "Found: "
+"""How a headline begins that names something."""
+
 MORE_LAWS = " More laws at once would follow the recordings more closely, as they do where the catalogue lacks one."
 """What is said where the best set is not named."""
 
@@ -171,8 +174,12 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
             ["nothing"] if frozenset() in d.credible else []
         )
         chances = {c: holding(classes, c) if c > d.lead else classes[c] for c in d.credible}
-        text = undecided(d.lead, d.credible, chances)
-        text += f" The best is {say(shown)}, which {explained}."
+        text = undecided(d.lead, d.credible, chances, lambda effects: say(shown, only=effects))
+        more = p.effects(d.best) - d.lead
+        if text.startswith(FOUND) and more:
+            text += f" With {say(shown, only=more)} they {explained.replace('explains', 'explain', 1)}."
+        else:
+            text += f" The best is {say(shown)}, which {explained}."
         return Judgement(d.word, text + _unlisted(d), d.probability, names, **common)
     # the shown set may hold more than what surely acts: of that, each effect by its own probability
     named = [s for s in suspects if s.effect in d.lead]
@@ -180,7 +187,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if d.word == "MEASUREMENT":
         text = f"The measurement, not the device, explains the mismatch: {say(shown, only=d.lead)}"
     else:
-        text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
+        text = f"{FOUND}{say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
     text += f", p = {d.probability:.2f}; {who} {explained}."
@@ -199,14 +206,23 @@ def smooth_moment(forward: Predictor, f: Fit) -> str:
     return f"{title(UNLISTED)}, at {site} (root mean square {said(usual_moment(forward, f), 'N m', 2)})"
 
 
-def undecided(lead: frozenset[str], credible: list[frozenset[str]], chances: dict[frozenset[str], float]) -> str:
-    """Between which explanations recordings do not decide, and what acts in all of them, in words."""
+def undecided(
+    lead: frozenset[str],
+    credible: list[frozenset[str]],
+    chances: dict[frozenset[str], float],
+    described: Callable[[frozenset[str]], str],
+) -> str:
+    """Between which explanations recordings do not decide, and what acts in all of them, in words.
+
+    Args:
+        described: effects with their sites and strengths, in words.
+    """
     likely = [c for c in credible[:4] if chances[c] > 1.0 - CREDIBLE] or credible[:1]
     lead = lead if all(c > lead for c in credible) else frozenset()
     each = [f"{_name(c - lead)} (p = {chances[c]:.2f})" for c in likely]
     rest = len(credible) - len(each)
     more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
-    sure = f"Found: {joined(sorted(map(title, lead)))}; besides, these" if lead else "These"
+    sure = f"{FOUND}{described(lead)}; besides, these" if lead else "These"
     return f"{sure} recordings do not decide between {joined(each)}{more}."
 
 

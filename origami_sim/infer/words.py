@@ -8,6 +8,9 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.recording.units import quantity
 
+WHOLE = ("the measurement", "the drive", "the ground")
+"""Sites that an effect's title says already."""
+
 PEOPLE = ("Coulomb", "Kelvin", "Maxwell")
 """Names with which titles of effects begin; they keep their capital."""
 
@@ -29,8 +32,8 @@ def distinct(fits: Sequence[Fit]) -> list[str]:
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 
 
-def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> str:
-    """The effects of a fit, all or `only` some, with their sites, if asked, and strengths: those of the device first.
+def say(f: Fit, *, only: Collection[str] | None = None) -> str:
+    """The effects of a fit, all or `only` some, with their sites and strengths: those of the device first.
 
     Intervals are left to the table where there are more than two: a headline has to be read at a glance.
     """
@@ -49,7 +52,7 @@ def say(f: Fit, *, sites: bool = True, only: Collection[str] | None = None) -> s
         if s.more:
             what = f"{'more' if t > 0 else 'less'} {what} than stated"
         strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
-        where = f" at {s.site}" if sites else ""
+        where = f" at {s.site}" if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
         out.append(f"{what}{where} ({strength}{interval})")
     return joined(out)

@@ -136,11 +136,12 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
 
 def test_what_acts_in_every_explanation_is_said_once():
     drag, friction, delay = (frozenset((e,)) for e in ("air_drag", "crease_friction", "clock_delay"))
-    text = undecided(drag, [drag, friction], {drag: 0.6, friction: 0.3})
+    text = undecided(drag, [drag, friction], {drag: 0.6, friction: 0.3}, str)
     assert text.startswith("These recordings do not decide between ") and "(p = 0.60) and" in text
-    text = undecided(friction, [friction | drag, friction | delay], {friction | drag: 0.6, friction | delay: 0.3})
-    assert text.startswith("Found: dry friction in a crease; besides, these recordings do not decide between ")
-    assert text.count("dry friction") == 1 and " with " not in text
+    chances = {friction | drag: 0.6, friction | delay: 0.3}
+    text = undecided(friction, list(chances), chances, lambda effects: f"{len(effects)} effect with 0.2 mN m")
+    assert text.startswith("Found: 1 effect with 0.2 mN m; besides, these recordings do not decide between ")
+    assert "dry friction" not in text and text.count(" with ") == 1
 
 
 def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:

@@ -4,13 +4,10 @@ import re
 from functools import cache
 
 from origami_sim.effects import CATALOGUE, get
-from origami_sim.infer.words import title
+from origami_sim.infer.words import WHOLE, title
 
 SEPARATOR = " + "
 """Between the effects of one explanation in its label."""
-
-WHOLE = ("the measurement", "the drive", "the ground")
-"""Sites that an effect's title says already."""
 
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
 _PLAIN_OWNERS = ("inertia", "setting")
