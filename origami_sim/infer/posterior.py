@@ -71,10 +71,9 @@ class Posterior:
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
-            refitted model. reconsidered: whether all were tried over their ranges. left: the crease at which a
-            law that the catalogue lacks explains most beside the best set, if it does. swapped: by how much single
-            effects were better than they promised in the place of the best set. missed: by how much sets were better
-            than their estimates, by the fit that these are about.
+            refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
+            were better than they promised in the place of the best set. missed: by how much sets were better than their
+            estimates, by the fit that these are about.
     """
 
     signatures: list[Signature]
@@ -95,7 +94,6 @@ class Posterior:
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
-    left: str = ""
     swapped: list[float] = field(default_factory=list)
     missed: dict[Key, list[float]] = field(default_factory=dict)
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)

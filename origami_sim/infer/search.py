@@ -115,34 +115,30 @@ def reconsidered(
 
 
 def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
-    """Enters a smooth moment of a crease that no law gives, if beside the best set one explains more.
+    """Enters a smooth moment of a crease that no law gives, if it may be as probable as the best set.
 
     It is fitted alone, and competes with what was found: where that is right the moment explains less, as it cannot do
     what laws of the drive, of memory or with sharp bends do.
     """
     if all(s.status for s in out.signatures):  # nothing can be tested
         return
-    best, none = max(_named(out), key=lambda k: out.total[k]), out.nodes[frozenset()].fit
-    coefficients = anywhere(forward)
-    left = [one for one in beside(forward, out.nodes[best].fit, coefficients, out.hyper) if one[2] > 0.0]
-    if not left:
-        return
-    out.left, sites = max(left, key=lambda one: one[2])[0].site, {s.site for s, *_ in left}
-    about = left
-    if best:
-        about = beside(forward, none, [s for s in coefficients if s.site in sites], out.hyper)
+    best, none = max(out.total[k] for k in _named(out)), out.nodes[frozenset()].fit
+    about = beside(forward, none, anywhere(forward), out.hyper)
     if not about:
         return
     suspect, begin, gain = max(about, key=lambda one: one[2])
-    if out.total[frozenset()] + gain < out.total[best] + np.log(UNFITTED):
+    every, key = [*out.signatures, Signature(suspect, [], 1.0)], frozenset({len(out.signatures)})
+    prior = log_priors(every)
+    odds = _log_prior(key, prior, out.hyper) - _log_prior(frozenset(), prior, out.hyper)
+    if out.total[frozenset()] + gain + odds < best + np.log(UNFITTED):
         return
-    out.signatures.append(Signature(suspect, [], 1.0))
-    key, theta = frozenset({len(out.signatures) - 1}), np.concatenate([none.theta, begin])
+    out.signatures.append(every[-1])
+    theta = np.concatenate([none.theta, begin])
     f = fit(forward, Hypothesis((suspect,)), level(forward, none), theta=theta, local=none.local)
     if f.failed:
         out.failed[key] = f.failed
     else:
-        enter(out, _node(out, forward, key, f)[0], log_priors(out.signatures))
+        enter(out, _node(out, forward, key, f)[0], prior)
 
 
 def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.ndarray, float] | None]) -> bool:

@@ -17,6 +17,7 @@ from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Free, Suspect, scaled, suspects, told_apart
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.screen import Signature, screen
@@ -89,6 +90,9 @@ def beside(
 
     Each is judged in the noise that it would leave itself; all is linear about the fit.
     """
+    assert f.weights is not None
+    # in coloured noise that a fit leaves for lack of a moment, that moment would not show
+    f = f.reweighted(Weights(f.weights.deviation, gap=f.weights.gap))
     assert f.weights is not None and f.linear is not None
     # a constant moment tells at which size the others of its crease change about as much as is missed
     first = {s.site: s for s in coefficients[::-1]}
@@ -127,6 +131,14 @@ def beside(
         shapes = [n.start for n in suspect.free[len(mine) :]]
         out.append((suspect, np.array([*values[-len(mine) :] * sizes, *shapes]), float(gain)))
     return out
+
+
+def crease_of_the_rest(forward: Predictor, f: Fit, hyper: Hyper = HYPER) -> str:
+    """The crease at which such a moment explains most of what a fit leaves; "" where it explains nothing anywhere."""
+    if any(s.effect == UNLISTED for s in f.hypothesis.suspects):
+        return ""
+    found = max(beside(forward, f, anywhere(forward), hyper), key=lambda one: one[2], default=None)
+    return found[0].site if found is not None and found[2] > 0.0 else ""
 
 
 def _joint(mine: Sequence[Signature], missed: float) -> Suspect:

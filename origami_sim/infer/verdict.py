@@ -13,7 +13,7 @@ from origami_sim.infer.bursts import bursts
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
-from origami_sim.infer.unlisted import UNLISTED, usual_moment
+from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
 
 CREDIBLE = 0.95
@@ -28,6 +28,9 @@ LISTED = 3
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
 
+
+SAID = 0.005
+"""Share of the mismatch from which on it is said: what rounds to a per cent."""
 
 FOUND = "Found: "
 """How a headline begins that names something."""
@@ -144,7 +147,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     chance = d.chance
     more_laws = len(chance) < len(p.total)  # only some may be named
     classes = by_effects(p, chance)
-    shown, explained = widened(p, d.best), _explained(budgeted(d.best), p.left)
+    best = p.nodes[d.best].fit
+    left = crease_of_the_rest(forward, best, p.hyper) if d.lead and budgeted(d.best).rest >= SAID else ""
+    shown, explained = widened(p, d.best), _explained(budgeted(d.best), left)
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
@@ -388,10 +393,10 @@ def deviations(node: Node, p: Posterior) -> np.ndarray:
 def _explained(b: Budget, left: str) -> str:
     """What a set explains, what numbers of the model do, and how much at which crease is left, in words."""
     text = f"explains {b.named:.0%} of the mismatch"
-    if b.numbers >= 0.005:
+    if b.numbers >= SAID:
         text += f", numbers of the model {b.numbers:.0%}"
     where = f", above all at {left}" if left else ""
-    return text + (f"; {b.rest:.0%} is real and not named{where}" if b.rest >= 0.005 else "")
+    return text + (f"; {b.rest:.0%} is real and not named{where}" if b.rest >= SAID else "")
 
 
 def _unlisted(d: Decision) -> str:
