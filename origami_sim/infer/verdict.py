@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit, precision
@@ -166,7 +167,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if d.word == "UNKNOWN" and UNLISTED in d.lead:
         b = budgeted(d.best)
         text = f"Something real is missing that the catalogue does not name: {smooth_moment(forward, shown)}."
-        text += f" It explains {b.rest:.0%} of the mismatch, numbers of the model {b.numbers:.0%}."
+        text += f" It explains {_share(b.rest)} of the mismatch, numbers of the model {_share(b.numbers)}."
         nearest = next((f for f in others if f.hypothesis.suspects), None)
         text += f" The closest of the catalogue is {say(nearest)}." if nearest else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
@@ -375,28 +376,40 @@ def widened(p: Posterior, key: Key) -> Fit:
 
 
 def deviations(node: Node, p: Posterior) -> np.ndarray:
-    """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI]."""
-    cell = node.grid[int(np.argmax(node.evidence + p.hyper.log_cells))]
-    assert cell is not None
+    """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI].
+
+    About the fit, over all sizes of flaws and discrepancy: under each the numbers have a variance and a mean of their
+    own.
+    """
     own = OwnColumns(node.fit)
     count, first = len(own.columns), len(own.nominal)
-    spread = np.concatenate([g.spread for g in own.groups])
+    spread, at = (np.concatenate([getattr(g, name) for g in own.groups]) for name in ("spread", "at"))
     strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in own.groups])
-    known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread)
-    cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known**2), rcond=1e-14)
+    known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread) ** 2
+    log = node.evidence + p.hyper.log_cells
+    second = np.zeros(count)
+    for cell, weight in zip(node.grid, np.exp(log - logsumexp(log)), strict=True):
+        if cell is not None:
+            cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known), rcond=1e-14)
+            away = cover @ (cell.gram[:count, -1] - known * at)
+            second += weight * (np.maximum(np.diag(cover), 0.0) + away**2)
     out = np.zeros(count)
     scale = np.array([node.fit.free[c].scale for c in own.columns])
-    out[np.array(own.columns) - first] = scale * np.sqrt(np.maximum(np.diag(cover), 0.0))
+    out[np.array(own.columns) - first] = scale * np.sqrt(second)
     return out
 
 
 def _explained(b: Budget, left: str) -> str:
     """What a set explains, what numbers of the model do, and how much at which crease is left, in words."""
-    text = f"explains {b.named:.0%} of the mismatch"
+    text = f"explains {_share(b.named)} of the mismatch"
     if b.numbers >= SAID:
         text += f", numbers of the model {b.numbers:.0%}"
     where = f", above all at {left}" if left else ""
     return text + (f"; {b.rest:.0%} is real and not named{where}" if b.rest >= SAID else "")
+
+
+def _share(part: float) -> str:
+    return f"{part:.0%}" if part >= SAID else "less than 1%"
 
 
 def _unlisted(d: Decision) -> str:
