@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,7 @@ from origami_sim.possible import Possible
 from origami_sim.predict.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.scene import scene_module
+from origami_sim.threads import in_step, leads, shared
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
@@ -69,7 +71,20 @@ def diagnose(
             that the model does not know.
     """
     o = options or Options()
-    tell = progress or (lambda stage, part: None)
+    return in_step(lambda: _diagnosed(subject, recordings, o, catalogue, priors, progress, keep), o.threads)
+
+
+def _diagnosed(
+    subject: Source,
+    recordings: Sequence[Recording | str | Path] | Recording | str | Path,
+    o: Options,
+    catalogue: Sequence[str] | None,
+    priors: Mapping[str, float | str] | None,
+    progress: Report | None,
+    keep: Keep | None,
+) -> Diagnosis:
+    """What `diagnose` finds; processes that go in step all find it (see `in_step`)."""
+    tell = progress if progress is not None and leads() else (lambda stage, part: None)
     seconds: dict[str, float] = {}
     began = clock.perf_counter()
 
@@ -125,10 +140,14 @@ def diagnose(
         keep.fits = {"before": given, "refitted": base, "after": best}
     noted = list(dict.fromkeys([*judged.notes, *noted]))
     nowhere, left_out = np.full(len(forward.components), np.nan), "Held-out error could not be told"
-    errors = {
-        key: attempt(noted, left_out, lambda f=node.fit: held_out(forward, f, weights).rms, nowhere)
-        for key, node in posterior.nodes.items()
-    }
+
+    def error(f: Fit) -> tuple[np.ndarray, list[str]]:
+        said: list[str] = []
+        return attempt(said, left_out, lambda: held_out(forward, f, weights).rms, nowhere), said
+
+    told = shared([partial(error, node.fit) for node in posterior.nodes.values()])
+    errors = {key: rms for key, (rms, _) in zip(posterior.nodes, told, strict=True)}
+    noted += [note for _, notes in told for note in notes]
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
     noise = forward.blocks[0].noise
     scores = attempt(noted, "The screening cannot be shown", lambda: scored(posterior), [])

@@ -9,6 +9,7 @@ from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.stored import Stored
 from origami_sim.predict.cache import Cache
 from origami_sim.predict.worlds import Worlds
+from origami_sim.threads import leads
 
 
 class Keep:
@@ -40,7 +41,7 @@ class Keep:
     def stands(self, found: Diagnosis) -> None:
         """Takes over the diagnosis as it is now."""
         self.found = found
-        if self.write is not None:
+        if self.write is not None and leads():
             self.write(found)
 
     def clear(self) -> None:

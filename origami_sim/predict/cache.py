@@ -21,6 +21,7 @@ import numpy as np
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.predictor import Prediction
 from origami_sim.predict.worlds import Worlds
+from origami_sim.threads import leads, told
 
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
@@ -49,8 +50,12 @@ class Cache:
         made: Callable[[], Prediction],
     ) -> Prediction:
         """What was predicted before, or else what is made now."""
-        file = self.folder / f"{digest(forward, each, theta, local, wanted)}.npz"
-        stored = _read(file, len(wanted))
+
+        def known() -> tuple[Path, Prediction | None]:
+            file = self.folder / f"{digest(forward, each, theta, local, wanted)}.npz"
+            return file, _read(file, len(wanted))
+
+        file, stored = told(known)
         if stored is not None:
             self.found += 1
             return stored
@@ -60,7 +65,7 @@ class Cache:
         ends = [None if e is None else np.ascontiguousarray(e) for e in new.ends]
         out = Prediction([np.ascontiguousarray(v) for v in new.values], ends)
         self.computed += 1
-        if clock.perf_counter() - began > WORTH:
+        if leads() and clock.perf_counter() - began > WORTH:
             _write(file, out)
         return out
 

@@ -34,6 +34,7 @@ from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.settling import coupled, levels, per_world, settling
 from origami_sim.solve.system import System
+from origami_sim.threads import told
 
 PASSIVE = ("bars", "bar_viscosity", "panel_bending", "ogden_bars")
 """Effects that keep panels stiff; rigid panels do not need them."""
@@ -104,6 +105,9 @@ class Curves(Worlds, ABC):
         return recording
 
     def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
+        return told(lambda: self._read_off(each, theta, wanted))  # threads share the worlds of a curve
+
+    def _read_off(self, each: Sequence[Hypothesis], theta, wanted: list[int]) -> Prediction:
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
         curves, impossible = {}, {}
         for r in sorted({self.blocks[b].recording for b in wanted}):
