@@ -91,6 +91,10 @@ class Articulation:
                         members.add(child)
         self._below = below
         self._carried = [np.isin(owner, list(members)) for members in below]
+        self._owned = {p: np.flatnonzero(owner == p) for p in self.order}
+        axes = [x[k] - x[j] for _, j, k, _ in model.creases[self.creases].tolist()]
+        crossed = [np.cross(np.eye(3), axis / np.linalg.norm(axis)) for axis in axes]
+        self._crossed = [(k, k @ k) for k in crossed]  # what crosses the axis with a vector, once and twice
 
     @property
     def order(self) -> list[int]:
@@ -145,15 +149,15 @@ class Articulation:
         turns = {self.root: pose.rotation}
         shifts = {self.root: pose.centre - pose.rotation @ self._centre}
         for joint, (c, parent, child, sign) in enumerate(self._joints):
-            _, j, k, _ = self.model.creases[c]
-            axis = (x[k] - x[j]) / np.linalg.norm(x[k] - x[j])
-            angle = sign * (pose.angles[joint] - self._rest[c])
-            turns[child] = turns[parent] @ Rotation.from_rotvec(angle[:, None] * axis).as_matrix()
-            shifts[child] = turns[parent] @ x[j] + shifts[parent] - turns[child] @ x[j]
+            pivot, (once, twice) = x[self.model.creases[c, 1]], self._crossed[joint]
+            angle = (sign * (pose.angles[joint] - self._rest[c]))[:, None, None]
+            turn = np.eye(3) + np.sin(angle) * once + 2.0 * np.sin(0.5 * angle) ** 2 * twice  # Rodrigues 1840
+            turns[child] = turns[parent] @ turn
+            shifts[child] = turns[parent] @ pivot + shifts[parent] - turns[child] @ pivot
         out = np.empty((len(x), pose.worlds, 3))
-        for panel in turns:
-            mine = np.flatnonzero(self._owner == panel)
-            out[mine] = np.einsum("wab,nb->nwa", turns[panel], x[mine]) + shifts[panel]
+        for panel, turn in turns.items():
+            mine = self._owned[panel]
+            out[mine] = np.swapaxes(x[mine] @ np.swapaxes(turn, 1, 2) + shifts[panel][:, None], 0, 1)
         return out
 
     def poses_of(self, x: np.ndarray, angles: np.ndarray) -> Pose:
