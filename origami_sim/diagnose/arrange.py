@@ -184,10 +184,10 @@ def rigid_rollouts(
         return None
     if len(probe.model.contacts):  # a contact is no smooth function of a start
         start = o.start or starting(subject, recordings)
-        found = RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads)
+        found = RigidRollouts(subject, recordings, segment=o.segment, start=start, threads=o.threads, probe=probe)
     else:
         length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
-        found = RigidRollouts(subject, recordings, segment=length, threads=o.threads)
+        found = RigidRollouts(subject, recordings, segment=length, threads=o.threads, probe=probe)
     if bent <= BENDING:
         return found, [] if forced else [BENT.format(bent)]
     # a recorder that averages over frames has more noise than neighbouring frames show

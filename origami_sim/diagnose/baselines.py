@@ -9,6 +9,7 @@ the refit without that half.
 import copy
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,6 +20,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Baseline
 from origami_sim.infer.held_out import steps_without
 from origami_sim.locate.locate import motion
+from origami_sim.threads import shared
 
 KNOTS = 9
 
@@ -62,33 +64,42 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
         return without("needs segments in two halves, and frames outside of each")
     scale = np.array([n.scale for n in base.free])
     told = [replace(base, theta=base.theta + scale * step) for step in steps_without(base, halves)]
-    count = len(forward.recordings)
-    moved = [[motion(forward, f, r) for r in range(count)] for f in told]  # type: ignore[arg-type]
+    each = range(len(forward.recordings))
+    found = shared([partial(motion, forward, f, r) for f in told for r in each])  # type: ignore[arg-type]
+    moved = [found[k : k + len(each)] for k in range(0, len(found), len(each))]
     if any(m is None for motions in moved for m in motions):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
     if any(len(next(_samples(forward, m, 0, h))) < FEWEST for m, h in zip(moved, halves, strict=True)):
         return without("needs segments in two halves, and frames outside of each")
-    for name, learn in (("sparse regression (STLSQ)", _sparse), ("Gaussian process", _process)):
-        squares, seen, terms = 0.0, 0.0, []
-        for held, known, motions in zip(halves, told, moved, strict=True):
-            tables, said = [], []
-            for k in range(len(forward.articulation.creases)):
-                a, w, y = _samples(forward, motions, k, held)
-                grid_a, grid_w = _range(a), _range(w)
-                values, text = learn(a, w, y, np.linspace(*grid_a, KNOTS), np.linspace(*grid_w, KNOTS))
-                tables.append((grid_a, grid_w, values))
-                said.append(text)
-            terms.append("; ".join(said))
-            f = _predict(forward, known, tables, held, weights)
-            if f is None or f.failed:
-                squares = np.full(len(forward.components), np.nan)
-                break
-            r = np.concatenate(f.residuals)
-            squares = squares + np.nansum(r**2, axis=0)
-            seen = seen + np.sum(np.isfinite(r), axis=0)
-        rms = np.sqrt(squares / np.maximum(seen, 1))
-        out.append(Baseline(name, np.atleast_1d(rms).tolist(), terms[0] if terms else ""))
+    learners = {"sparse regression (STLSQ)": _sparse, "Gaussian process": _process}
+    parts = list(zip(halves, told, moved, strict=True))
+    tried = iter(shared([partial(_tried, forward, weights, learn, *p) for learn in learners.values() for p in parts]))
+    for name in learners:
+        squares, seen, terms = zip(*(next(tried) for _ in parts), strict=True)
+        rms = np.sqrt(sum(squares) / np.maximum(sum(seen), 1))
+        out.append(Baseline(name, np.atleast_1d(rms).tolist(), terms[0]))
     return out
+
+
+def _tried(
+    forward: Predictor, weights: Weights, learn: Callable, held: list[int], known: Fit, motions
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """What a learnt correction misses on segments that are held out: squares (D,), how many, and what it is in words.
+
+    Not a number where it cannot be simulated.
+    """
+    tables, said = [], []
+    for k in range(len(forward.articulation.creases)):
+        a, w, y = _samples(forward, motions, k, held)
+        grid_a, grid_w = _range(a), _range(w)
+        values, text = learn(a, w, y, np.linspace(*grid_a, KNOTS), np.linspace(*grid_w, KNOTS))
+        tables.append((grid_a, grid_w, values))
+        said.append(text)
+    f = _predict(forward, known, tables, held, weights)
+    if f is None or f.failed:
+        return np.full(len(forward.components), np.nan), np.ones(len(forward.components)), "; ".join(said)
+    r = np.concatenate(f.residuals)
+    return np.nansum(r**2, axis=0), np.sum(np.isfinite(r), axis=0), "; ".join(said)
 
 
 def _halves(forward: Predictor) -> list[list[int]]:

@@ -6,7 +6,7 @@ it would leave itself: all is linear, the residuals that follow are looked at as
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -18,6 +18,7 @@ from origami_sim.fit.linear import triangle
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, patterns, recast
 from origami_sim.infer.implied import OwnColumns, left_by
+from origami_sim.threads import shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class Foresight:
 
     def gains(self, sets: Sequence[Sequence[Group]], hyper: Hyper) -> np.ndarray:
         """Log evidence that sets of effects gain over the fit, each in noise of its own."""
-        likely = [self._likely(groups) for groups in sets]
+        likely = shared([partial(self._likely, groups) for groups in sets])
         new = np.array([sum(g.strengths for g in groups if g not in self.own) for groups in sets])
         gain = np.array(likely) - self._before
         d = np.sqrt(2.0 * np.maximum(gain, 1.0) / np.maximum(new, 1))

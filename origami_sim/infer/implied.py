@@ -4,6 +4,7 @@ Every hypothesis is judged by its own (empirical Bayes), so that what one of the
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import residual_process
 from origami_sim.fit.weights import Weights, recast
+from origami_sim.threads import shared
 
 ROUNDS = 4
 """Times that gaps and levels follow each other, at most."""
@@ -60,13 +62,14 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     own = OwnColumns(f)
     line, none = line.condensed([np.zeros((r.count, 0)) for r in line.rows])
     effects = [t[:, own.columns] for t in line.tangent]
-    laid = own.sets(len(own.columns))
-    log = []
-    for gap in hyper.gaps:
-        now, theirs = regapped(line, effects, f.weights, gap)
+    laid, weights = own.sets(len(own.columns)), f.weights
+
+    def log_evidence(gap: float) -> float:
+        now, theirs = regapped(line, effects, weights, gap)
         cell = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, 0.0)
-        log.append(cell.of(laid, hyper)[0][0] - np.log(gap))
-    return hyper.gaps[int(np.argmax(log))]
+        return float(cell.of(laid, hyper)[0][0] - np.log(gap))
+
+    return hyper.gaps[int(np.argmax(shared([partial(log_evidence, gap) for gap in hyper.gaps])))]
 
 
 class OwnColumns:

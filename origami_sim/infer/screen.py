@@ -28,7 +28,7 @@ field of 0.6 ms then promises 23 less, in log evidence, than its fit has. Half a
 probability of four swings by more than 0.010.
 """
 
-CHUNK = 12
+CHUNK = 6
 """Suspects that are simulated together, so that progress shows and cores share them."""
 
 

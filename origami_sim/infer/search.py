@@ -10,6 +10,7 @@ and no probability by more than 0.011.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -31,6 +32,7 @@ from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
+from origami_sim.threads import shared
 
 UNFITTED = 0.05
 """Part of the best set's posterior up to which another is not worth a fit: what is named holds four times the rest."""
@@ -52,6 +54,9 @@ CELLS = 8
 
 MANY = 200
 """Sets beyond which only these cells are looked at."""
+
+TOGETHER = 24
+"""Sets that are judged at once, while other cores judge others; half and double take as long."""
 
 TIGHT = 1e-4
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
@@ -421,11 +426,17 @@ def _judge(
     width: dict[tuple[int, int], list[int]] = {}
     for n, s in enumerate(sets):
         width.setdefault((len(s), sum(len(node.groups[g].columns) for g in s)), []).append(n)
+    alike = [mine[k : k + TOGETHER] for mine in width.values() for k in range(0, len(mine), TOGETHER)]
+    white = node.foresight.white if foresee and node.foresight is not None else None
     count = every.gram.shape[-1] - 1
-    laid = [(mine, Sets.of([sets[n] for n in mine], node.groups, own, count)) for mine in width.values()]
+
+    def judged(mine: list[int]) -> list[tuple[np.ndarray, np.ndarray]]:
+        rows = Sets.of([sets[n] for n in mine], node.groups, own, count)
+        return [each.of(rows, out.hyper) for each in (every, white) if each is not None]
+
+    judgements = list(zip(alike, shared([partial(judged, mine) for mine in alike]), strict=True))
     log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
-    for mine, rows in laid:
-        log, value = every.of(rows, out.hyper)
+    for mine, ((log, value), *_) in judgements:
         found[np.ix_(mine, order)] = (log + cells[order, None] + log_prior[mine]).T
         peak = np.argmax(log + cells[order, None], axis=0)
         values.update((n, value[peak[k], k]) for k, n in enumerate(mine) if log[peak[k], k] > -np.inf)
@@ -435,8 +446,7 @@ def _judge(
         # what is missing explains some of the colour, and all that flaws and discrepancy would
         bare = np.array([smooth == 0.0 and flaws == out.hyper.flaws[0] for _, smooth, flaws in out.hyper.cells])
         total, rank, promise = float(logsumexp((node.evidence + cells)[bare])), rank.copy(), promise.copy()
-        for mine, rows in laid:
-            log, value = node.foresight.white.of(rows, out.hyper)
+        for mine, (_, (log, value)) in judgements:
             rank[mine] = log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
         leading = np.argsort(-rank)[:LEADING].tolist()
@@ -502,7 +512,7 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, l
         return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
 
     gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
-    found = {gap: judged(gap) for gap in gaps}
+    found = dict(zip(gaps, shared([partial(judged, gap) for gap in gaps]), strict=True))
     cells = [cell for _, cells in found.values() for cell in cells]
     evidence = np.full(len(hyper.cells), -np.inf)
     evidence[: len(cells)] = Summed.join(cells).of(laid, hyper)[0][:, 0]

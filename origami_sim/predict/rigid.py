@@ -44,7 +44,8 @@ class RigidRollouts(Rollouts):
 
     Args:
         segment: length of a segment [s]; None: a recording is one segment. tied: whether a segment begins where the one
-            before ends. The rest as for `Rollouts`.
+            before ends. probe: of the same model and recordings; what it has read of them is not read again. The rest
+            as for `Rollouts`.
 
     Raises:
         InputError: what rigid panels refuse; closed loops, a root that is held in part.
@@ -61,8 +62,11 @@ class RigidRollouts(Rollouts):
         start: str = "fit",
         tied: bool = True,
         threads: int | None = None,
+        probe: "RigidRollouts | None" = None,
     ):
         super().__init__(subject.with_rigid_panels(), recordings, start=start, threads=threads)
+        if probe is not None:
+            self.readings = probe.readings
         self._tree = Topology(self.model)
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         self._films: dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]] = {}
@@ -76,6 +80,8 @@ class RigidRollouts(Rollouts):
         pieces = max(1, round(count / frames))
         firsts = np.arange(0, count, -(-count // pieces))  # of equal length, but for the last
         firsts = np.append(firsts[count - firsts >= min(FEWEST, count)], count)
+        if self.start == "fit":
+            self.read_starts(index, firsts[:-1].tolist())
         out = [self.segment(index, int(a), int(b - a)) for a, b in pairwise(firsts)]
         if not tied or self.start != "fit":
             return out

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -26,14 +27,14 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.channels import angle_mask, channel_values, depths, stacked, turned_axes
 from origami_sim.predict.drives import drive_of, shifted
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
-from origami_sim.predict.starts import CAREFUL, NEAR, channel_tangent, read_start, seen_first, spans
+from origami_sim.predict.starts import CAREFUL, NEAR, Reading, channel_tangent, read_start, seen_first, spans
 from origami_sim.predict.stated import stated
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import batch_of
-from origami_sim.threads import default_threads, side_by_side
+from origami_sim.threads import default_threads, shared, side_by_side
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
@@ -50,8 +51,15 @@ FINER = 20
 FILMED = 64e6
 """Bytes of positions that are kept before they are read; more would not be faster."""
 
-TOGETHER = 1024
-"""Rollouts that are made at once: with a quarter or four times as many, memory or overhead costs a twentieth more."""
+TOGETHER, PARTS = 1024, 4
+"""Rollouts that are made at once, at most, and parts into which segments are cut, at least, for cores to share.
+
+With a quarter or four times as many rollouts, memory or overhead costs a twentieth more; twice as many parts cost the
+single predictions of a fit, of 250 segments, a tenth, half as many leave cores idle.
+"""
+
+READ = 30
+"""Starts that one core reads while others read others: some 50 ms of work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +122,9 @@ class Rollouts(Worlds, ABC):
         subject: how to build the model. recordings: of one object.
         start: "fit" if segments have starts that are fitted, "rest" if recordings start from rest in the model's
             reference state. threads: see `Batch`.
+
+    Attributes:
+        readings: what recordings say about the state at frames, by recording and frame, where that has been read.
     """
 
     panels, separate, curve = "", True, False
@@ -125,6 +136,7 @@ class Rollouts(Worlds, ABC):
         self.start = start
         self.drives = [drive_of(r, self.drive) for r in self.recordings]
         self._recorded: dict[int, Motion | None] = {}
+        self.readings: dict[tuple[int, int], Reading] = {}
         self._usual: dict[int, np.ndarray] = {}
         self.local = 2 * self.articulation.size if start == "fit" else 0
 
@@ -138,7 +150,8 @@ class Rollouts(Worlds, ABC):
         arm, m = self.articulation, self.articulation.size
         pose, rates, known, found, shows = arm.reference(), np.zeros(m), np.zeros(0), None, None
         if self.start == "fit":
-            found = read_start(self.model, arm, recording, values, noise, first)
+            self.read_starts(index, [first])
+            found = self.readings[index, first]
             pose, rates, shows = found.pose, found.rates, found.tangent
             usual = np.maximum(self.usual_rates(index), 1e-9)
             told = np.isfinite(found.error)
@@ -151,16 +164,28 @@ class Rollouts(Worlds, ABC):
             return block
         return stated(self, block, self.usual_rates(index), found.error, found.shown)
 
+    def read_starts(self, index: int, frames: Sequence[int]) -> None:
+        """Reads the state at frames of a recording, where that has not been done, into `readings`."""
+        recording = self.recordings[index]
+        values, noise = stacked(recording)
+        new = [k for k in frames if (index, k) not in self.readings]
+
+        def read(part: list[int]) -> list[Reading]:
+            return [read_start(self.model, self.articulation, recording, values, noise, k) for k in part]
+
+        found = shared([partial(read, new[k : k + READ]) for k in range(0, len(new), READ)])
+        self.readings.update(zip(((index, k) for k in new), chain.from_iterable(found), strict=True))
+
     def usual_rates(self, index: int) -> np.ndarray:
         """(m,) root mean square of the rates of the coordinates in a recording, where channels tell them.
 
         What no channel tells is taken to move as fast as what they do tell, a radian as a device's size.
         """
         if index not in self._usual:
-            recording, arm = self.recordings[index], self.articulation
-            values, noise = stacked(recording)
-            picked = np.unique(np.linspace(0, len(values) - 1, 24).astype(int))
-            found = [read_start(self.model, arm, recording, values, noise, int(k)) for k in picked]
+            arm, count = self.articulation, len(self.recordings[index].times)
+            picked = np.unique(np.linspace(0, count - 1, 24).astype(int)).tolist()
+            self.read_starts(index, picked)
+            found = [self.readings[index, k] for k in picked]
             size = spans(arm, self.model)
             rates = np.stack([np.where(np.isfinite(f.error), f.rates, np.nan) for f in found]) / size
             squares = np.array([np.mean(r[np.isfinite(r)] ** 2) if np.any(np.isfinite(r)) else np.nan for r in rates.T])
@@ -193,8 +218,8 @@ class Rollouts(Worlds, ABC):
             worlds, impossible = self.worlds_of(each, theta, effects, r)
             first = None if local is None else local[0]
             memories = self._memories(r, worlds, [self.blocks[b] for b in mine], first)
-            most = max(1, TOGETHER // len(worlds))
             for group in _by_length(self.blocks, mine):  # into parts, the same on any number of threads
+                most = max(1, min(TOGETHER // len(worlds), -(-len(group) // PARTS)))
                 for part in (group[k : k + most] for k in range(0, len(group), most)):
                     parts.append((r, part, impossible))
                     jobs.append(partial(self._roll, r, part, worlds, local, memories))
