@@ -27,7 +27,7 @@ Of 32,000 by 190 in 0.6 of the time of 8,000 rows at once, by one thread; 500 an
 WIDE, SEGMENTS = 4000, 30
 """Rows of a long matrix, and segments, that one core factors while others do the next ones: some 20 ms of work.
 
-Half adds a twentieth to the time of one core, double leaves cores idle.
+Twice as many leave cores idle where a recording has 200 segments; half of them take as long together.
 """
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.predictor import Prediction
 from origami_sim.predict.worlds import Worlds
 from origami_sim.threads import leads, told
@@ -77,8 +77,8 @@ class Cache:
 def digest(forward: Worlds, each: Sequence[Hypothesis], theta, local, wanted: Sequence[int]) -> str:
     """Digest of all that a prediction depends on."""
     effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
-    sites = [[(s.effect, s.entities) for s in h.suspects] for h in each]
-    numbers = [f.name for f in forward.subject.nominals]
+    sites = [[(s.effect, s.entities, *map(_number, s.free)) for s in h.suspects] for h in each]
+    numbers = [_number(f) for f in forward.subject.nominals]
     h = hashlib.sha256(repr((_sources(), forward.kind(), numbers, effects, sites, list(wanted))).encode())
     nominal = np.array([f.start for f in forward.subject.nominals])
     model, parameters = forward.world(Hypothesis(), nominal, ())
@@ -102,6 +102,11 @@ def digest(forward: Worlds, each: Sequence[Hypothesis], theta, local, wanted: Se
     for part in forward.inputs():
         h.update(b"-" if part is None else part if isinstance(part, bytes) else np.asarray(part, float).tobytes())
     return h.hexdigest()[:32]
+
+
+def _number(f: Free) -> tuple:
+    """Which number of a model a value is for."""
+    return f.owner, f.name, f.entities, f.recording
 
 
 @cache

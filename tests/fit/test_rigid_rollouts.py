@@ -1,5 +1,6 @@
 """Predictions by rigid panels: tied segments of noise-free swings, devices that float, and bars that become stiff."""
 
+from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,12 +12,13 @@ from origami_sim.bodies import rigid
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
-from origami_sim.fit.hypothesis import Hypothesis, suspects
+from origami_sim.fit.hypothesis import Hypothesis, scaled, suspects
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.unlisted import anywhere
 from origami_sim.model import State
 from origami_sim.pattern import strip
-from origami_sim.predict import rollouts
+from origami_sim.predict import cache, rollouts
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
@@ -254,3 +256,23 @@ def test_every_number_of_a_body_moves_what_is_predicted(name):
     for two, one in zip(both, alone, strict=True):
         assert two[1] == pytest.approx(one[0], abs=1e-9)
         assert np.abs(two[1] - two[0]).max() > 1e-4
+
+
+def test_a_stored_prediction_is_of_the_numbers_that_were_asked_for(tied, tmp_path, monkeypatch):
+    """Two numbers of one effect at one crease, of the same value."""
+    monkeypatch.setattr(cache, "WORTH", 0.0)
+    forward = copy(tied)
+    _, *others = anywhere(forward)
+    one, other = (scaled(s, 1e-4) for s in others[:2])
+    assert (one.effect, one.entities) == (other.effect, other.entities) and one.free[0].name != other.free[0].name
+
+    def predicted(s) -> np.ndarray:
+        theta = [f.start for f in (*forward.subject.nominals, *s.free)]
+        theta[len(forward.subject.nominals)] = 1e-4
+        return np.concatenate(forward.predict(Hypothesis((s,)), np.array([theta])), axis=1)
+
+    fresh = [predicted(s) for s in (one, other)]
+    forward.cache = cache.Cache(tmp_path)
+    for _ in range(2):
+        assert all(np.array_equal(predicted(s), f) for s, f in zip((one, other), fresh, strict=True))
+    assert not np.allclose(*fresh, atol=1e-9) and forward.cache.found == 2
