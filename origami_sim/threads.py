@@ -94,6 +94,22 @@ def shared(jobs: Sequence[Callable[[], T]], progress: Callable[[float], None] | 
     return out
 
 
+@contextmanager
+def in_turn() -> Iterator[None]:
+    """Processes in step do one after the other what the next ones then find done, such as compiling a kernel."""
+    if _team is None:
+        yield
+        return
+    import fcntl  # where processes fork
+
+    file = _team.boards[0][0]
+    fcntl.lockf(file, fcntl.LOCK_EX)  # falls with its process
+    try:
+        yield
+    finally:
+        fcntl.lockf(file, fcntl.LOCK_UN)
+
+
 class Team:
     """Processes that go in step.
 

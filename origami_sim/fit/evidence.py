@@ -205,15 +205,15 @@ class Summed:
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
         wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         tight = np.where(sets.strength, norm / hyper.slabs[-1], 1.0 / wide)
-        full, inverse, value, move = a, a, sets.at, sets.at
+        full, value, move = a, sets.at, sets.at
         for turn in range(ROUNDS):
             if turn:  # as narrow as the normals are that a strength of this size may come from
                 slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
                 tight = np.where(sets.strength, slab, tight)
             full = a + np.eye(k) * (tight**2)[..., None, :]
-            inverse = np.linalg.inv(full)
-            move = (inverse @ (b - sets.at * tight**2)[..., None])[..., 0]
+            move = np.linalg.solve(full, (b - sets.at * tight**2)[..., None])[..., 0]
             value = sets.at + move
+        inverse = np.linalg.inv(full)
         sd = np.sqrt(np.maximum(inverse[..., range(k), range(k)], 1e-300))
         sided = np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0)
         # what lies beyond a bound explains nothing

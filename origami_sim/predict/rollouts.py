@@ -51,11 +51,11 @@ FINER = 20
 FILMED = 64e6
 """Bytes of positions that are kept before they are read; more would not be faster."""
 
-TOGETHER, PARTS = 1024, 4
+TOGETHER, PARTS = 1024, 2
 """Rollouts that are made at once, at most, and parts into which segments are cut, at least, for cores to share.
 
-With a quarter or four times as many rollouts, memory or overhead costs a twentieth more; twice as many parts cost the
-single predictions of a fit, of 250 segments, a tenth, half as many leave cores idle.
+With a quarter or four times as many rollouts, memory or overhead costs a twentieth more. A part costs 5 ms; in one part
+all cores but one wait for the single predictions of a fit, in four more than two gain little.
 """
 
 READ = 30

@@ -17,7 +17,7 @@ from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import plates, skin, sources
 from origami_sim.solve.compose import BITS, compose
 from origami_sim.solve.compose_sheets import asks_change
-from origami_sim.threads import default_threads
+from origami_sim.threads import default_threads, in_turn
 
 APART = 128
 """Bytes between the worlds' stretches of memory on the CPU: two cache lines, because processors fetch them in pairs.
@@ -279,7 +279,7 @@ class Batch:
                 kernel, dim=hi - lo, inputs=[*inputs, *(lo if o is _FIRST else o for o in outputs)], device=self.device
             )
 
-        with COMPILING:
+        with COMPILING, in_turn():
             kernel = getattr(self.program, name)
             wp.load_module(kernel.module, device=self.device)
         if self.threads == 1:
