@@ -160,7 +160,7 @@ class Team:
         except Exception:
             return 0
 
-    def _others(self, kind: tuple[int, int], size: int) -> dict[int, T]:
+    def _others(self, kind: tuple[int, int], size: int) -> dict:
         """What the others made, once all are done; the one that leads goes on alone if one of them is gone."""
         try:
             if self.rank == 0:
@@ -178,7 +178,7 @@ class Team:
                 _out_of_step()
             _disband()
             return {}
-        out: dict[int, T] = {}
+        out: dict = {}
         for rank, (boards, length) in enumerate(zip(self.boards, sizes, strict=True)):
             if rank != self.rank and length:
                 with mmap.mmap(boards[self.round % 2], length, access=mmap.ACCESS_READ) as board:
