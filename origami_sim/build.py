@@ -14,6 +14,7 @@ from origami_sim.masses import Stated, positive
 from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
+from origami_sim.pattern.intersections import overlapping_pairs
 from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, stated
 from origami_sim.statements import statement
@@ -37,7 +38,8 @@ class Sheet(Grounds, Electrodes, Thick):
             creases set, not the stiffness of panels).
 
     Raises:
-        InputError: unknown material, thickness or modulus not positive, faces that cannot be triangulated.
+        InputError: unknown material, thickness or modulus not positive, faces that cannot be triangulated, panels that
+            overlap or pass through each other.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Sheet(Grounds, Electrodes, Thick):
         thickness = converted(thickness, "m", "thickness")
         modulus, density = converted(modulus, "Pa", "modulus"), converted(density, "kg/m^3", "density")
         self.mesh = triangulate(pattern, triangulation)
+        self._refuse_overlap()
         faces = pattern.face_count
         self._names = [m or material for m in pattern.materials]
         chosen = [_material(n, i) for i, n in enumerate(self._names)]
@@ -112,6 +115,16 @@ class Sheet(Grounds, Electrodes, Thick):
             pattern.rest_angles[self.mesh.crease_edge],
         )
         self._electrodes = np.zeros(len(self.mesh.creases) + len(self.mesh.bends), np.int32)
+
+    def _refuse_overlap(self) -> None:
+        found = overlapping_pairs(self.mesh.vertices, self.mesh.triangles)
+        if len(found):
+            one, other = sorted(self.mesh.triangle_face[found[0]].tolist())
+            raise InputError(
+                f"panel {one} and panel {other} overlap at the start" if one != other else f"panel {one} is in itself",
+                field="pattern",
+                allowed="panels that lie beside each other",
+            )
 
     # what a designer states ------------------------------------------------------------------------------------
 

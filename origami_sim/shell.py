@@ -130,6 +130,7 @@ def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -
     upright = np.linalg.norm(found.axes @ np.array(shell.axis), axis=1) < 1e-6 * np.linalg.norm(shell.axis)
     turn = np.arctan2(found.axes[:, 1] @ np.array(shell.axis), found.axes[:, 0] @ np.array(shell.axis))
     membrane, bending = np.zeros((len(triangles), 3, 3)), np.zeros((len(triangles), 3, 3))
+    whole = np.zeros(len(triangles))
     by_panel = [_of_panel(sheet, shell, p) for p in range(sheet.pattern.face_count)]
     plain = shell.elasticity is None and shell.membrane is None and shell.bending is None
     for t, panel in enumerate(model.triangle_panel.tolist()):
@@ -145,13 +146,14 @@ def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -
             by = _turned(turn[t])
             a, d = by.T @ a @ by, by.T @ d @ by
         membrane[t], bending[t] = a, curvature.relaxed(d, found.normal[t][found.loose[t]])
-    laws = [(n, membrane) for n in ("shell_membrane", "shell_membrane_relaxation")]
-    laws += [(n, bending) for n in ("shell_bending", "shell_bending_relaxation")]
-    for effect, matrices in laws:
+        whole[t] = np.abs(d).max()
+    stretch = np.abs(membrane).max(axis=(1, 2), initial=0.0)
+    laws = [(n, membrane, stretch) for n in ("shell_membrane", "shell_membrane_relaxation")]
+    laws += [(n, bending, whole) for n in ("shell_bending", "shell_bending_relaxation")]
+    for effect, matrices, scale in laws:
         if effect not in model.effects:
             continue
-        # what is left of a relaxed direction by rounding must not be negative
-        scale = np.abs(matrices).max(axis=(1, 2), initial=1e-300)
+        # what is left of a relaxed direction by rounding must not be negative, nor all that a lone triangle has
         for c in COMPONENTS:
             row, column = PLACES[c]
             values = matrices[:, row, column]

@@ -15,11 +15,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from origami_sim.build import Sheet
+from origami_sim.pattern.intersections import crossing_pairs
 from origami_sim.solve.skin import Pairs, near_pairs
 from origami_sim.touch import SQUEEZE
 
 from .elastic import Elastic
-from .intersections import crossing_pairs
 
 REACH = 0.5
 """Distance within which pairs are looked at beyond that at which they touch, over the median edge; a step moves no

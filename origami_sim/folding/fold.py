@@ -16,11 +16,11 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern
+from origami_sim.pattern.intersections import crossing_pairs
 
 from .consistency import Vertex, vertices
 from .contact import Contact
 from .elastic import Elastic, Shape
-from .intersections import crossing_pairs
 from .placement import Placement
 
 if TYPE_CHECKING:

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from origami_sim.pattern.intersections import crossing_pairs
+
 from .fold import STRETCH, Folding
-from .intersections import crossing_pairs
 
 WORST = 8
 """Creases that a table of the worst lists."""

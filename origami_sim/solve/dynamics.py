@@ -116,7 +116,7 @@ class Trajectory:
 
     def crossings(self, frame: int = -1) -> np.ndarray:
         """[W] pairs of triangles that pass through each other in a frame; of worlds that went unstable, 0."""
-        from origami_sim.folding.intersections import crossing_pairs  # only who asks waits for its imports
+        from origami_sim.pattern.intersections import crossing_pairs  # only who asks waits for its imports
 
         x = self.x[frame]
         sound = np.all(np.isfinite(x), axis=(0, 2))

@@ -10,8 +10,9 @@ from origami_sim.errors import InputError
 from origami_sim.folding import fold, read, summarise
 from origami_sim.folding.consistency import vertices
 from origami_sim.folding.elastic import Elastic
-from origami_sim.folding.intersections import crossing_pairs
+from origami_sim.folding.motion import model_of
 from origami_sim.pattern import grid, miura, strip, waterbomb
+from origami_sim.pattern.intersections import crossing_pairs
 
 TWIST = np.radians(30)
 
@@ -207,6 +208,8 @@ def test_a_shape_that_lies_in_itself_cannot_be_kept_apart():
     pattern.vertices[4:, 0] = 0.001  # the second panel lies on the first
     with pytest.raises(InputError, match="overlap at the start"):
         fold(pattern, touch=True)
+    model = model_of(fold(pattern, touch=False), thickness=1e-4, material="paper", crease_stiffness=1e-3)[0]
+    assert len(model.triangles) == 4
 
 
 def test_a_ring_is_not_folded_about_a_circle_by_stretching_it(tmp_path):

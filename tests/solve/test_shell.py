@@ -18,6 +18,7 @@ from origami_sim import (
     isotropic,
     orthotropic,
     rigid,
+    sheet,
     simulate,
     stable_step,
     uncreased,
@@ -222,6 +223,13 @@ def test_a_shell_keeps_its_energy_while_it_swings():
         ranges.append(np.ptp(motion.energy_balance()))
     assert ranges[0] < 0.1 * max(e.max() for e in motion.energies.values())
     assert ranges[2] < 0.35 * ranges[1] < 0.15 * ranges[0]
+
+
+def test_a_lone_triangle_bends_without_any_moment():
+    """Nothing but rounding is left of its stiffness: none of it may be negative."""
+    far = [(0, 0, 0), (20, 0, 0), (20, 20, 0), (5, 30, 0), (30, 30, 0), (30, 50, 0)]
+    parameters = Sheet(sheet(np.array(far) * 1e-3, [(0, 1, 2), (3, 4, 5)]), thickness=1e-3).shell().build()[1]
+    assert not any(np.any(parameters["shell_bending", f"stiffness_{c}"]) for c in ("11", "22", "12", "66", "16", "26"))
 
 
 def test_what_no_sheet_can_be_is_refused():

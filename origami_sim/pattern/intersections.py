@@ -1,4 +1,4 @@
-"""Triangles of a folded sheet that pass through each other."""
+"""Triangles of a sheet that pass through each other, or lie on each other in one plane."""
 
 import numpy as np
 
@@ -19,12 +19,24 @@ def crossing_pairs(x, triangles, depth: float) -> np.ndarray:
     Args:
         x: [N, 3] positions [m]. triangles: [T, 3] node triples. depth: [m], the sheet's thickness.
     """
-    found = [_crossing(x, triangles, pairs, depth) for pairs in _near_pairs(x, triangles)]
+    found = [_crossing(x, triangles, pairs, depth) for pairs in _near_pairs(x, triangles, 2)]
     return np.concatenate(found) if found else np.zeros((0, 2), dtype=np.int64)
 
 
-def _near_pairs(x, triangles):
-    """Yield pairs [P, 2] of triangles that share no edge and whose boxes overlap."""
+def overlapping_pairs(x, triangles) -> np.ndarray:
+    """Return the pairs [P, 2] of triangles that cross, or that both cover a part of one plane, as no sheet does.
+
+    Neighbours count as well where one lies folded back on the other.
+
+    Args:
+        x: [N, 3] positions [m]. triangles: [T, 3] node triples.
+    """
+    found = [crossing_pairs(x, triangles, 0.0), *(_covering(x, triangles, p) for p in _near_pairs(x, triangles, 3))]
+    return np.concatenate(found)
+
+
+def _near_pairs(x, triangles, fewer: int):
+    """Yield pairs [P, 2] of triangles whose boxes overlap, with fewer nodes in common than so many."""
     from shapely import STRtree, box  # only here: a start without patterns need not wait for it
 
     corners = x[triangles]
@@ -37,8 +49,24 @@ def _near_pairs(x, triangles):
         keep = (one < other) & (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
         one, other = one[keep], other[keep]
         shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
-        if np.any(shared < 2):
-            yield np.column_stack([one, other])[shared < 2]
+        if np.any(shared < fewer):
+            yield np.column_stack([one, other])[shared < fewer]
+
+
+def _covering(x, triangles, pairs) -> np.ndarray:
+    """Return those of the pairs that lie in one plane and have an area in common: no side of either parts them."""
+    slack = SLACK * float(np.ptp(x, axis=0).max())
+    a, b = x[triangles[pairs[:, 0]]], x[triangles[pairs[:, 1]]]
+    flat = np.maximum(np.abs(_heights(b, a)), np.abs(_heights(a, b))).max(axis=1) <= slack
+    a, b, pairs = a[flat], b[flat], pairs[flat]
+    normal, apart = _normals(a), np.zeros(len(a), bool)
+    for t in (a, b):
+        for k in range(3):
+            side = np.cross(normal, t[:, (k + 1) % 3] - t[:, k])
+            side /= np.maximum(np.linalg.norm(side, axis=1), 1e-300)[:, None]
+            one, other = (np.einsum("pca,pa->pc", each, side) for each in (a, b))
+            apart |= np.maximum(one.min(1) - other.max(1), other.min(1) - one.max(1)) > -slack
+    return pairs[~apart]
 
 
 def _crossing(x, triangles, pairs, depth) -> np.ndarray:
