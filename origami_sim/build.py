@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.bodies import rigid
+from origami_sim.curvature import ALIKE
 from origami_sim.dielectric import Electrodes
 from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
@@ -16,7 +17,7 @@ from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
 from origami_sim.quantities import converted
-from origami_sim.shell import Shell, assign, stated
+from origami_sim.shell import Shell, assign, matrices, plates, stated
 from origami_sim.statements import statement
 from origami_sim.thick import Hinge, Thick
 from origami_sim.touch import Touch, refuse_overlap
@@ -421,6 +422,7 @@ class Sheet(Grounds, Electrodes, Thick):
         contacts, shares = self._grounded()
         tri = np.array([c.triangle for c in contacts], int)
         carriers = [c.pad or mesh.triangles[c.triangle] for c in contacts]
+        elastic = None if self._shell is None else matrices(self, self._shell)
         model = Model(
             position=mesh.vertices,
             free=self._free,
@@ -436,6 +438,7 @@ class Sheet(Grounds, Electrodes, Thick):
             electrodes=self._electrodes,
             effects=tuple(self._effects),
             names={**self._labels, "contact": tuple(c.name for c in contacts)},
+            plates=ALIKE if elastic is None or self._shell is None else plates(self, self._shell, elastic[1]),
         )
         p = Parameters(model)
         mass = self._node_masses()
@@ -446,8 +449,8 @@ class Sheet(Grounds, Electrodes, Thick):
         stiffness = self.membrane * self._bar_sections() / lengths
         if "bars" in self._effects:
             p.set("bars", "rest_length", lengths).set("bars", "stiffness", stiffness)
-        if self._shell is not None:
-            assign(self, self._shell, model, p)
+        if elastic is not None and self._shell is not None:
+            assign(self._shell, *elastic, model, p)
         if self.membrane_damping > 0:
             reduced = 1.0 / (1.0 / mass[mesh.bars]).sum(1)
             p.set("bar_viscosity", "viscosity", 2 * self.membrane_damping * np.sqrt(stiffness * reduced))

@@ -8,7 +8,8 @@ as in the element of Morley (1968, Aeronautical Quarterly 19, 149) and in the di
 normals (Grinspun, Gingold, Reisman & Zorin 2006, Computer Graphics Forum 25, 547). The two sides of a hinge share its
 angle, phi_left + phi_right = theta; how they share it is no further unknown here but a combination of the hinge angles
 around, the smallest that is exact where the curvature is constant. Deflections are then a part of Morley's, which keeps
-his convergence; angles stay angles at any rotation of the sheet, so that rigid motions cost nothing.
+his convergence; angles stay angles at any rotation of the sheet, so that rigid motions cost nothing. Between triangles
+of different rigidity the curvature across their line jumps so that the moment does not (`_Mesh.jump`).
 
 At an edge without a neighbour (a border, a crease) phi_e is whatever leaves no moment across the edge: `relaxed` takes
 that direction out of the rigidity. Beside a triangle that is held, the edge keeps to the plane of the held triangle.
@@ -39,6 +40,9 @@ RINGS = 4
 CONDITION = 1e3
 """Largest condition number of the equations of exactness; beyond it another ring is asked. Ten times less changes
 nothing but corners, ten times more lets needle-like corners amplify."""
+
+ALIKE = np.zeros((0, 6))
+"""Plates of which none differs from the others."""
 
 OUTER = 0.3
 """Weight of each further ring: less keeps stencils short, more spreads them; twice or half moves errors by a tenth."""
@@ -138,24 +142,32 @@ def relaxed(rigidity: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 def of(model: "Model") -> Curvature:
     """The weights of a model's triangles in its reference state."""
-    return curvature(model.position, model.triangles, model.bends, model.free)
+    return curvature(model.position, model.triangles, model.bends, model.free, model.plates)
 
 
-def curvature(position: np.ndarray, triangles: np.ndarray, bends: np.ndarray, free: np.ndarray) -> Curvature:
+def curvature(
+    position: np.ndarray,
+    triangles: np.ndarray,
+    bends: np.ndarray,
+    free: np.ndarray,
+    plates: np.ndarray = ALIKE,
+) -> Curvature:
     """The weights of a mesh in its reference state.
 
     Args:
         position: [N, 3] [m]. triangles: [T, 3]. bends: [Q, 4] hinges i, j, k, l. free: [N, 3] 0 where held.
+        plates: [T, 6] bending stiffness D11, D22, D12, D66, D16, D26 of the triangles in their axes, as `axes_of` has
+            them, up to a common factor; empty: that of one material throughout.
     """
-    given = (position, float), (triangles, np.int64), (bends, np.int64), (free, float)
+    given = (position, float), (triangles, np.int64), (bends, np.int64), (free, float), (plates, float)
     return _cached(*((np.asarray(a, kind).tobytes(), a.shape) for a, kind in given))
 
 
 @functools.lru_cache(maxsize=16)
-def _cached(position, triangles, bends, free) -> Curvature:
-    x, mask = (np.frombuffer(data, float).reshape(shape) for data, shape in (position, free))
+def _cached(position, triangles, bends, free, plates) -> Curvature:
+    x, mask, stiff = (np.frombuffer(data, float).reshape(shape) for data, shape in (position, free, plates))
     t, b = (np.frombuffer(data, np.int64).reshape(shape) for data, shape in (triangles, bends))
-    return _Mesh(x, t, b, mask).curvature()
+    return _Mesh(x, t, b, mask, stiff).curvature()
 
 
 def _directions(normal: np.ndarray) -> np.ndarray:
@@ -186,9 +198,13 @@ class _Mesh:
         pairs: triangle and edge left and right of each hinge. hinges: those of each triangle.
         edge, outward: [T, 3, 2] edges and their unit normals. length: [T, 3]. area: [T].
         unit: [T, 3, 3] turns of the edges for unit curvature. loose: [T, 3] edges without a neighbour. held: [T].
+        stiff: [T, 3, 3] bending stiffness; nothing where all are alike.
     """
 
-    def __init__(self, position: np.ndarray, triangles: np.ndarray, bends: np.ndarray, free: np.ndarray):
+    def __init__(
+        self, position: np.ndarray, triangles: np.ndarray, bends: np.ndarray, free: np.ndarray, plates: np.ndarray
+    ):
+        self.stiff = plates[:, [[0, 2, 4], [2, 1, 5], [4, 5, 3]]]
         self.axes = axes_of(position, triangles)
         self.flat = np.einsum("tka,tba->tkb", position[triangles] - position[triangles[:, :1]], self.axes)
         self.edge = np.roll(self.flat, -1, axis=1) - self.flat
@@ -312,24 +328,30 @@ class _Mesh:
         for q, ((a, _), (b, _)) in self.pairs.items():
             if self.held[a] or self.held[b]:
                 continue
-            if self.loose[b].sum() > self.loose[a].sum():
+            # the one of which borders leave more open; of two alike the stiffer one, which it bends less
+            if self._asked(b) > self._asked(a):
                 a, b = b, a
+            if not self._relaxed_alike(a, b, q):
+                continue
             frames = {a: np.eye(3)}
             self.across(a, q, frames)
-            if not self._relaxed_alike(a, b, frames[b]):
-                continue
             back = np.linalg.inv(frames[b])
             difference = {f: own[a].get(f, 0.0) - back @ own[b].get(f, np.zeros(3)) for f in {**own[a], **own[b]}}
             weight = BESIDE_HELD if beside[a] or beside[b] else VARIATION
+            if len(self.stiff):  # as much as the softer one would ask: it may curve on where the other cannot
+                weight *= np.divide(*sorted(s[0, 0] for s in self.in_line(a, q)))
             out.append((a, 0.0, weight * (self.area[a] + self.area[b]) / 3, difference))
         return out
 
-    def _relaxed_alike(self, a: int, b: int, frame: np.ndarray) -> bool:
+    def _asked(self, t: int) -> tuple[int, float]:
+        return int(self.loose[t].sum()), float(np.trace(self.stiff[t])) if len(self.stiff) else 0.0
+
+    def _relaxed_alike(self, a: int, b: int, q: int) -> bool:
         """Whether what borders leave open in the curvature of triangle b they leave open in that of a as well."""
-        known = voigt(self.outward[a][self.loose[a]])
+        known, turned = voigt(self.outward[a][self.loose[a]]), self.turned(a, q)
         return all(
             np.any(np.abs(known - v).max(axis=1, initial=0.0) < 1e-6)
-            for v in voigt(self.outward[b][self.loose[b]]) @ np.linalg.inv(frame).T
+            for v in voigt(self.outward[b][self.loose[b]]) @ np.linalg.inv(turned).T
         )
 
     def share(self, q: int) -> dict[int, float]:
@@ -370,13 +392,50 @@ class _Mesh:
         return np.sum(turns, axis=0)
 
     def across(self, t: int, f: int, frames: dict[int, np.ndarray]) -> int:
-        """The triangle on the other side of a hinge; adds its frame, which turns curvatures into its axes."""
-        (a, ka), (b, kb) = self.pairs[f] if t == self.pairs[f][0][0] else self.pairs[f][::-1]
-        other, own, its = b, self.edge[a, ka], -self.edge[b, kb]
+        """The triangle on the other side of a hinge; adds its frame, which turns curvatures into its axes and state."""
+        other = self.sides(t, f)[1][0]
         if other not in frames:
-            angle = np.arctan2(its[1], its[0]) - np.arctan2(own[1], own[0])
-            frames[other] = _rotation(angle) @ frames[t]
+            frames[other] = self.turned(t, f) @ frames[t]
+            if len(self.stiff):
+                frames[other] = self.jump(t, f) @ frames[other]
         return other
+
+    def sides(self, t: int, f: int) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Triangle and edge on this side of a hinge, and on the other one."""
+        one, other = self.pairs[f]
+        return (one, other) if t == one[0] else (other, one)
+
+    def turned(self, t: int, f: int) -> np.ndarray:
+        """Curvature components [3, 3] in the axes of the triangle on the other side of a hinge."""
+        (a, ka), (b, kb) = self.sides(t, f)
+        own, its = self.edge[a, ka], -self.edge[b, kb]
+        return _rotation(np.arctan2(its[1], its[0]) - np.arctan2(own[1], own[0]))
+
+    def in_line(self, t: int, f: int) -> list[np.ndarray]:
+        """Bending stiffness [3, 3] across and along a hinge, on this side of it and on the other one."""
+        back = [(c, np.linalg.inv(_axes(self.outward[c, k]))) for c, k in self.sides(t, f)]
+        return [b.T @ self.stiff[c] @ b for c, b in back]
+
+    def jump(self, t: int, f: int) -> np.ndarray:
+        """Curvature [3, 3] on the other side of a hinge, of that which the sheet would have there if it went on alike.
+
+        Along their line the curvature and the twist of both sides are the same, across it their moments.
+        """
+        b, kb = self.sides(t, f)[1]
+        one, other = (s[0] for s in self.in_line(t, f))
+        if np.allclose(one, other, rtol=1e-9, atol=1e-9 * other[0]):  # what rounding makes of one material
+            return np.eye(3)
+        step = np.eye(3)
+        step[0] = one / other[0]
+        step[0, 1:] -= other[1:] / other[0]
+        axes = _axes(self.outward[b, kb])
+        return np.linalg.inv(axes) @ step @ axes
+
+
+def _axes(normal: np.ndarray) -> np.ndarray:
+    """Curvature components [3, 3] across and along a line, and twice their twist, of those in the triangle's axes."""
+    c, s = normal
+    return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
 
 
 def _normal(edge: np.ndarray) -> np.ndarray:

@@ -48,6 +48,8 @@ class Model:
         pad_triangles: [4 Q] triangles that carry the corners of patches, of those that can touch other parts.
         pad_weights: [4 Q, 3] barycentric weights of these corners. pad_heights: [4 Q] of the patches' middle planes
             above the panels' [m]. pad_thickness: [Q] [m].
+        plates: [T, 6] bending stiffness D11, D22, D12, D66, D16, D26 [N m] of the triangles of a shell in their axes
+            (`curvature.axes_of`), by which neighbours share the turn of the line between them; empty: all are alike.
     """
 
     position: np.ndarray
@@ -71,6 +73,7 @@ class Model:
     pad_weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     pad_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
     pad_thickness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    plates: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import model_line  # only who looks pays for it
@@ -145,7 +148,7 @@ class Model:
         for f in fields(self):
             if f.name == "channels" or (f.name in ("panels", "carriers") and self.panels == "elastic"):
                 continue
-            if f.name in PADS and not len(self.pad_triangles):
+            if (f.name in PADS and not len(self.pad_triangles)) or (f.name == "plates" and not len(self.plates)):
                 continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())

@@ -119,46 +119,63 @@ def _positive(name: str, given: ArrayLike) -> np.ndarray:
     return m
 
 
-def assign(sheet: "Sheet", shell: Shell, model: Model, parameters: Parameters) -> None:
-    """Sets the stiffness of every triangle, from its panel's thickness, material and patch.
+def matrices(sheet: "Sheet", shell: Shell) -> tuple[np.ndarray, np.ndarray]:
+    """Membrane [N/m] and bending stiffness [N m] of every triangle, both [T, 3, 3], in its axes.
+
+    They follow from the panels' thickness, material and patch.
 
     Raises:
         InputError: the material's axis stands upright on a panel.
     """
-    triangles = model.triangles
-    found = curvature.of(model)
-    upright = np.linalg.norm(found.axes @ np.array(shell.axis), axis=1) < 1e-6 * np.linalg.norm(shell.axis)
-    turn = np.arctan2(found.axes[:, 1] @ np.array(shell.axis), found.axes[:, 0] @ np.array(shell.axis))
-    membrane, bending = np.zeros((len(triangles), 3, 3)), np.zeros((len(triangles), 3, 3))
-    whole = np.zeros(len(triangles))
+    axes = curvature.axes_of(sheet.mesh.vertices, sheet.mesh.triangles)
+    along, across = (axes[:, k] @ np.array(shell.axis) for k in (0, 1))
+    upright = np.hypot(along, across) < 1e-6 * np.linalg.norm(shell.axis)
+    turn = np.arctan2(across, along)
+    membrane, bending = np.zeros((len(axes), 3, 3)), np.zeros((len(axes), 3, 3))
     by_panel = [_of_panel(sheet, shell, p) for p in range(sheet.pattern.face_count)]
     plain = shell.elasticity is None and shell.membrane is None and shell.bending is None
-    for t, panel in enumerate(model.triangle_panel.tolist()):
+    for t, panel in enumerate(sheet.mesh.triangle_face.tolist()):
         a, d = by_panel[panel]
         if not plain:
             if upright[t]:
                 raise InputError(
                     "the material's axis stands upright on a panel",
-                    field=f"axis on {model.name('panel', panel)}",
+                    field=f"axis on panel {panel}",
                     value=list(shell.axis),
                     allowed="a direction with a part in every panel's plane",
                 )
             by = _turned(turn[t])
             a, d = by.T @ a @ by, by.T @ d @ by
-        membrane[t], bending[t] = a, curvature.relaxed(d, found.normal[t][found.loose[t]])
-        whole[t] = np.abs(d).max()
-    stretch = np.abs(membrane).max(axis=(1, 2), initial=0.0)
-    laws = [(n, membrane, stretch) for n in ("shell_membrane", "shell_membrane_relaxation")]
+        membrane[t], bending[t] = a, d
+    return membrane, bending
+
+
+def plates(sheet: "Sheet", shell: Shell, bending: np.ndarray) -> np.ndarray:
+    """Bending stiffness of the triangles as `Model.plates` has it; empty if the panels are alike."""
+    first, *others = (_of_panel(sheet, shell, p)[1] for p in range(sheet.pattern.face_count))
+    if all(np.array_equal(first, d) for d in others):
+        return curvature.ALIKE
+    rows, columns = zip(*(PLACES[c] for c in COMPONENTS), strict=True)
+    return bending[:, rows, columns]
+
+
+def assign(shell: Shell, membrane: np.ndarray, whole: np.ndarray, model: Model, parameters: Parameters) -> None:
+    """Sets the stiffness of every triangle, of which borders and creases take a part of the bending away."""
+    found = curvature.of(model)
+    loosened = zip(whole, found.normal, found.loose, strict=True)
+    bending = np.array([curvature.relaxed(d, n[loose]) for d, n, loose in loosened]).reshape(whole.shape)
+    laws = [(n, membrane, membrane) for n in ("shell_membrane", "shell_membrane_relaxation")]
     laws += [(n, bending, whole) for n in ("shell_bending", "shell_bending_relaxation")]
-    for effect, matrices, scale in laws:
+    for effect, values, before in laws:
         if effect not in model.effects:
             continue
         # what is left of a relaxed direction by rounding must not be negative, nor all that a lone triangle has
+        scale = np.abs(before).max(axis=(1, 2), initial=1e-300)
         for c in COMPONENTS:
             row, column = PLACES[c]
-            values = matrices[:, row, column]
-            values = np.where(np.abs(values) < 1e-12 * scale, 0.0, values)
-            parameters.set(effect, f"stiffness_{c}", values[:, None])
+            entries = values[:, row, column]
+            entries = np.where(np.abs(entries) < 1e-12 * scale, 0.0, entries)
+            parameters.set(effect, f"stiffness_{c}", entries[:, None])
         if effect.endswith("relaxation"):
             for i, (share, time) in enumerate(shell.relaxation, 1):
                 parameters.set(effect, f"share_{i}", share).set(effect, f"time_{i}", time)

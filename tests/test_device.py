@@ -1,6 +1,7 @@
 """Devices as files: run, shown, compared and saved by the name of a file; only what is named is executed."""
 
 import copy
+import dataclasses
 import json
 import re
 import textwrap
@@ -14,7 +15,7 @@ from origami_sim.design import read_design, write_design
 from origami_sim.device import device_module, lasting
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
-from origami_sim.pattern import kresling, miura, strip
+from origami_sim.pattern import kresling, miura, strip, uncreased
 from origami_sim.quantities import parsed, si
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.results import load_run
@@ -330,6 +331,17 @@ def test_show_draws_scenes(scene, call, tmp_path):
     assert (code, err) == (0, "") and (tmp_path / "x.png").stat().st_size > 10000
     if scene == "de_fold":
         assert json.loads(out)["creases"]["marks"][0] == "flat, electrodes of group 0"
+
+
+def test_a_shell_of_two_rigidities_is_saved_whole(tmp_path):
+    """With the stiffness by which the turn of their line is shared: all else alike, the hash would differ."""
+    sheet = Sheet(uncreased(strip([0.01, 0.02], 0.01)), thickness=1e-3).panel([1], rigidity=1e-3).shell()
+    model, parameters = sheet.build()
+    assert model.plates.shape == (len(model.triangles), 6)
+    path = write_design(tmp_path / "shell.toml", (model, parameters), Drive())
+    again, numbers, _ = device_module(str(path)).build(scene_settings(device_module(str(path))))
+    assert again.hash == model.hash != dataclasses.replace(model, plates=model.plates[:0]).hash
+    assert numbers.hash == parameters.hash
 
 
 @pytest.mark.parametrize("scene", ["box", "crawler", "de_fold", "cube_toss", "bifold", "multi_field_sheet"])
