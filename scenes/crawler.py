@@ -51,6 +51,7 @@ class Strip:
         axial: E A by cell [N]. patch: its width by cell [m].
         hinge, lossy: of stations within the strip, what half a cell on either side bends [N m/rad], and loses
             [N m s/rad].
+        beyond: turn per moment of the sheet that bends on under a patch, by cell [rad/(N m)].
     """
 
     x: np.ndarray
@@ -64,6 +65,7 @@ class Strip:
     axial: np.ndarray
     hinge: np.ndarray
     lossy: np.ndarray
+    beyond: np.ndarray
 
     @classmethod
     def of(cls, s: Settings) -> "Strip":
@@ -87,7 +89,8 @@ class Strip:
         share = half**2 * bare * middle / (0.5 * length)
         lossy = s.loss_time * (hinge if s.patch_loss else hinge**2 * (share[:-1] + share[1:] + ends))
         axial = s.membrane * (s.modulus * s.thickness * middle + mae.modulus * s.patch_thickness * patch)
-        return cls(x, width, owner, length, middle, patch, bare * middle, rigidity, axial, hinge, lossy)
+        beyond = (np.append(ends, 0.0) + np.append(0.0, ends)) * (patch > 0)
+        return cls(x, width, owner, length, middle, patch, bare * middle, rigidity, axial, hinge, lossy, beyond)
 
     @property
     def borders(self) -> np.ndarray:
@@ -100,7 +103,7 @@ class Strip:
 
 
 def triangles(d: Strip, across: int) -> Pattern:
-    """A sheet with creases at the patches' borders, and diagonals that are each other's mirror image left and right.
+    """A sheet without creases, and with diagonals that are each other's mirror image left and right.
 
     Vertex (across + 1) s + j lies at station s; the triangles of a cell follow each other.
     """
@@ -112,11 +115,7 @@ def triangles(d: Strip, across: int) -> Pattern:
             a, b = k * row + j, (k + 1) * row + j
             left = 2 * j < across
             faces += [(a, b, b + 1), (a, b + 1, a + 1)] if left else [(a, b, a + 1), (b, b + 1, a + 1)]
-    pattern = uncreased_sheet(vertices, faces)
-    for e, (a, b) in enumerate(pattern.edges.tolist()):
-        if a // row == b // row and a // row in d.borders:
-            pattern.assignments[e], pattern.fold_angles[e] = "U", np.nan
-    return pattern
+    return uncreased_sheet(vertices, faces)
 
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
@@ -133,16 +132,14 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     panels = sheet.pattern.face_count // len(d.length)  # of a cell
     cell = np.arange(sheet.pattern.face_count) // panels
     station = sheet.mesh.creases[:, 1] // (across + 1)
-    hinge, lossy = (values[station - 1] / across for values in (d.hinge, d.lossy))
-    sheet.crease(stiffness=hinge)
     if s.guided:
-        sheet.fix(nodes=range(2 * len(d.x)), axes="y").set("crease_viscosity", viscosity=lossy)
+        sheet.crease(stiffness=d.hinge[station - 1])
+        sheet.fix(nodes=range(2 * len(d.x)), axes="y").set("crease_viscosity", viscosity=d.lossy[station - 1])
         # cells do not twist: a cell's diagonal would couple twist to bending, which a sheet does not, and soften bare
         # cells
         sheet.panel(cell, rigidity=_bonded(s) * s.twist)
     else:
         _as_shell(s, d, sheet, cell)
-        sheet.set("crease_relaxation", stiffness_1=lossy / s.relaxation_time, time_1=s.relaxation_time)
     for number, size, sign, factor in (
         (1, s.big_width, s.polarity, s.big_moment),
         (2, s.small_width, -s.polarity, 1.0),
@@ -189,11 +186,13 @@ def _bonded(s: Settings) -> float:
 def _as_shell(s: Settings, d: Strip, sheet: Sheet, cell: np.ndarray):
     """Makes a strip a shell whose losses relax: those of the sheet, or of the patches as well."""
     ratio = s.loss_time / s.relaxation_time
-    share = np.full(len(d.length), ratio) if s.patch_loss else ratio * d.bare / d.rigidity
+    rigidity = 1.0 / (1.0 / d.rigidity + d.beyond / d.length)
+    lost = rigidity * (d.bare / d.rigidity**2 + d.beyond / d.length)  # of the moments squared, where the sheet bends
+    share = np.full(len(d.length), ratio) if s.patch_loss else ratio * lost
     poisson = s.poisson if s.anticlastic else 0.0
     tension = (d.axial / d.middle)[cell]
     plane = isotropic(1.0, poisson)
-    sheet.panel(np.arange(len(cell)), rigidity=(d.rigidity / d.middle)[cell])
+    sheet.panel(np.arange(len(cell)), rigidity=(rigidity / d.middle)[cell])
     sheet.shell(poisson=poisson, relaxation=[(ratio, s.relaxation_time)])
     sheet.set("shell_bending_relaxation", share_1=share[cell])
     sheet.set("shell_membrane", stiffness_11=tension * plane[0, 0], stiffness_22=tension * plane[1, 1],

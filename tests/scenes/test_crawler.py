@@ -26,7 +26,7 @@ CHAIN = 25.53
 RELAXING, CURVING = 25.34, 28.15
 """With cells of 1.25 mm: losses of a free strip, `--relaxing`; a bridge that curves across as well, `--free`."""
 
-STIFFENING = {0.005: 1.149, 0.04: 1.112, 0.2: 1.100}
+STIFFENING = {0.005: 1.153, 0.04: 1.116, 0.2: 1.104}
 """Turn of that bridge over its turn in plane strain, under the couples that the fields [T] bring (`--bend`)."""
 
 SLOW = pytest.mark.slow
@@ -280,9 +280,10 @@ def turn(s, poisson):
 
 
 def test_free_strip_bends_as_a_beam_does_in_plane_strain():
-    """1.7 % softer than the beam with cells of 2.5 mm, 0.8 % with 1.25; without creases at the patches 16, 8 % less."""
-    s = free(anticlastic=False)
-    assert bridge(s) == pytest.approx(turn(s, s.poisson), rel=0.02)
+    """0.5 % softer than the beam with cells of 5 mm, 0.2 % with 2.5; by halves of each line's turn 31, 16 % less."""
+    for cell, error in ((0.005, 0.01), (0.0025, 0.005)):
+        s = free(cell, anticlastic=False)
+        assert bridge(s) == pytest.approx(turn(s, s.poisson), rel=error)
 
 
 def test_free_strip_bends_between_plane_strain_and_plane_stress():
@@ -315,7 +316,7 @@ def bent(s, fields):
 
 @SLOW
 def test_free_bridge_stiffens_where_it_bends_far():
-    """1.154, 1.112, 1.102 at 22, 68, 85 degrees, with cells of 1.25 mm; 1.136, 1.095, 1.088 with 2.5 mm."""
+    """1.157, 1.119, 1.111 at 22, 68, 85 degrees, with cells of 1.25 mm; 1.156, 1.115, 1.110 with 2.5 mm."""
     softer = bent(free(0.00125), STIFFENING) / bent(free(0.00125, anticlastic=False), STIFFENING)
     np.testing.assert_allclose(softer, list(STIFFENING.values()), rtol=0.01)
 
@@ -343,14 +344,11 @@ def test_free_strip_weighs_stands_and_loses_as_the_guided_one(cell):
 def test_free_strip_loses_as_a_viscous_one_where_it_is_slow(cell):
     """Branches whose stiffness times their time is the viscosity; a turn at 265 Hz meets 99 % of it.
 
-    Moment of a Maxwell branch out of phase: c w / (1 + (w tau)^2). Their time hardly shortens the step.
+    Moment of a Maxwell branch out of phase: c w / (1 + (w tau)^2). Their time shortens the step by 5.2 % at most.
     """
     s = free(cell, anticlastic=False)
-    (model, p), q = crawler.build(s)[:2], crawler.build(s.replace(guided=True))[1]
+    model, p, _ = crawler.build(s)
     d, across = crawler.Strip.of(s), crawler.Strip.of(s).across(s)
-    time, viscosity = p["crease_relaxation", "time_1"][:, 0], q["crease_viscosity", "viscosity"][:, 0]
-    given = p["crease_relaxation", "stiffness_1"][:, 0] * time
-    np.testing.assert_allclose(given, np.repeat(viscosity[d.borders - 1] / across, across))
     bare = s.modulus / (1 - s.poisson**2) * s.thickness**3 / 12
     of = model.triangle_panel // (2 * across)
     lost = d.rigidity[of] * p["shell_bending_relaxation", "share_1"][:, 0] * s.relaxation_time
@@ -358,7 +356,7 @@ def test_free_strip_loses_as_a_viscous_one_where_it_is_slow(cell):
     assert set(p["shell_bending_relaxation", "time_1"][:, 0]) == {s.relaxation_time}
     assert 1 / (1 + (2 * np.pi * 265.0 * s.relaxation_time) ** 2) > 0.99
     slow = crawler.build(s.replace(relaxation_time=1e-3))
-    assert stable_step(model, p).dt > 0.95 * stable_step(*slow[:2]).dt
+    assert stable_step(model, p).dt > 0.945 * stable_step(*slow[:2]).dt
 
 
 def test_feet_turn_with_their_pads_on_any_mesh():
@@ -395,22 +393,21 @@ def plane():
 
 @SLOW
 def test_free_strip_walks_alike_with_halved_cells(plane):
-    """26.09 and 26.22 mm; with a branch of 1 ms 25.53 and 26.20 mm."""
+    """25.29 and 25.18 mm."""
     far, near, motion = plane
     assert near == pytest.approx(far, rel=0.02)
     assert np.abs(motion.x[..., 1].mean(axis=1)).max() < 5e-5
 
 
 @SLOW
-@pytest.mark.xfail(reason="3.0 and 3.5 % beyond it: the soft bridge is 1.7, meshes scatter by 1.9 %", strict=True)
-def test_free_strip_in_plane_strain_comes_to_walk_as_the_chain(plane):
-    errors = [stride / RELAXING - 1 for stride in plane[:2]]
-    assert errors[1] == pytest.approx(0.0, abs=0.03)
-    assert errors[1] < 0.6 * errors[0]
+def test_free_strip_in_plane_strain_walks_as_the_chain(plane):
+    """0.2 and 0.6 % from it."""
+    for stride in plane[:2]:
+        assert stride == pytest.approx(RELAXING, rel=0.01)
 
 
 @SLOW
-@pytest.mark.xfail(reason="4.3 % short of it; with cells of 5 mm 3.2, with 1.25 mm 5.3 %", strict=True)
+@pytest.mark.xfail(reason="4.6 % short of it, whose ground does not touch where it has curved across", strict=True)
 def test_free_strip_walks_as_a_chain_that_curves_across():
     stride, motion = walk(2, guided=False)
     assert np.abs(motion.x[..., 1].mean(axis=1)).max() < 5e-5
@@ -440,6 +437,15 @@ def test_end_correction_makes_the_borders_of_the_patches_softer():
     assert len(borders) == 4
     np.testing.assert_allclose(np.sort(more)[-4:], np.sort(expected), rtol=1e-6)
     assert np.abs(np.sort(more)[:-4]).max() < 1e-9 * expected.max()
+
+
+def test_the_end_correction_softens_a_free_strip_as_much():
+    """Turn of the bridge with the big patch held: more by that of bare sheet of length c h, 6 %."""
+    s, c = free(anticlastic=False), read_calibration("crease_bridge").end_correction
+    d = crawler.Strip.of(s)
+    bare = s.modulus / (1 - s.poisson**2) * s.thickness**3 / 12
+    more = c * s.thickness / (bare * d.width[d.borders[2]])
+    assert bridge(s.replace(end_correction=c)) == pytest.approx(turn(s, s.poisson) + more, rel=0.01)
 
 
 @SLOW
