@@ -350,12 +350,14 @@ def candidates(
     return [c for c in sorted(out, key=lambda c: c[0]) if not (c[2].key in seen or seen.add(c[2].key))]
 
 
-def sampled(base: Settings, n: int, cycles: int, seed: int = 0) -> list[tuple[dict, Trial]]:
-    """Points of a Latin hypercube over `SAMPLED`, rounded to three digits."""
-    unit = qmc.LatinHypercube(len(SAMPLED), rng=np.random.default_rng(seed)).random(n)
+def sampled(
+    base: Settings, n: int, cycles: int, seed: int = 0, ranges: Mapping[str, tuple[float, float]] = SAMPLED
+) -> list[tuple[dict, Trial]]:
+    """Points of a Latin hypercube over ranges of unknowns, rounded to three digits."""
+    unit = qmc.LatinHypercube(len(ranges), rng=np.random.default_rng(seed)).random(n)
     out = []
     for row in unit:
-        where = {k: float(f"{lo + u * (hi - lo):.3g}") for (k, (lo, hi)), u in zip(SAMPLED.items(), row, strict=True)}
+        where = {k: float(f"{lo + u * (hi - lo):.3g}") for (k, (lo, hi)), u in zip(ranges.items(), row, strict=True)}
         out.append((where, Trial(apply(base, **where), cycles)))
     return out
 
