@@ -1,5 +1,7 @@
 """Fixtures shared by the tests of effects and solvers."""
 
+import os
+
 import pytest
 import warp as wp
 
@@ -18,6 +20,15 @@ LONG = (
     "test_markers.py",
 )
 """Files that take longest: those that share the cores begin with them, so that none waits for another at the end."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Gives each worker cores of its own: diagnoses in step would wait for those of other workers."""
+    worker = getattr(config, "workerinput", None)
+    if worker is None or not hasattr(os, "sched_setaffinity"):
+        return
+    number, count = int(worker["workerid"].removeprefix("gw")), worker["workercount"]
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[number::count] or os.sched_getaffinity(0))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
