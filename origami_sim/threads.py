@@ -24,6 +24,12 @@ TOKEN = struct.Struct("ii")
 
 NO_MORE = -1
 
+COPIES = 8
+"""Processes in step where nobody states how many: each holds the memory of a whole diagnosis.
+
+Of a double chain 28 % is done in every process, so that half as many take 1.2 times as long, and twice as many 0.9.
+"""
+
 
 def default_threads() -> int:
     """Cores that this process may use."""
@@ -31,7 +37,7 @@ def default_threads() -> int:
 
 
 def in_step(work: Callable[[], T], threads: int | None) -> T:
-    """What work returns, done by this process in step with copies of it (forks), on so many cores (default: all).
+    """What work returns, done by this process in step with copies of it (forks), on so many cores (default: `COPIES`).
 
     All do the same work, each for itself, but for jobs that they share (`side_by_side`): of these each does some, and
     is told what the others made (single program, multiple data; Darema 2001). So a copy is made once, and has at hand
@@ -40,7 +46,7 @@ def in_step(work: Callable[[], T], threads: int | None) -> T:
     Work has to go the same way in all of them: by what it is given, what jobs return and what is `told`, never by a
     clock. A copy that goes another way, fails or is killed ends the sharing; this process then does all jobs itself.
     """
-    count = threads or default_threads()
+    count = threads or min(default_threads(), COPIES)
     if count <= 1 or not _may_share():
         return work()
     with _led(work, count):
