@@ -30,12 +30,6 @@ COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
 
 
-SAID = 0.005
-"""Share of the mismatch from which on it is said: what rounds to a per cent."""
-
-FOUND = "Found: "
-"""How a headline begins that names something."""
-
 MORE_LAWS = " More laws at once would follow the recordings more closely, as they do where the catalogue lacks one."
 """What is said where the best set is not named."""
 
@@ -149,7 +143,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     more_laws = len(chance) < len(p.total)  # only some may be named
     classes = by_effects(p, chance)
     best = p.nodes[d.best].fit
-    left = crease_of_the_rest(forward, best, p.hyper) if d.lead and budgeted(d.best).rest >= SAID else ""
+    left = crease_of_the_rest(forward, best, p.hyper) if d.lead and _shows(budgeted(d.best).rest) else ""
     shown, explained = widened(p, d.best), _explained(budgeted(d.best), left)
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
@@ -180,9 +174,10 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
             ["nothing"] if frozenset() in d.credible else []
         )
         chances = {c: holding(classes, c) if c > d.lead else classes[c] for c in d.credible}
-        text = undecided(d.lead, d.credible, chances, lambda effects: say(shown, only=effects))
-        more = p.effects(d.best) - d.lead
-        if text.startswith(FOUND) and more:
+        sure = in_all(d.lead, d.credible)
+        text = undecided(sure, d.credible, chances, say(shown, only=sure) if sure else "")
+        more = p.effects(d.best) - sure
+        if sure and more:
             text += f" With {say(shown, only=more)} they {explained.replace('explains', 'explain', 1)}."
         else:
             text += f" The best is {say(shown)}, which {explained}."
@@ -193,7 +188,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if d.word == "MEASUREMENT":
         text = f"The measurement, not the device, explains the mismatch: {say(shown, only=d.lead)}"
     else:
-        text = f"{FOUND}{say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
+        text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
     text += f", p = {d.probability:.2f}; {who} {explained}."
@@ -212,24 +207,25 @@ def smooth_moment(forward: Predictor, f: Fit) -> str:
     return f"{title(UNLISTED)}, at {site} (root mean square {said(usual_moment(forward, f), 'N m', 2)})"
 
 
+def in_all(lead: frozenset[str], credible: list[frozenset[str]]) -> frozenset[str]:
+    """The effects that are named, if every explanation holds them and more; else none."""
+    return lead if all(c > lead for c in credible) else frozenset()
+
+
 def undecided(
-    lead: frozenset[str],
-    credible: list[frozenset[str]],
-    chances: dict[frozenset[str], float],
-    described: Callable[[frozenset[str]], str],
+    sure: frozenset[str], credible: list[frozenset[str]], chances: dict[frozenset[str], float], described: str
 ) -> str:
     """Between which explanations recordings do not decide, and what acts in all of them, in words.
 
     Args:
-        described: effects with their sites and strengths, in words.
+        described: what surely acts, with sites and strengths, in words.
     """
     likely = [c for c in credible[:4] if chances[c] > 1.0 - CREDIBLE] or credible[:1]
-    lead = lead if all(c > lead for c in credible) else frozenset()
-    each = [f"{_name(c - lead)} (p = {chances[c]:.2f})" for c in likely]
+    each = [f"{_name(c - sure)} (p = {chances[c]:.2f})" for c in likely]
     rest = len(credible) - len(each)
     more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
-    sure = f"{FOUND}{described(lead)}; besides, these" if lead else "These"
-    return f"{sure} recordings do not decide between {joined(each)}{more}."
+    begin = f"Found: {described}; besides, these" if sure else "These"
+    return f"{begin} recordings do not decide between {joined(each)}{more}."
 
 
 def unnamed_verdict(
@@ -378,38 +374,41 @@ def widened(p: Posterior, key: Key) -> Fit:
 def deviations(node: Node, p: Posterior) -> np.ndarray:
     """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI].
 
-    About the fit, over all sizes of flaws and discrepancy: under each the numbers have a variance and a mean of their
-    own.
+    Their variances are the mean over all sizes of flaws and discrepancy.
     """
     own = OwnColumns(node.fit)
     count, first = len(own.columns), len(own.nominal)
-    spread, at = (np.concatenate([getattr(g, name) for g in own.groups]) for name in ("spread", "at"))
+    spread = np.concatenate([g.spread for g in own.groups])
     strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in own.groups])
     known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread) ** 2
     log = node.evidence + p.hyper.log_cells
-    second = np.zeros(count)
+    variance = np.zeros(count)
     for cell, weight in zip(node.grid, np.exp(log - logsumexp(log)), strict=True):
         if cell is not None:
             cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known), rcond=1e-14)
-            away = cover @ (cell.gram[:count, -1] - known * at)
-            second += weight * (np.maximum(np.diag(cover), 0.0) + away**2)
+            variance += weight * np.maximum(np.diag(cover), 0.0)
     out = np.zeros(count)
     scale = np.array([node.fit.free[c].scale for c in own.columns])
-    out[np.array(own.columns) - first] = scale * np.sqrt(second)
+    out[np.array(own.columns) - first] = scale * np.sqrt(variance)
     return out
 
 
 def _explained(b: Budget, left: str) -> str:
     """What a set explains, what numbers of the model do, and how much at which crease is left, in words."""
     text = f"explains {_share(b.named)} of the mismatch"
-    if b.numbers >= SAID:
+    if _shows(b.numbers):
         text += f", numbers of the model {b.numbers:.0%}"
     where = f", above all at {left}" if left else ""
-    return text + (f"; {b.rest:.0%} is real and not named{where}" if b.rest >= SAID else "")
+    return text + (f"; {b.rest:.0%} is real and not named{where}" if _shows(b.rest) else "")
+
+
+def _shows(part: float) -> bool:
+    """Whether a share of the mismatch is a per cent at least, as it is said."""
+    return round(part, 2) > 0.0
 
 
 def _share(part: float) -> str:
-    return f"{part:.0%}" if part >= SAID else "less than 1%"
+    return f"{part:.0%}" if _shows(part) else "less than 1%"
 
 
 def _unlisted(d: Decision) -> str:

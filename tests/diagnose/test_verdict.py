@@ -13,7 +13,7 @@ from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import credible, decide, undecided
+from origami_sim.infer.verdict import credible, decide, in_all, undecided
 from origami_sim.infer.words import joined, said, title
 from origami_sim.locate.describe import described
 
@@ -135,11 +135,14 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
 
 
 def test_what_acts_in_every_explanation_is_said_once():
-    drag, friction, delay = (frozenset((e,)) for e in ("air_drag", "crease_friction", "clock_delay"))
-    text = undecided(drag, [drag, friction], {drag: 0.6, friction: 0.3}, str)
+    effects: list[str] = ["air_drag", "crease_friction", "clock_delay"]
+    drag, friction, delay = (frozenset((e,)) for e in effects)
+    assert not in_all(drag, [drag, friction])
+    text = undecided(frozenset(), [drag, friction], {drag: 0.6, friction: 0.3}, "")
     assert text.startswith("These recordings do not decide between ") and "(p = 0.60) and" in text
     chances = {friction | drag: 0.6, friction | delay: 0.3}
-    text = undecided(friction, list(chances), chances, lambda effects: f"{len(effects)} effect with 0.2 mN m")
+    assert in_all(friction, list(chances)) == friction
+    text = undecided(friction, list(chances), chances, "1 effect with 0.2 mN m")
     assert text.startswith("Found: 1 effect with 0.2 mN m; besides, these recordings do not decide between ")
     assert "dry friction" not in text and text.count(" with ") == 1
 
