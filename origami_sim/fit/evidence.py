@@ -205,20 +205,20 @@ class Summed:
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
         wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         tight = np.where(sets.strength, norm / hyper.slabs[-1], 1.0 / wide)
-        full, value, move = a, sets.at, sets.at
+        full, value, move, force = a, sets.at, sets.at, sets.at
         for turn in range(ROUNDS):
             if turn:  # as narrow as the normals are that a strength of this size may come from
                 slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
                 tight = np.where(sets.strength, slab, tight)
             full = a + np.eye(k) * (tight**2)[..., None, :]
-            move = np.linalg.solve(full, (b - sets.at * tight**2)[..., None])[..., 0]
+            move, force = _least(full, b - sets.at * tight**2, sets.low - sets.at, sets.high - sets.at)
             value = sets.at + move
         inverse = np.linalg.inv(full)
         sd = np.sqrt(np.maximum(inverse[..., range(k), range(k)], 1e-300))
-        sided = np.where(sets.side != 0, np.log(2.0) + log_ndtr(sets.side * value / sd), 0.0)
-        # what lies beyond a bound explains nothing
-        value = np.clip(value, sets.low, sets.high)
-        move = value - sets.at
+        # of what lies beyond a bound there is no probability: of a tail that begins there, what is left is the rest
+        inside = np.where(sets.side != 0, log_ndtr(sets.side * value / sd), 0.0)
+        inside = np.where(force != 0.0, np.log(0.5 * erfcx(np.abs(force) * sd / np.sqrt(2.0))), inside)
+        inside = inside + np.where(sets.side != 0, np.log(2.0), 0.0)
         left = square + np.sum(move * ((a @ move[..., None])[..., 0] - 2.0 * b), axis=-1)
         out = known - 0.5 * left - 0.5 * np.linalg.slogdet(full)[1] + 0.5 * k * np.log(2 * np.pi)
         slab = log_slab(value * norm, hyper) + np.log(norm)
@@ -226,7 +226,7 @@ class Summed:
         out += np.sum(np.where(sets.strength, slab, shape), axis=-1)
         # what is far beyond the usual is less probable: a Cauchy density times the one on the scale of detectability
         far = np.log1p((value / sets.usual) ** 2) + log_usual(sets.usual * norm, hyper)
-        return out + np.sum(sided - far, axis=-1), value
+        return out + np.sum(inside - far, axis=-1), value
 
 
 def summed(p: Problem, smooth: float, flaws: float) -> Summed:
@@ -265,6 +265,40 @@ def log_usual(c: np.ndarray, hyper: Hyper) -> np.ndarray:
     ratio = np.where(np.isfinite(c), c, 1.0)[..., None] / widths
     share = (ratio * np.sqrt(np.pi / 2) * erfcx(ratio / np.sqrt(2.0))) @ hyper.shares
     return np.where(np.isfinite(c), np.log(share), 0.0)
+
+
+def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where x' A x / 2 - b' x is least within bounds, and its slope there: none but in numbers that a bound holds.
+
+    A sweep over coordinates finds which numbers are held, and a Newton step up to the next bound moves the others, in
+    turn (as in gradient projection, More & Toraldo 1991): no turn makes it worse.
+
+    Args:
+        a: [..., n, k, k]. b: [..., n, k]. low, high: [n, k].
+    """
+    x, slope = np.linalg.solve(a, b[..., None])[..., 0], np.zeros_like(b)
+    low, high = np.broadcast_to(low, x.shape), np.broadcast_to(high, x.shape)
+    met = np.nonzero(np.any((x < low) | (x > high), axis=-1))
+    if not len(met[0]):
+        return x, slope
+    a, b, low, high = a[met], b[met], low[met], high[met]
+    y, k = np.clip(x[met], low, high), x.shape[-1]
+    for _ in range(2 * k):
+        before = y.copy()
+        for i in range(k):
+            force = b[:, i] - np.sum(a[:, i] * y, axis=-1)
+            y[:, i] = np.clip(y[:, i] + force / a[:, i, i], low[:, i], high[:, i])
+        held = (y <= low) | (y >= high)
+        force = np.where(held, 0.0, b - (a @ y[..., None])[..., 0])
+        free = np.where(held[:, :, None] | held[:, None, :], np.eye(k), a)
+        step = np.linalg.solve(free, force[..., None])[..., 0]
+        room = np.where(step > 0, high - y, y - low) / np.maximum(np.abs(step), 1e-300)
+        y = np.clip(y + step * np.minimum(1.0, room.min(axis=-1, initial=1.0, where=~held))[:, None], low, high)
+        if np.array_equal(y, before):
+            break
+    x[met] = y
+    slope[met] = np.where((y <= low) | (y >= high), b - (a @ y[..., None])[..., 0], 0.0)
+    return x, slope
 
 
 def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:

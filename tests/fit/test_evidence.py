@@ -113,7 +113,7 @@ def test_one_effect(d, side):
 
 
 def test_what_lies_beyond_a_bound_explains_nothing():
-    """An effect of d' 20 whose strength may be 5: its evidence is that of what 5 explains, but for the tail's width."""
+    """An effect of d' 20 whose strength may be 5: its evidence is that of what 5 explains."""
     toy, rng = Toy([1.0]), np.random.default_rng(1)
     residual = toy.drawn(rng, np.array([20.0 / toy.norms[0]]))
     free, most = groups([0]), np.array([5.0 / toy.norms[0]])
@@ -123,7 +123,25 @@ def test_what_lies_beyond_a_bound_explains_nothing():
     exact = logsumexp(toy.log_density(left) + slab(d)) + np.log(d[1] - d[0]) - toy.log_density(residual)
     (unbound,), (found,) = (gained(toy, residual, [(0,)], made) for made in (free, bound))
     assert unbound > 150.0 > 100.0 > found
-    assert found == pytest.approx(exact, abs=3.7)  # the tail is 1/15 wide, and not sqrt(2 pi): 3.6 in log evidence
+    assert found == pytest.approx(exact, abs=LAPLACE)
+
+
+def test_an_effect_at_its_bound_leaves_the_others_free():
+    """Two that are nearly alike would be large and opposite: where one is bound, the other explains what both would."""
+    toy, rng = Toy([1.0, 1.0], alike=0.3), np.random.default_rng(1)
+    residual = toy.drawn(rng, np.array([60.0, -40.0]) / toy.norms)
+    made = groups([0, 0])
+    bound = [made[0], replace(made[1], low=np.full(1, -0.01 / toy.norms[1]), high=np.full(1, 0.01 / toy.norms[1]))]
+    alone, both = gained(toy, residual, [(0,), (0, 1)], bound)
+    assert alone - 10.0 < both < alone + 1.0
+    assert gained(toy, residual, [(0, 1)], made)[0] > alone + 20.0
+
+
+def test_the_wrong_side_of_a_bound_is_a_tail():
+    toy, rng = Toy([1.0]), np.random.default_rng(1)
+    residual = toy.drawn(rng, np.array([-5.0 / toy.norms[0]]))
+    (sided,) = gained(toy, residual, [(0,)], [replace(groups([1])[0], low=np.zeros(1), high=np.full(1, np.inf))])
+    assert sided == pytest.approx(on_grid(toy, residual, [0], [1]), abs=LAPLACE)
 
 
 @pytest.mark.parametrize("d", [0.0, 5.0, 20.0])
