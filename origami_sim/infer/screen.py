@@ -8,7 +8,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Suspect, scaled, usual
-from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision
+from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision, small
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.threads import side_by_side
@@ -159,7 +159,7 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
 
 def _signatures(forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights) -> list[Signature]:
     """Signatures of suspects that are simulated together; strengths are such that they change as much as is missed."""
-    goal = np.sqrt(max(base.cost, 0.0)) + 1.0
+    goal = np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks))
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
     parts = _changes(forward, group, size, base, weights)
@@ -173,6 +173,13 @@ def _signatures(forward: Predictor, group: Sequence[Suspect], base: Fit, weights
         for k, new in zip(redo, again, strict=True):
             parts[k] = new
     return [Signature(scaled(s, abs(z)), p, float(z)) for s, z, p in zip(group, size, parts, strict=True)]
+
+
+def _missed(forward: Predictor, base: Fit, weights: Weights) -> float:
+    """What a fit leaves beyond the measurement noise, and moves its numbers from their priors [standard deviations]."""
+    left = np.concatenate(base.residuals)
+    beyond = np.nansum(left**2 - forward.blocks[0].noise ** 2, axis=0) / weights.deviation**2
+    return float(np.sqrt(np.sum(np.maximum(beyond, 0.0)) + base.penalty))
 
 
 def _affordable(forward: Predictor, base: Fit, s: Suspect, change: float, least: float) -> float:
