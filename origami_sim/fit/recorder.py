@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.noise import STATED, infer
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import autocovariance
+from origami_sim.fit.weights import Weights
 
 FILTER = 10
 """Frames over which recorders average, at most: trackers take medians of 3 and means of up to 7.
@@ -29,6 +31,25 @@ def recorder_noise(forward: Predictor, f: Fit) -> np.ndarray:
         return noise
     whole = joined(forward, f)
     return np.array([flat_level([r[:, d] for r in whole], float(n)) for d, n in enumerate(noise)])
+
+
+def recorder_weights(forward: Predictor, f: Fit) -> Weights:
+    """Level and colour of noise as a recorder's may be that a fit leaves, read where no motion reaches (see `infer`).
+
+    Of curves it is white, as large as neighbouring points show.
+    """
+    own, noise = f.weights, forward.blocks[0].noise
+    assert own is not None
+    if forward.curve:
+        rough = [np.diff(r, 2, axis=0) / np.sqrt(6.0) for r in f.residuals if len(r) > 2]
+        level = np.sqrt(np.nanmean(np.concatenate(rough) ** 2, axis=0)) if rough else noise
+        return Weights(np.maximum(np.nan_to_num(level), noise), gap=own.gap, log_prior=own.log_prior)
+    longest = max(joined(forward, f), key=len)
+    times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(longest))
+    found = [infer(times, column, stated=float(n)) for column, n in zip(longest.T, noise, strict=True)]
+    level = np.maximum([n.deviation for n in found], noise)
+    log_prior = -0.5 * float(np.sum((np.log(level / noise) / STATED) ** 2))
+    return Weights(level, tuple(n.colour for n in found), own.gap, log_prior)
 
 
 def joined(forward: Predictor, f: Fit) -> list[np.ndarray]:

@@ -44,12 +44,13 @@ class Budget:
     Attributes:
         shares: add up to one; none if nothing is missed. over: error that is left, over the recorder's noise (root mean
             square over the components). pushed: probability that forces act now and then, see
-            `bursts`.
+            `bursts`. real: that what is left is no noise of the recorder, see `remainder`.
     """
 
     shares: list[Share]
     over: float
     pushed: float = 0.0
+    real: float = 0.0
 
     @property
     def named(self) -> float:
@@ -74,8 +75,8 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     what the recorder shows; the budget allows for next to none.
     """
     assert best.weights is not None
-    recorder, over = recorder_noise(forward, best), over_noise(forward, best)
-    level, now = np.minimum(best.weights.deviation, recorder), bursts(best)
+    recorder, over, now = recorder_noise(forward, best), over_noise(forward, best), bursts(best)
+    level = np.minimum(best.weights.deviation, recorder)
     if now.probability > 0.5:
         level = np.minimum(level, np.maximum(now.level, forward.blocks[0].noise))
     noise = Weights(level, best.weights.colour, HYPER.least)

@@ -11,22 +11,22 @@ and no probability by more than 0.011.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import Group, Problem, Sets, Summed, log_slab, problem, summed
+from origami_sim.fit.evidence import Sets, Summed, log_slab
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed, small
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.weights import Weights, log_volume, recast
+from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import FAR, over_noise
-from origami_sim.infer.discrepancy import cosines
 from origami_sim.infer.foresight import Foresight
-from origami_sim.infer.implied import OwnColumns, regapped, with_own_noise
+from origami_sim.infer.implied import OwnColumns, with_own_noise
+from origami_sim.infer.judged import judged
 from origami_sim.infer.nominal import level
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
@@ -484,42 +484,8 @@ def _same_place(a: Suspect, b: Suspect) -> bool:
 
 
 def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, list[np.ndarray]]:
-    """A judged fit, and the columns of its own and of all further effects, per segment."""
-    hyper, f = out.hyper, with_own_noise(forward, f, out.hyper)
-    line, own = f.linear, OwnColumns(f)
-    assert line is not None and f.weights is not None
-    # order: the fit's own columns by suspect, then one column for each other suspect
-    others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
-    count, groups = len(own.columns), list(own.groups)
-    for n, o in enumerate(others):
-        one = out.signatures[o]
-        groups.append(Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, one.usual))
-    added = [np.zeros((len(t), len(others))) for t in line.tangent]
-    for k, o in enumerate(others):
-        for columns, part in zip(added, out.signatures[o].parts, strict=True):
-            columns[:, k] = part
-    added = recast(added, line.rows, out.weights, f.weights)
-    effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
-    width, weights = count + len(others), f.weights
-    laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
-    out.smooth = out.smooth or cosines(forward, f, line)
-    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)])
-
-    def judged(gap: float) -> tuple[Problem, list[Summed]]:
-        now, columns = regapped(small, both, weights, gap)
-        theirs, waves = [c[:, :width] for c in columns], [c[:, width:] for c in columns]
-        made = problem(now, own.nominal, own.precision, own.away, theirs, waves)
-        made = replace(made, constant=made.constant + volume)
-        return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
-
-    gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
-    found = dict(zip(gaps, shared([partial(judged, gap) for gap in gaps]), strict=True))
-    cells = [cell for _, cells in found.values() for cell in cells]
-    evidence = np.full(len(hyper.cells), -np.inf)
-    evidence[: len(cells)] = Summed.join(cells).of(laid, hyper)[0][:, 0]
-    grid: list[Summed | None] = [*cells, *[None] * (len(evidence) - len(cells))]
-    problems = {gap: made for gap, (made, _) in found.items()}
-    return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
+    """A fit judged by its own noise, and the columns of its own and of all further effects, per segment."""
+    return judged(out, forward, key, with_own_noise(forward, f, out.hyper))
 
 
 def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:

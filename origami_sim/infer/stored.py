@@ -11,7 +11,7 @@ diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import Budget, Share, budget
 from origami_sim.infer.posterior import Key, Node, Posterior
+from origami_sim.infer.remainder import remainder
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.search import enter, log_priors, place
 from origami_sim.infer.verdict import COMPARED, best_of, decide, unnamed_verdict
@@ -104,7 +105,10 @@ class Stored:
             p.hyper.gaps,
             nodes,
             list(p.failed),
-            {k: budget(forward, given, base, n.fit) for k, n in p.nodes.items()},
+            {
+                k: replace(budget(forward, given, base, n.fit), real=remainder(p, forward, k))
+                for k, n in p.nodes.items()
+            },
             quiet,
             compared,
             frozenset(k for k, n in p.nodes.items() if n.wide),
@@ -180,7 +184,8 @@ class Stored:
             ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
-                | {"wide": key in self.wide, "over": mismatch.over, "pushed": mismatch.pushed}
+                | {"wide": key in self.wide, "over": mismatch.over}
+                | {"pushed": mismatch.pushed, "real": mismatch.real}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))
@@ -242,7 +247,8 @@ class Stored:
                 size, constant = arrays[f"{n}.{k}.size"], float(arrays[f"{n}.{k}.constant"])
                 problems[float(gap)] = Reduced(gram, cross, size, constant)
             nodes[key] = list(node["members"]), groups, list(node["others"]), problems
-            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], node.get("pushed", 0.0))
+            real = {k: node.get(k, 0.0) for k in ("pushed", "real")}
+            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], **real)
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
         wide = frozenset(frozenset(n["members"]) for n in about["nodes"] if n["wide"])

@@ -14,6 +14,7 @@ from origami_sim.infer.bursts import bursts
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
+from origami_sim.infer.remainder import remainder
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
 
@@ -100,7 +101,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    missing = max(left.pushed, float(np.sum(p.cells(best)[~p.hyper.clean])))
+    missing = max(left.pushed, left.real, float(np.sum(p.cells(best)[~p.hyper.clean])))
     real = UNLISTED in lead or left.over > FAR or missing > ALONE
     if left.rest > left.named and real:
         return as_("UNKNOWN", np.nan)
@@ -135,7 +136,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
 
     def budgeted(key: Key) -> Budget:
         if key not in budgets:
-            budgets[key] = budget(forward, given, base, p.nodes[key].fit)
+            mismatch = budget(forward, given, base, p.nodes[key].fit)
+            budgets[key] = replace(mismatch, real=remainder(p, forward, key))
         return budgets[key]
 
     d = decide(p, budgeted)
@@ -241,7 +243,8 @@ def unnamed_verdict(
         text = f"The refitted model misses the recordings by {over:.2f} times the noise"
         if over < FAR:
             now = bursts(base)
-            text = "The refitted model follows the recordings only if forces that it lacks act on the device"
+            text = f"What the refitted model leaves, {over:.2f} times the noise, is more than noise: forces that it "
+            text += "lacks act on the device"
             if now.probability > 0.5:
                 missed = f"{now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as the others"
                 text = f"{text} now and then: {missed}"
