@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.bodies import rigid
-from origami_sim.curvature import ALIKE
 from origami_sim.dielectric import Electrodes
 from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
 from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
-from origami_sim.model import Model, Parameters, dihedral_angles
+from origami_sim.model import ALIKE, Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
 from origami_sim.quantities import converted
@@ -37,6 +36,7 @@ class Sheet(Grounds, Electrodes, Thick):
         membrane_damping: dashpots in the bars, as a ratio of critical.
         panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, in reduced coordinates: a step that
             creases set, not the stiffness of panels).
+        overlapping: accept panels that overlap or pass through each other at the start.
 
     Raises:
         InputError: unknown material, thickness or modulus not positive, faces that cannot be triangulated, panels that
@@ -55,6 +55,7 @@ class Sheet(Grounds, Electrodes, Thick):
         membrane: float = 1.0,
         membrane_damping: float = 0.02,
         panels: str = "elastic",
+        overlapping: bool = False,
     ):
         if panels not in ("elastic", "rigid"):
             raise InputError("no such panels", field="panels", value=panels, allowed="elastic, rigid")
@@ -63,11 +64,13 @@ class Sheet(Grounds, Electrodes, Thick):
         self.made = {
             "thickness": thickness, "material": material, "modulus": modulus, "density": density, "panels": panels,
             "triangulation": triangulation, "membrane": membrane, "membrane_damping": membrane_damping,
+            "overlapping": overlapping or None,
         }  # fmt: skip
         thickness = converted(thickness, "m", "thickness")
         modulus, density = converted(modulus, "Pa", "modulus"), converted(density, "kg/m^3", "density")
         self.mesh = triangulate(pattern, triangulation)
-        self._refuse_overlap()
+        if not overlapping:
+            self._refuse_overlap()
         faces = pattern.face_count
         self._names = [m or material for m in pattern.materials]
         chosen = [_material(n, i) for i, n in enumerate(self._names)]

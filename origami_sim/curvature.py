@@ -21,12 +21,10 @@ constant, and falls with the square of the mesh size as the error does that it m
 
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from origami_sim.model import Model
+from origami_sim.model import ALIKE, Model
 
 VARIATION, BESIDE_HELD = 0.2, 1.2
 """Weights of the energy of differences of curvature across a line, per third of the two areas; the second beside held
@@ -40,9 +38,6 @@ RINGS = 4
 CONDITION = 1e3
 """Largest condition number of the equations of exactness; beyond it another ring is asked. Ten times less changes
 nothing but corners, ten times more lets needle-like corners amplify."""
-
-ALIKE = np.zeros((0, 6))
-"""Plates of which none differs from the others."""
 
 OUTER = 0.3
 """Weight of each further ring: less keeps stencils short, more spreads them; twice or half moves errors by a tenth."""
@@ -140,7 +135,7 @@ def relaxed(rigidity: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return rigidity - rigidity @ by @ np.linalg.pinv(by.T @ rigidity @ by, rcond=1e-10) @ by.T @ rigidity
 
 
-def of(model: "Model") -> Curvature:
+def of(model: Model) -> Curvature:
     """The weights of a model's triangles in its reference state."""
     return curvature(model.position, model.triangles, model.bends, model.free, model.plates)
 

@@ -21,6 +21,9 @@ BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx"
 PADS = ("pad_triangles", "pad_weights", "pad_heights", "pad_thickness")
 """Attributes of a model that say where patches can touch; a model without them is stored as if there were none."""
 
+ALIKE = np.zeros((0, 6))
+"""`Model.plates` of triangles that are all alike."""
+
 
 @dataclass(frozen=True, repr=False)
 class Model:
@@ -73,7 +76,7 @@ class Model:
     pad_weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     pad_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
     pad_thickness: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    plates: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
+    plates: np.ndarray = field(default_factory=lambda: ALIKE)
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import model_line  # only who looks pays for it

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from origami_sim import curvature
 from origami_sim.effects._plate import BRANCHES, COMPONENTS
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model import ALIKE, Model, Parameters
 
 if TYPE_CHECKING:
     from origami_sim.build import Sheet
@@ -154,7 +154,7 @@ def plates(sheet: "Sheet", shell: Shell, bending: np.ndarray) -> np.ndarray:
     """Bending stiffness of the triangles as `Model.plates` has it; empty if the panels are alike."""
     first, *others = (_of_panel(sheet, shell, p)[1] for p in range(sheet.pattern.face_count))
     if all(np.array_equal(first, d) for d in others):
-        return curvature.ALIKE
+        return ALIKE
     rows, columns = zip(*(PLACES[c] for c in COMPONENTS), strict=True)
     return bending[:, rows, columns]
 

@@ -98,9 +98,10 @@ def test_help_and_import_wait_for_no_library(tmp_path, code):
     assert out.splitlines()[-1].strip() == "loaded"
 
 
-def test_simulating_loads_neither_viewer_nor_plots(tmp_path):
+def test_simulating_loads_no_viewer_plots_or_mesh_reader(tmp_path):
+    idle = ("rerun", "matplotlib", "pyarrow", "trimesh", "shapely")
     code = (
         "from origami_sim import Drive, Sheet, equilibrium, read_pattern, simulate, strip\n"
-        "import sys\nprint('loaded', *(m for m in ('rerun', 'matplotlib', 'pyarrow') if m in sys.modules))"
+        f"import sys\nprint('loaded', *(m for m in {idle!r} if m in sys.modules))"
     )
     assert python(code, tmp_path).stdout.splitlines()[-1].strip() == "loaded"

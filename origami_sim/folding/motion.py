@@ -11,13 +11,6 @@ from origami_sim.solve.timestep import AT_REST, TimeStep
 from .fold import Folding
 
 
-class _AsGiven(Sheet):
-    """A sheet that may lie in itself, as shapes do that are given so and folded without contact."""
-
-    def _refuse_overlap(self) -> None:
-        pass
-
-
 def model_of(
     folding: Folding, *, thickness: float, material: str, crease_stiffness: float
 ) -> tuple[Model, Parameters, Drive]:
@@ -32,7 +25,8 @@ def model_of(
     """
     elastic = folding.sheet
     mesh, creases = elastic.mesh, len(elastic.mesh.creases)
-    sheet = _AsGiven(elastic.pattern, thickness=thickness, material=material, membrane_damping=0.0)
+    # folded without contact, a shape that is given may lie in itself
+    sheet = Sheet(elastic.pattern, thickness=thickness, material=material, membrane_damping=0.0, overlapping=True)
     membrane = crease_stiffness / (folding.softness * np.median(elastic.lengths) * elastic.size)  # E t [N/m]
     stiffness = folding.softness * elastic.weights * membrane * elastic.size**2
     way = np.where(elastic.driven, elastic.target - elastic.start, 0.0)

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from ..errors import InputError
 from ..files import read_bytes
@@ -37,6 +36,8 @@ def read_mesh(path, *, unit="m", size=None, scale=None) -> Pattern:
     Raises:
         InputError: unreadable or empty mesh, unknown suffix or unit, or anything `checks` refuses.
     """
+    import trimesh  # only here: slow to import
+
     suffix = _suffix(path)
     stated = metres_per(unit)
     data = read_bytes(path)
@@ -167,6 +168,8 @@ def write_mesh(vertices, faces, path) -> None:
     Raises:
         InputError: unknown suffix, a face that cannot be split, or a file that cannot be written.
     """
+    import trimesh  # only here: slow to import
+
     suffix = _suffix(path)
     vertices = np.asarray(vertices, dtype=np.float64)
     triangles = []

@@ -68,6 +68,7 @@ def test_a_sheet_whose_triangles_overlap_at_the_start_is_refused(tmp_path, monke
         else:
             with pytest.raises(InputError, match="panel 0 and panel 1 overlap at the start"):
                 Sheet(pattern, thickness=1e-3)
+            Sheet(pattern, thickness=1e-3, overlapping=True)
     with pytest.raises(InputError, match="overlap at the start"):
         Sheet(kresling(6, radius=0.02, height=0.02, twist=np.pi), thickness=1e-3)
     Sheet(grid(3, 3, 0.01, 0.01), thickness=1e-3, triangulation="center")
