@@ -3,7 +3,7 @@
     python benchmarks/free_crawler.py --cell 5 2.5 1.25
     python benchmarks/free_crawler.py --cell 5 2.5 1.25 --set anticlastic=false
 
-The chain's bridge curves across as the strip's does, unless that is in plane strain.
+The chain curves across as the strip does, unless that is in plane strain.
 
 Minutes to tens of minutes per mesh. Steps are 1.2 times those that are taken by themselves, within their bound;
 `--longer 1` takes those.

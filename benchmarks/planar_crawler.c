@@ -9,7 +9,8 @@
 
 #define MOST 512
 #define POINTS 16
-#define SHAPES 8
+#define SHAPES 64
+#define LIFTED 24
 #define STRETCHES 16
 #define BAND 6 /* a hinge joins three stations of two coordinates */
 
@@ -29,12 +30,13 @@ typedef struct {
     double field, frequency, gravity, decay;
     double relaxation;                            /* of the losses' Maxwell branch [s]; 0: they are viscous */
     int first, last;                              /* stations between which the bridge is */
-    int shapes;                                   /* in which a bridge curves across, amplitudes c [m]; 0: plane strain */
+    int shapes, lifted;                           /* in which the strip curves across, amplitudes c [m]; of these the
+                                                     first lift the bridge; none: plane strain */
     double bending[SHAPES][SHAPES];               /* energy c' bending c / 2 [N/m] */
     double poisson[MOST][SHAPES];                 /* by hinge that turns by t: t poisson . c [N] */
-    double flattening[MOST][SHAPES][SHAPES];      /* membrane: sum of t^2 c' flattening c / 2 [N/m] */
-    double relief[MOST][SHAPES][STRETCHES];       /* less |sum of t relief' c|^2 / 2, by moving within itself [(N/m)^1/2] */
-    double loss_time;                             /* of the bridge's bending across [s] */
+    double bending_loss[SHAPES][SHAPES], poisson_loss[MOST][SHAPES]; /* of what loses, times the time of that */
+    double flattening[MOST][LIFTED][LIFTED];      /* membrane: sum of t^2 c' flattening c / 2 [N/m] */
+    double relief[MOST][LIFTED][STRETCHES];       /* less |sum of t relief' c|^2 / 2, by moving within itself [(N/m)^1/2] */
 } Device;
 
 typedef struct { double x, z; } V;
@@ -83,79 +85,79 @@ static void touch(const V *p, const V *v, V *f, double (*matrix)[BAND], int j, d
 }
 
 /* solves a x = b by Cholesky's decomposition; a holds the lower band, row by row, its diagonal last; x goes into b */
-static void solve(int n, double (*a)[BAND], double *b)
+static inline void solve(int n, int band, double a[n][band], double *b)
 {
     for (int i = 0; i < n; i++) {
-        const int first = i < BAND - 1 ? 0 : i - BAND + 1;
+        const int first = i < band - 1 ? 0 : i - band + 1;
         for (int j = first; j <= i; j++) {
-            double s = a[i][j - i + BAND - 1];
-            for (int k = j < BAND ? first : (first > j - BAND + 1 ? first : j - BAND + 1); k < j; k++)
-                s -= a[i][k - i + BAND - 1] * a[j][k - j + BAND - 1];
-            a[i][j - i + BAND - 1] = j < i ? s * a[j][BAND - 1] : 1 / sqrt(s); /* the diagonal's inverse is kept */
+            double s = a[i][j - i + band - 1];
+            for (int k = j < band ? first : (first > j - band + 1 ? first : j - band + 1); k < j; k++)
+                s -= a[i][k - i + band - 1] * a[j][k - j + band - 1];
+            a[i][j - i + band - 1] = j < i ? s * a[j][band - 1] : 1 / sqrt(s); /* the diagonal's inverse is kept */
         }
         double s = b[i];
-        for (int k = first; k < i; k++) s -= a[i][k - i + BAND - 1] * b[k];
-        b[i] = s * a[i][BAND - 1];
+        for (int k = first; k < i; k++) s -= a[i][k - i + band - 1] * b[k];
+        b[i] = s * a[i][band - 1];
     }
     for (int i = n - 1; i >= 0; i--) {
         double s = b[i];
-        for (int k = i + 1; k < n && k < i + BAND; k++) s -= a[k][i - k + BAND - 1] * b[k];
-        b[i] = s * a[i][BAND - 1];
+        for (int k = i + 1; k < n && k < i + band; k++) s -= a[k][i - k + band - 1] * b[k];
+        b[i] = s * a[i][band - 1];
     }
 }
 
-/* curvature across the bridge, without inertia */
-typedef struct { double c[SHAPES], stress[SHAPES], lost[SHAPES]; } Across;
+/* curvature across the strip, without inertia: amplitudes, what the branches have followed and what they hold; the same
+   of the couples that it makes of hinges */
+typedef struct { double c[SHAPES], past[SHAPES], lost[SHAPES], turned[MOST], held[MOST]; } Across;
 
-/* adds to the couples m of the hinges, which have turned by t, what the bridge's curvature across makes of them; its
-   bending loses like that along, by branches of which `kept` is left after a step; `drag` is their stiffness over the
-   elastic one for what is new. `held` and `lost` are the couples by bending alone and by their branches. */
-static void curve(const Device *d, Across *w, const double *t, double *m, double *held, double *lost, double kept,
-                  double drag)
+/* adds to the couples m of the hinges, which have turned by t, what the strip's curvature across makes of them; its
+   bending loses like that along, by branches of which `kept` is left after a step and `gain` comes of what is new */
+static void curve(const Device *d, Across *w, const double *t, double *m, double kept, double gain)
 {
-    const int n = d->shapes;
-    double a[SHAPES][SHAPES], b[SHAPES], load[SHAPES] = {0}, in[SHAPES][STRETCHES] = {{0}}, moved[STRETCHES] = {0};
-    for (int k = 0; k < n; k++)
-        for (int l = 0; l < n; l++) a[k][l] = (1 + drag) * d->bending[k][l];
-    for (int i = d->first; i <= d->last; i++)
+    const int n = d->shapes, h = d->lifted;
+    double a[SHAPES][SHAPES], flat[LIFTED][LIFTED] = {{0}}, in[LIFTED][STRETCHES] = {{0}}, moved[STRETCHES] = {0};
+    double load[SHAPES] = {0}, fast[SHAPES] = {0};
+    for (int i = 1; i < d->cells; i++)
         for (int k = 0; k < n; k++) {
             load[k] += d->poisson[i][k] * t[i];
-            for (int l = 0; l < n; l++) a[k][l] += t[i] * t[i] * d->flattening[i][k][l];
+            fast[k] += d->poisson_loss[i][k] * t[i];
+        }
+    for (int i = d->first; i <= d->last; i++)
+        for (int k = 0; k < h; k++) {
+            for (int l = 0; l < h; l++) flat[k][l] += t[i] * t[i] * d->flattening[i][k][l];
             for (int s = 0; s < STRETCHES; s++) in[k][s] += t[i] * d->relief[i][k][s];
         }
     for (int k = 0; k < n; k++) {
-        b[k] = drag * w->stress[k] - kept * w->lost[k] - (1 + drag) * load[k];
-        for (int l = 0; l < n; l++)
-            for (int s = 0; s < STRETCHES; s++) a[k][l] -= in[k][s] * in[l][s];
-    }
-    for (int k = 0; k < n; k++)
-        for (int r = k + 1; r < n; r++) {
-            const double q = a[r][k] / a[k][k];
-            for (int l = k; l < n; l++) a[r][l] -= q * a[k][l];
-            b[r] -= q * b[k];
+        double *row = a[k] + SHAPES - 1 - k;
+        w->c[k] = gain * w->past[k] - kept * w->lost[k] - load[k] - gain * fast[k];
+        for (int l = 0; l <= k; l++) row[l] = d->bending[k][l] + gain * d->bending_loss[k][l];
+        for (int l = 0; l <= k && k < h; l++) {
+            row[l] += flat[k][l];
+            for (int s = 0; s < STRETCHES; s++) row[l] -= in[k][s] * in[l][s];
         }
-    for (int k = n - 1; k >= 0; k--) {
-        for (int l = k + 1; l < n; l++) b[k] -= a[k][l] * w->c[l];
-        w->c[k] = b[k] / a[k][k];
     }
+    solve(n, SHAPES, a, w->c);
     for (int k = 0; k < n; k++) {
-        double stress = load[k];
-        for (int l = 0; l < n; l++) stress += d->bending[k][l] * w->c[l];
-        w->lost[k] = kept * w->lost[k] + drag * (stress - w->stress[k]);
-        w->stress[k] = stress;
-        for (int s = 0; s < STRETCHES; s++) moved[s] += in[k][s] * w->c[k];
+        for (int l = 0; l < n; l++) fast[k] += d->bending_loss[k][l] * w->c[l];
+        w->lost[k] = kept * w->lost[k] + gain * (fast[k] - w->past[k]);
+        w->past[k] = fast[k];
+        for (int s = 0; s < STRETCHES && k < h; s++) moved[s] += in[k][s] * w->c[k];
     }
-    for (int i = d->first; i <= d->last; i++) {
-        double now = 0, flat = 0;
+    for (int i = 1; i < d->cells; i++) {
+        double turned = 0;
         for (int k = 0; k < n; k++) {
-            now += d->poisson[i][k] * w->c[k];
-            for (int l = 0; l < n; l++) flat += t[i] * w->c[k] * d->flattening[i][k][l] * w->c[l];
-            for (int s = 0; s < STRETCHES; s++) flat -= w->c[k] * d->relief[i][k][s] * moved[s];
+            m[i] += d->poisson[i][k] * w->c[k];
+            turned += d->poisson_loss[i][k] * w->c[k];
         }
-        lost[i] = kept * lost[i] + drag * (now - held[i]);
-        held[i] = now;
-        m[i] += now + lost[i] + flat;
+        w->held[i] = kept * w->held[i] + gain * (turned - w->turned[i]);
+        w->turned[i] = turned;
+        m[i] += w->held[i];
     }
+    for (int i = d->first; i <= d->last; i++)
+        for (int k = 0; k < h; k++) {
+            for (int l = 0; l < h; l++) m[i] += t[i] * w->c[k] * d->flattening[i][k][l] * w->c[l];
+            for (int s = 0; s < STRETCHES; s++) m[i] -= w->c[k] * d->relief[i][k][s] * moved[s];
+        }
 }
 
 /* runs so many steps and stores the centre of mass [x] at the end of each period of `every` steps */
@@ -163,7 +165,7 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
 {
     static _Thread_local V f[MOST];
     static _Thread_local double ux[MOST], uz[MOST], len[MOST], c[MOST], bristle[POINTS * MOST], ends[2], a[2 * MOST][BAND];
-    static _Thread_local double before[MOST], lost[MOST], m[MOST], held[MOST], own[MOST];
+    static _Thread_local double before[MOST], lost[MOST], m[MOST];
     static _Thread_local Across w;
     const int n = d->cells;
     V *p = (V *)state, *v = p + n + 1;
@@ -172,8 +174,6 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
     ends[0] = ends[1] = 0;
     memset(before, 0, sizeof before);
     memset(lost, 0, sizeof lost);
-    memset(held, 0, sizeof held);
-    memset(own, 0, sizeof own);
     memset(&w, 0, sizeof w);
     const double kept = d->relaxation > 0 ? exp(-dt / d->relaxation) : 0;
     for (int i = 0; i <= n; i++) total += d->mass[i];
@@ -201,7 +201,7 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
             }
             before[i] = angle;
         }
-        if (d->shapes) curve(d, &w, before, m, held, own, kept, (1 - kept) / dt * d->loss_time);
+        if (d->shapes) curve(d, &w, before, m, kept, (1 - kept) / dt);
         for (int i = 1; i < n; i++) { c[i] -= m[i]; c[i - 1] += m[i]; }
         for (int j = 0; j < n; j++) {
             const double q = c[j] / len[j];
@@ -232,7 +232,7 @@ int run(const Device *d, double *state, double dt, long steps, long every, doubl
             const double g[6] = {hx, hz, -hx - qx, -hz - qz, qx, qz};
             lose(a, 2 * i - 2, 6, g, dt * d->loss[i]);
         }
-        solve(2 * (n + 1), a, (double *)v);
+        solve(2 * (n + 1), BAND, a, (double *)v);
         for (int i = 0; i <= n; i++) {
             p[i].x += dt * v[i].x; p[i].z += dt * v[i].z;
         }

@@ -11,12 +11,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-MOST, POINTS, SHAPES, STRETCHES = 512, 16, 8, 16
+MOST, POINTS, SHAPES, LIFTED, STRETCHES = 512, 16, 64, 24, 16
 ARRAYS = ("rigidity", "loss", "axial", "dashpot", "length", "couple", "lift", "mass", "kn", "cn")
 NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay",
            "relaxation")  # fmt: skip
@@ -28,6 +28,8 @@ FRACTION = 0.25
 The step is of first order: half changes the strides of the reference set by 0.4 % at cells of 2.6 mm, 0.1 % at 1.3 mm;
 double was used for cells of 0.65 mm only, by which time the bound itself is that small.
 """
+ELEMENT = 5e-3
+"""Length of the elements by which a strip curves across [m]."""
 
 
 class Device(ctypes.Structure):
@@ -43,11 +45,13 @@ class Device(ctypes.Structure):
         ("first", ctypes.c_int),
         ("last", ctypes.c_int),
         ("shapes", ctypes.c_int),
+        ("lifted", ctypes.c_int),
         ("bending", ctypes.c_double * SHAPES * SHAPES),
         ("poisson", ctypes.c_double * SHAPES * MOST),
-        ("flattening", ctypes.c_double * SHAPES * SHAPES * MOST),
-        ("relief", ctypes.c_double * STRETCHES * SHAPES * MOST),
-        ("loss_time", ctypes.c_double),
+        ("bending_loss", ctypes.c_double * SHAPES * SHAPES),
+        ("poisson_loss", ctypes.c_double * SHAPES * MOST),
+        ("flattening", ctypes.c_double * LIFTED * LIFTED * MOST),
+        ("relief", ctypes.c_double * STRETCHES * LIFTED * MOST),
     ]
 
 
@@ -63,29 +67,40 @@ def library() -> ctypes.CDLL:
         return ctypes.CDLL(str(out))
 
 
-def chain(s: dict, cell: float, relaxing: bool) -> tuple[dict[str, np.ndarray], np.ndarray, float]:
-    """Numbers of the device, its first state (2, stations, 2), and the shortest step of its springs [s]."""
-    length, patch = [], []
-    for name, width in (("overhang", 0.0), ("big_length", s["big_width"]), ("span", 0.0),
-                        ("small_length", s["small_width"]), ("overhang", 0.0)):  # fmt: skip
-        n = max(1, round(s[name] / cell))
-        length += [s[name] / n] * n
-        patch += [width] * n
-    length, patch, n = np.array(length), np.array(patch), len(length)
+def divided(s: dict, size: float) -> list[np.ndarray]:
+    """Lengths [m] of cells of about a size: of an overhang, the big patch, the bridge, the small patch, an overhang."""
+    parts = [s[n] for n in ("overhang", "big_length", "span", "small_length", "overhang")]
+    counts = [max(1, round(part / size)) for part in parts]
+    return [np.full(n, part / n) for part, n in zip(parts, counts, strict=True)]
+
+
+def cells(s: dict, size: float) -> tuple[np.ndarray, ...]:
+    """Of cells of about a size: length, width of sheet and patch [m], rigidity of the sheet, of both [N m^2].
+
+    Two bonded layers bend about their own neutral axis, the sheet alone beside the patch.
+    """
+    parts = divided(s, size)
+    length = np.concatenate(parts)
+    patch = np.repeat([0.0, s["big_width"], 0.0, s["small_width"], 0.0], [len(part) for part in parts])
     x = np.append(0.0, np.cumsum(length))
     width = np.interp((x[1:] + x[:-1]) / 2, x[[0, -1]], [s["rear_width"], s["front_width"]])
-
-    # bending: two bonded layers about their own neutral axis, the sheet alone beside the patch
     h, t = s["thickness"], s["patch_thickness"]
     soft, hard = MAE / (1 - 0.49**2), s["modulus"] / (1 - s["poisson"] ** 2)
     axis = (hard * h**2 / 2 + soft * t * (h + t / 2)) / (hard * h + soft * t)
     bonded = hard * (h**3 / 12 + h * (h / 2 - axis) ** 2) + soft * (t**3 / 12 + t * (h + t / 2 - axis) ** 2)
     bare = hard * h**3 / 12
-    rigidity = bare * (width - patch) + bonded * patch
+    return length, width, patch, bare * width, bare * (width - patch) + bonded * patch
+
+
+def chain(s: dict, cell: float, relaxing: bool) -> tuple[dict[str, np.ndarray], np.ndarray, float]:
+    """Numbers of the device, its first state (2, stations, 2), and the shortest step of its springs [s]."""
+    length, width, patch, bare, rigidity = cells(s, cell)
+    n, h, t = len(length), s["thickness"], s["patch_thickness"]
+    x = np.append(0.0, np.cumsum(length))
     k, c = np.zeros(n + 1), np.zeros(n + 1)
     half = length / rigidity / 2
     k[1:n] = 1 / (half[1:] + half[:-1])
-    part = half * bare * width / rigidity  # of the turn squared, over the whole's, that bends the sheet
+    part = half * bare / rigidity  # of the turn squared, over the whole's, that bends the sheet
     c[1:n] = s["loss_time"] * (k[1:n] if s["patch_loss"] else k[1:n] ** 2 * (part[1:] + part[:-1]))
 
     time = s["relaxation_time"] if relaxing else 0.0
@@ -128,96 +143,144 @@ def chain(s: dict, cell: float, relaxing: bool) -> tuple[dict[str, np.ndarray], 
 
 
 def across(
-    s: dict, cell: float, waves: int = 4, powers: tuple[int, ...] = (2, 4), nodes: int = 8
-) -> tuple[int, int, dict[str, np.ndarray]]:
-    """Stations where the bridge begins and ends, and energies of its curvature across by shape (see planar_crawler.c).
+    s: dict, cell: float, element: float = ELEMENT, powers: tuple[int, ...] = (2, 4), waves: int = 4, nodes: int = 6
+) -> dict:
+    """What the device has of a strip that curves across: shapes of that, and energies by shape (see planar_crawler.c).
 
-    Between the patches, where it is flat with its slope, the sheet is lifted by w(x, y) from a bend of curvature k(x)
-    and moves by u, v within itself. Energies per area are those of Kirchhoff and, for its stretching, of Donnell:
+    The sheet is lifted by w(x, y) from a bend of curvature k(x) and moves by u, v within itself. Energies per area are
+    those of Kirchhoff, with the rigidity D of sheet and patch spread over the width, and for the bridge's stretching of
+    Donnell:
 
         D / 2 (k_x^2 + k_y^2 + 2 nu k_x k_y + 2 (1 - nu) w_xy^2),  k_x = k + w_xx,  k_y = w_yy
         C / 2 (e_x^2 + e_y^2 + 2 nu e_x e_y + (1 - nu) / 2 g^2),   e_x = u_x - k w,  e_y = v_y,  g = u_y + v_x
 
-    with C = E h / (1 - nu^2). What is lifted from a bend is stretched: so a bridge that bends far stiffens. w has no
-    mean over the width, which is the chain's. The shapes are polynomials, so many `waves` along the bridge times powers
-    of the place across it; u and v are condensed. Those that a walk has leave a bridge 0.3 to 0.5 % too stiff.
+    with C = E h / (1 - nu^2). What is lifted from a bend is stretched: so a bridge that bends far stiffens. Patches
+    hardly bend along, but curve across where the bridge bends so fast that its losses ask for more than D k. w has no
+    mean over the width, which is the chain's. It is cubic along each of the elements, with its slope, times powers of
+    the place across; u and v are polynomials, so many `waves` along the bridge, and condensed.
     """
     h, nu, span = s["thickness"], s["poisson"], s["span"]
+    length, width, _, bare, rigidity = cells(s, cell)
+    x = np.append(0.0, np.cumsum(length))
+    first, last = np.cumsum([len(part) for part in divided(s, cell)])[1:3].tolist()
     stretch = s["modulus"] * h / (1 - nu**2)
-    plate = stretch * h**2 / 12
-    counts = [max(1, round(s[n] / cell)) for n in ("overhang", "big_length", "span")]
-    first, start = sum(counts[:2]), s["overhang"] + s["big_length"]
-    total = start + span + s["small_length"] + s["overhang"]
+    half_width = np.interp((x[first] + x[last]) / 2, x[[0, -1]], [s["rear_width"], s["front_width"]]) / 2
     at, weight = np.polynomial.legendre.leggauss(nodes)
-    half_width = 0.5 * (s["rear_width"] + (s["front_width"] - s["rear_width"]) * (start + span / 2) / total)
 
-    def along(x, power: int, derivative: int):
-        """[waves, ...] shapes that vanish at the ends as the power says."""
-        rim = np.polynomial.Polynomial([1, 0, -1]) ** power
-        shapes = [rim * np.polynomial.Legendre.basis(k).convert(kind=np.polynomial.Polynomial) for k in range(waves)]
-        return np.array([p.deriv(derivative)(2 * x / span - 1) * (2 / span) ** derivative for p in shapes])
+    # shapes: those that lift the bridge first
+    places = np.append(0.0, np.cumsum(np.concatenate(divided(s, element))))
+    at_bridge = (places > x[first] - 1e-9) & (places < x[last] + 1e-9)
+    order, lifting = np.argsort(~at_bridge, kind="stable"), 2 * len(powers) * int(at_bridge.sum())
+    one, none = np.eye(len(places))[:, order], np.zeros((len(places), len(places)))
+    value, slope = CubicHermiteSpline(places, one, none), CubicHermiteSpline(places, none, one / half_width)
+
+    def lift(at, derivative: int):
+        return np.stack([value(at, derivative), slope(at, derivative)]).transpose(2, 0, 1)
+
+    def within(at, derivative: int):
+        """[waves, ...] shapes that vanish at the ends of the bridge."""
+        legendre = [np.polynomial.Legendre.basis(k).convert(kind=np.polynomial.Polynomial) for k in range(waves)]
+        shapes = [np.polynomial.Polynomial([1, 0, -1]) * p for p in legendre]
+        z = 2 * (at - x[first]) / span - 1
+        return np.array([p.deriv(derivative)(z) * (2 / span) ** derivative for p in shapes])
 
     def side(y, power: int, derivative: int):
         p = np.polynomial.Polynomial.basis(power).deriv(derivative)
         return p(y / half_width) / half_width**derivative
 
     def product(f, g):
-        return np.concatenate([f * each for each in g])
+        """[shapes along times shapes across, ...]"""
+        return (f[..., None, :] * np.array(g)).reshape(-1, f.shape[-1])
 
-    count = waves * len(powers)
-    bending, membrane = np.zeros((count, count)), np.zeros((2 * count, 2 * count))
-    out = {"poisson": np.zeros((MOST, count)), "flattening": np.zeros((MOST, count, count)),
-           "relief": np.zeros((MOST, count, 2 * count))}  # fmt: skip
-    halves = np.linspace(0.0, span, 2 * counts[2] + 1)
-    for k, (a, b) in enumerate(pairwise(halves)):  # the hinge at its one end bends half a cell
-        hinge = first + (k + 1) // 2
-        bends = b - a if k in (0, 2 * counts[2] - 1) else 2 * (b - a)
-        x = (a + b) / 2 + (b - a) / 2 * np.repeat(at, nodes)
-        width = s["rear_width"] + (s["front_width"] - s["rear_width"]) * (start + x) / total
-        y = width / 2 * np.tile(at, nodes)
-        area = (b - a) / 2 * np.repeat(weight, nodes) * width / 2 * np.tile(weight, nodes)
-        mean = {p: (width / 2 / half_width) ** p / (p + 1) for p in powers}
-        lift, along_2 = (product(along(x, 2, d), [side(y, p, 0) - mean[p] for p in mean]) for d in (0, 2))
-        across_2 = product(along(x, 2, 0), [side(y, p, 2) for p in mean])
-        twist = product(along(x, 2, 1), [side(y, p, 1) for p in mean])
+    count, moves = 2 * len(powers) * len(places), 2 * waves * len(powers)
+    bending, bending_loss, membrane = np.zeros((count, count)), np.zeros((count, count)), np.zeros((moves, moves))
+    poisson, poisson_loss = np.zeros((len(x), count)), np.zeros((len(x), count))
+    flattening, relief = np.zeros((len(x), lifting, lifting)), np.zeros((len(x), lifting, moves))
+    half = length / rigidity / 2
+    for k in range(2 * len(length)):  # halves of cells: each bends with the hinge at its end, by its share
+        j, hinge = k // 2, (k + 1) // 2
+        a = x[j] + (k % 2) * length[j] / 2
+        both = half[hinge - 1 : hinge + 1]
+        bend = half[j] / both.sum() / (length[j] / 2) if len(both) == 2 else 0.0  # curvature over the hinge's turn
+        along = a + length[j] / 4 * (1 + np.repeat(at, nodes))
+        wide = np.interp(along, x[[0, -1]], [s["rear_width"], s["front_width"]])
+        y = wide / 2 * np.tile(at, nodes)
+        area = length[j] / 4 * np.repeat(weight, nodes) * wide / 2 * np.tile(weight, nodes)
+        lifted = [side(y, p, 0) - (wide / 2 / half_width) ** p / (p + 1) for p in powers]
+        along_2 = product(lift(along, 2), lifted)
+        across_2 = product(lift(along, 0), [side(y, p, 2) for p in powers])
+        twist = product(lift(along, 1), [side(y, p, 1) for p in powers])
+        d, c = rigidity[j] / width[j] * area, stretch * area
+        lossy = s["loss_time"] * (d if s["patch_loss"] else bare[j] / width[j] * area)
+        for matrix, coupling, by in ((bending, poisson, d), (bending_loss, poisson_loss, lossy)):
+            matrix += (by * along_2) @ (along_2 + nu * across_2).T + (by * across_2) @ (across_2 + nu * along_2).T
+            matrix += (2 * (1 - nu) * by * twist) @ twist.T
+            coupling[hinge] += bend * (along_2 + nu * across_2) @ by
+        if not first <= j < last:
+            continue
+        w = product(lift(along, 0), lifted)[:lifting]
         even, odd = ([p - k for p in powers] for k in (2, 1))
-        none = np.zeros((count, len(x)))
-        e_x = np.concatenate([product(along(x, 1, 1), [side(y, p, 0) for p in even]), none])
-        e_y = np.concatenate([none, product(along(x, 1, 0), [side(y, p, 1) for p in odd])])
-        shear = np.concatenate([product(along(x, 1, 0), [side(y, p, 1) for p in even]),
-                                product(along(x, 1, 1), [side(y, p, 0) for p in odd])])  # fmt: skip
-        d, c = plate * area, stretch * area
-        bending += (d * along_2) @ (along_2 + nu * across_2).T + (d * across_2) @ (across_2 + nu * along_2).T
-        bending += (2 * (1 - nu) * d * twist) @ twist.T
+        zero = np.zeros((moves // 2, len(along)))
+        e_x = np.concatenate([product(within(along, 1), [side(y, p, 0) for p in even]), zero])
+        e_y = np.concatenate([zero, product(within(along, 0), [side(y, p, 1) for p in odd])])
+        shear = np.concatenate([product(within(along, 0), [side(y, p, 1) for p in even]),
+                                product(within(along, 1), [side(y, p, 0) for p in odd])])  # fmt: skip
         membrane += (c * e_x) @ (e_x + nu * e_y).T + (c * e_y) @ (e_y + nu * e_x).T
         membrane += (0.5 * (1 - nu) * c * shear) @ shear.T
-        out["poisson"][hinge] += (along_2 + nu * across_2) @ d / bends
-        out["flattening"][hinge] += (c * lift) @ lift.T / bends**2
-        out["relief"][hinge] += (c * lift) @ (e_x + nu * e_y).T / bends
-    root = np.linalg.cholesky(membrane)
-    out["relief"] = np.linalg.solve(root, out["relief"].reshape(-1, 2 * count).T).T.reshape(out["relief"].shape)
-    return first, first + counts[2], {"bending": bending, **out}
+        flattening[hinge] += bend**2 * (c * w) @ w.T
+        relief[hinge] += bend * (c * w) @ (e_x + nu * e_y).T
+    relief = np.linalg.solve(np.linalg.cholesky(membrane), relief.reshape(-1, moves).T).T.reshape(relief.shape)
+    return {"first": first, "last": last, "shapes": count, "lifted": lifting, "bending": bending, "poisson": poisson,
+            "bending_loss": bending_loss, "poisson_loss": poisson_loss, "flattening": flattening,
+            "relief": relief}  # fmt: skip
 
 
 def turn(s: dict, cell: float, couple: float) -> tuple[float, float]:
     """Turn of a bridge that curves across under an even couple [N m]: [rad], and over that in plane strain."""
     from scipy.optimize import fsolve
 
-    first, last, e = across(s, cell, 10, (2, 4, 6, 8), nodes=12)
-    hinges = slice(first, last + 1)
+    e = across(s, cell, ELEMENT / 2, (2, 4, 6), waves=8, nodes=10)
+    hinges, some = slice(e["first"], e["last"] + 1), e["lifted"]
     stiffness = chain(s, cell, True)[0]["rigidity"][hinges]
     poisson, flattening, relief = (e[n][hinges] for n in ("poisson", "flattening", "relief"))
 
     def unbalanced(t):
         moved = np.einsum("i,iks->ks", t, relief)
-        whole = e["bending"] + np.einsum("i,ikl->kl", t**2, flattening) - moved @ moved.T
+        whole = e["bending"].copy()
+        whole[:some, :some] += np.einsum("i,ikl->kl", t**2, flattening) - moved @ moved.T
         c = np.linalg.solve(whole, -poisson.T @ t)
-        flat = t * np.einsum("k,ikl,l->i", c, flattening, c) - np.einsum("k,iks,s->i", c, relief, moved.T @ c)
+        b = c[:some]
+        flat = t * np.einsum("k,ikl,l->i", b, flattening, b) - np.einsum("k,iks,s->i", b, relief, moved.T @ b)
         return (stiffness * t + poisson @ c + flat) / couple - 1
 
     plane = couple / stiffness
     found = float(fsolve(unbalanced, plane).sum())
     return found, found / float(plane.sum())
+
+
+def filled(values: dict) -> Device:
+    device = Device()
+    for name, v in values.items():
+        if np.ndim(v):
+            np.ctypeslib.as_array(getattr(device, name))[tuple(map(slice, v.shape))] = v
+        else:
+            setattr(device, name, v)
+    return device
+
+
+def swung(lib: ctypes.CDLL, s: dict, *, cell: float, free: bool, duration: float) -> float:
+    """Turn of the small patch [rad] after a time in the field, the big one held, without weight, ground and air."""
+    values, state, step = chain(s | {"gravity": 0.0, "decay_rate": 0.0}, cell, True)
+    big, near, far = np.cumsum([len(part) for part in divided(s, cell)])[1:4]
+    values["mass"][: big + 1] = 1e9 * values["mass"].sum()
+    state[0, :, 1] += 1.0  # above the ground
+    steps = int(np.ceil(duration / (step * FRACTION)))
+    pointer, none = ctypes.POINTER(ctypes.c_double), np.zeros(1)
+    lib.run(ctypes.byref(filled(values | (across(s, cell) if free else {}))), state.ctypes.data_as(pointer),
+            ctypes.c_double(duration / steps), ctypes.c_long(steps), ctypes.c_long(steps + 1),
+            none.ctypes.data_as(pointer))  # fmt: skip
+    x, z = state[0, far] - state[0, near]
+    return float(np.arctan2(z, x))
 
 
 def walk(
@@ -230,20 +293,10 @@ def walk(
     relaxing: bool = False,
     free: bool = False,
 ) -> np.ndarray:
-    """Strides by cycle [m]; with `relaxing`, losses are the Maxwell branch of a free strip; with `free` too, and its
-    bridge curves across."""
+    """Strides by cycle [m]; with `relaxing`, losses are the Maxwell branch of a free strip; with `free` too, and it
+    curves across."""
     values, state, step = chain(s, cell, relaxing or free)
-    device = Device()
-    for name, v in values.items():
-        if np.ndim(v):
-            getattr(device, name)[: len(v)] = list(v)
-        else:
-            setattr(device, name, v)
-    if free:
-        device.shapes, device.loss_time = SHAPES, s["loss_time"]
-        device.first, device.last, energies = across(s, cell)
-        for name, v in energies.items():
-            ctypes.memmove(getattr(device, name), np.ascontiguousarray(v).ctypes.data, v.nbytes)
+    device = filled(values | (across(s, cell) if free else {}))
     every = int(np.ceil(1 / (s["frequency"] * step * fraction)))
     out = np.zeros(cycles + 1)
     out[0] = np.average(state[0, :, 0], weights=values["mass"])
@@ -263,8 +316,9 @@ def main(argv=None):
     parser.add_argument("--cycles", type=int, default=6)
     parser.add_argument("--fraction", type=float, default=FRACTION)
     parser.add_argument("--relaxing", action="store_true", help="losses as those of a free strip, not viscous")
-    parser.add_argument("--free", action="store_true", help="relaxing, and the bridge curves across")
+    parser.add_argument("--free", action="store_true", help="relaxing, and the strip curves across")
     parser.add_argument("--bend", type=float, nargs="+", metavar="N m", help="no walk: turn of a free bridge by couple")
+    parser.add_argument("--swing", type=float, nargs="+", metavar="ms", help="no walk: turn of a free bridge by time")
     args = parser.parse_args(argv)
     settings = read_calibration(args.calibration).override(args.set, "--set")
     values, lib = {n: settings[n].value for n in settings.as_dict()}, library()
@@ -272,7 +326,12 @@ def main(argv=None):
         for couple in args.bend or ():
             angle, softer = turn(values, 1e-3 * cell, couple)
             print(f"cells of {cell:g} mm, {couple:g} N m: {np.degrees(angle):.1f} deg, {softer:.4f} times plane strain")
-        if args.bend:
+        for time in args.swing or ():
+            plane, free = (
+                np.degrees(swung(lib, values, cell=1e-3 * cell, free=f, duration=1e-3 * time)) for f in (0, 1)
+            )
+            print(f"cells of {cell:g} mm, {time:g} ms: {free:.2f} deg, in plane strain {plane:.2f}")
+        if args.bend or args.swing:
             continue
         found = walk(lib, values, cell=1e-3 * cell, cycles=args.cycles, fraction=args.fraction,
                      relaxing=args.relaxing, free=args.free)  # fmt: skip
