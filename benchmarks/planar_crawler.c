@@ -10,7 +10,7 @@
 #define MOST 512
 #define POINTS 16
 #define SHAPES 64
-#define LIFTED 24
+#define LIFTED 32
 #define STRETCHES 16
 #define BAND 6 /* a hinge joins three stations of two coordinates */
 

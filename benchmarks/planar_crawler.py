@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-MOST, POINTS, SHAPES, LIFTED, STRETCHES = 512, 16, 64, 24, 16
+MOST, POINTS, SHAPES, LIFTED, STRETCHES = 512, 16, 64, 32, 16
 ARRAYS = ("rigidity", "loss", "axial", "dashpot", "length", "couple", "lift", "mass", "kn", "cn")
 NUMBERS = ("belly", "foot", "mu", "mu_forward", "mu_back", "field", "frequency", "gravity", "decay",
            "relaxation")  # fmt: skip
