@@ -1,7 +1,7 @@
 """What the crawler's stride hangs on, by the chain in a plane (planar_crawler.py), for which a walk takes a second.
 
     python benchmarks/crawler_unknowns.py [--out runs/crawler_unknowns] [--cell 3.8] [--only changes maps]
-    python benchmarks/crawler_unknowns.py --only points --cell 3.8 --samples 60
+    python benchmarks/crawler_unknowns.py --only points --samples 200
 
 The maps of `origami-sim study crawler` around the default, changes of 5 % of every parameter, and points of a Latin
 hypercube over eight unknowns, those near the target on half the cells as well. Without adhesion, which the chain lacks.
