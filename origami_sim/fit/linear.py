@@ -10,7 +10,6 @@ its innovations, which no choice of the starts can explain, and which are indepe
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
-from itertools import chain
 
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
@@ -24,11 +23,8 @@ PART = 1000
 Of 32,000 by 190 in 0.6 of the time of 8,000 rows at once, by one thread; 500 and 2,000 take a fifth more.
 """
 
-WIDE, SEGMENTS = 4000, 30
-"""Rows of a long matrix, and segments, that one core factors while others do the next ones: some 20 ms of work.
-
-Twice as many leave cores idle where a recording has 200 segments; half of them take as long together.
-"""
+WIDE = 4000
+"""Rows of a long matrix that one core factors while others do the next ones: some 20 ms of work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,39 +130,6 @@ class Linearisation:
             if tie is not None:
                 total -= float(np.log(tie).sum())
         return total
-
-    def condensed(self, columns: Sequence[np.ndarray]) -> tuple["Linearisation", list[np.ndarray]]:
-        """The same least squares, also of further columns [r, k], in few rows, for all sizes of the gaps.
-
-        A start reaches as many combinations of a segment's data as it has numbers, and other segments only through
-        them. All else is the same whatever the gaps: what it says together is a last segment without a start.
-        """
-        width, count = self.tangent[0].shape[1], columns[0].shape[1]
-        segments = range(len(self.rows))
-        parts = [segments[k : k + SEGMENTS] for k in range(0, len(segments), SEGMENTS)]
-        made = shared([partial(self._condensed, columns, part) for part in parts])
-        rows, slopes, kept = (list(chain.from_iterable(each)) for each in zip(*(one[:3] for one in made), strict=True))
-        kept.append(triangle(np.concatenate([beyond for *_, beyond in made])))
-        rows.append(Rows(len(kept[-1])))
-        slopes.append(np.zeros((len(kept[-1]), 0)))
-        tangent, more, residual = zip(*(np.split(x, [width, width + count], axis=1) for x in kept), strict=True)
-        line = Linearisation(rows, [r[:, 0] for r in residual], list(tangent), slopes, [*self.tie, None])
-        return line, list(more)
-
-    def _condensed(self, columns: Sequence[np.ndarray], segments: Sequence[int]):
-        """Rows, slopes and columns of some segments as starts reach them, and a triangle of what none of them does."""
-        rows, slopes, kept, beyond = [], [], [], []
-        for n in segments:
-            own, slope = self.rows[n], self.slopes[n]
-            whole, ends = np.column_stack([self.tangent[n], columns[n], self.residual[n]]), own.count - own.tie
-            known = slope if np.all(np.isfinite(slope)) else np.zeros_like(slope)
-            q, r = _orthogonal(known[:ends])
-            reached = q.T @ whole[:ends]
-            beyond.append(whole[:ends] - q @ reached)
-            rows.append(Rows(len(r), 0, own.tie))
-            slopes.append(np.concatenate([r, known[ends:]]))
-            kept.append(np.concatenate([reached, whole[ends:]]))
-        return rows, slopes, kept, triangle(np.concatenate(beyond))
 
     def padded(self, n: int, columns: np.ndarray) -> np.ndarray:
         """Columns of the rows of a segment's data, with zeros for all other rows."""

@@ -75,7 +75,7 @@ def flat_level(columns: Sequence[np.ndarray], noise: float) -> float:
     if max(len(c) for c in columns) < 4 * FILTER:
         return noise
     lags = 8 * FILTER  # so that the lines of the spectrum (Parzen's window) are half a band wide
-    covariance, u = autocovariance(columns, lags), np.arange(lags + 1) / lags
+    covariance, u = autocovariance(columns, lags)[0], np.arange(lags + 1) / lags
     window = np.where(u <= 0.5, 1.0 - 6.0 * u**2 + 6.0 * u**3, 2.0 * (1.0 - u) ** 3)
     frequency = np.linspace(0.0, 0.5, 4 * lags + 1)
     waves = np.cos(2.0 * np.pi * np.outer(np.arange(1, lags + 1), frequency))

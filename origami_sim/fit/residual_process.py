@@ -31,8 +31,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     """
     longest = max(len(c) for c in columns)
     order = min(ORDER, longest // 3)
-    products = autocovariance(columns, order)
-    count = sum(int(np.isfinite(c).sum()) for c in columns)
+    products, count = autocovariance(columns, order)
     level = max(float(np.sqrt(products[0])), noise)
     log_prior = -0.5 * float(np.log(level / noise) / STATED) ** 2
     best, found = 0.0, np.zeros(0)
@@ -53,10 +52,10 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     return level, np.ascontiguousarray(colour[: last + 1]), log_prior - 0.5 * len(found) * float(np.log(count))
 
 
-def autocovariance(columns: Sequence[np.ndarray], lags: int) -> np.ndarray:
-    """Products (lags + 1,) of residuals that many frames apart, over all segments, per frame that was seen."""
+def autocovariance(columns: Sequence[np.ndarray], lags: int) -> tuple[np.ndarray, int]:
+    """Products (lags + 1,) of residuals that many frames apart, over all segments, per frame that was seen; these."""
     apart = np.zeros(lags)
     joined = np.concatenate([part for c in columns for part in (c, apart)])
     known = np.isfinite(joined)
-    seen, filled = np.count_nonzero(known) - lags * len(columns), np.where(known, joined, 0.0)
-    return np.array([filled[: len(filled) - k] @ filled[k:] for k in range(lags + 1)]) / max(seen, 1)
+    seen, filled = int(np.count_nonzero(known)) - lags * len(columns), np.where(known, joined, 0.0)
+    return np.array([filled[: len(filled) - k] @ filled[k:] for k in range(lags + 1)]) / max(seen, 1), seen

@@ -69,7 +69,7 @@ def _two_levels(columns: list[np.ndarray]) -> tuple[float, float, float, float] 
     if len(columns) < FEWEST:
         return None
     square = np.array([float(np.nanmean(np.square(c))) for c in columns])
-    covariance = autocovariance(columns, min(ORDER, min(len(c) for c in columns) - 1))
+    covariance, _ = autocovariance(columns, min(ORDER, min(len(c) for c in columns) - 1))
     if square.min() <= 0.0 or covariance[0] <= 0.0:
         return None
     alike = 1.0 + 2.0 * float(np.sum((covariance[1:] / covariance[0]) ** 2))

@@ -68,6 +68,11 @@ class Foresight:
     def _before(self) -> float:
         return self._likely(self.own)
 
+    @cached_property
+    def _seen(self) -> np.ndarray:
+        """[n, D] which values were measured, in all segments."""
+        return np.concatenate([self.forward.blocks[b].seen() for b in self.fit.blocks])
+
     def _likely(self, groups: Sequence[Group]) -> float:
         """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part."""
         use = [*range(self.numbers), *(self.numbers + c for g in groups for c in g.columns)]
@@ -76,10 +81,10 @@ class Foresight:
         high = np.concatenate([none, *(np.maximum(g.bounds()[1] - g.at, 1e-12) for g in groups)])
         change = lsq_linear(self.root[:, use], self.root[:, -1], (low, high)).x
         assert self.fit.linear is not None
-        rows, blocks = self.fit.linear.rows, self.fit.blocks
-        rest = np.split(self.parts[:, -1] - self.parts[:, use] @ change, np.cumsum([r.data for r in rows])[:-1])
-        each = zip(rest, (self.forward.blocks[b].seen() for b in blocks), strict=True)
-        left = [np.where(seen, r.reshape(seen.shape) * self.weights.deviation, np.nan) for r, seen in each]
+        rows, deviation = self.fit.linear.rows, self.weights.deviation
+        rest = (self.parts[:, -1] - self.parts[:, use] @ change).reshape(-1, len(deviation))
+        lengths = [r.data // len(deviation) for r in rows]
+        left = np.split(np.where(self._seen, rest * deviation, np.nan), np.cumsum(lengths)[:-1])
         noise = left_by(self.forward, left, self.weights.gap)
         out = noise.log_prior - log_volume(noise, rows)
         for mine in patterns(rows):

@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from origami_sim.fit.evidence import Group, Sets, problem, summed
+from origami_sim.fit.chain import Chain
+from origami_sim.fit.evidence import Group, Problem, Sets, beside_numbers, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.hypothesis import usual
 from origami_sim.fit.least_squares import Fit, precision, smoothed
-from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import residual_process
-from origami_sim.fit.weights import Weights, recast
+from origami_sim.fit.weights import Weights
 from origami_sim.threads import shared
 
 ROUNDS = 4
@@ -60,13 +60,11 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
     if not any(t is not None for t in line.tie):
         return f.weights.gap
     own = OwnColumns(f)
-    line, none = line.condensed([np.zeros((r.count, 0)) for r in line.rows])
-    effects = [t[:, own.columns] for t in line.tangent]
-    laid, weights = own.sets(len(own.columns)), f.weights
+    laid = own.sets(len(own.columns))
+    chain = Chain.of(line, beside_numbers(line, own.nominal, [t[:, own.columns] for t in line.tangent]), f.weights.gap)
 
     def log_evidence(gap: float) -> float:
-        now, theirs = regapped(line, effects, weights, gap)
-        cell = summed(problem(now, own.nominal, own.precision, own.away, theirs, none), 0.0, 0.0)
+        cell = summed(own.problem(chain, gap, len(own.columns)), 0.0, 0.0)
         return float(cell.of(laid, hyper)[0][0] - np.log(gap))
 
     return hyper.gaps[int(np.argmax(shared([partial(log_evidence, gap) for gap in hyper.gaps])))]
@@ -107,15 +105,13 @@ class OwnColumns:
             self.groups.append(Group(columns, len(strong), at, side, spread, low, high, sizes))
             place += len(inner)
 
+    def problem(self, chain: Chain, gap: float, count: int) -> Problem:
+        """What is left of columns `beside_numbers`, of which so many are of effects, for a size of the gaps."""
+        cleared, spread = chain.eliminated(gap)
+        whole = with_priors([cleared], self.precision[self.nominal], self.away[self.nominal])
+        return without_numbers(whole, len(self.nominal), count, -spread)
+
     def sets(self, count: int) -> Sets:
         """The set of all of them, in a problem of so many columns."""
         whole = tuple(range(len(self.groups)))
         return Sets.of([whole], self.groups, len(whole), count)
-
-
-def regapped(line: Linearisation, effects: list[np.ndarray], weights: Weights, gap: float):
-    """A linearisation and further columns, for another size of the gaps."""
-    if not any(t is not None for t in line.tie):
-        return line, effects
-    new = replace(weights, gap=gap)
-    return line.reweighted(weights, new), recast(effects, line.rows, weights, new)

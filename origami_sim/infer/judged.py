@@ -6,12 +6,13 @@ from itertools import product
 
 import numpy as np
 
-from origami_sim.fit.evidence import Group, Problem, Summed, problem, summed
+from origami_sim.fit.chain import Chain
+from origami_sim.fit.evidence import Group, Problem, Summed, beside_numbers, summed
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import log_volume, recast
 from origami_sim.infer.discrepancy import cosines
-from origami_sim.infer.implied import OwnColumns, regapped
+from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.threads import shared
 
@@ -35,12 +36,11 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     width, weights = count + len(others), f.weights
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
     out.smooth = out.smooth or cosines(forward, f, line)
-    small, both = line.condensed([np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)])
+    both = [np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)]
+    chain = Chain.of(line, beside_numbers(line, own.nominal, both), weights.gap)
 
     def of_gap(gap: float) -> tuple[Problem, list[Summed]]:
-        now, columns = regapped(small, both, weights, gap)
-        theirs, waves = [c[:, :width] for c in columns], [c[:, width:] for c in columns]
-        made = problem(now, own.nominal, own.precision, own.away, theirs, waves)
+        made = own.problem(chain, gap, width)
         made = replace(made, constant=made.constant + volume)
         return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
 

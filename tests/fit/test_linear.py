@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import lstsq
 
 from origami_sim.fit import weights
+from origami_sim.fit.chain import Chain
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows, Weights, recast
 
@@ -79,24 +80,17 @@ def test_products_of_cleared_columns_are_those_without_the_starts(ties):
 @cases
 @lengths
 @pytest.mark.parametrize("gap", [1.0, 0.05])
-def test_condensed_rows_say_the_same_for_any_size_of_the_gaps(ties, data, gap):
-    """Products of all columns, starts and their determinant, though the ties came after."""
+def test_a_chain_says_the_same_for_any_size_of_the_gaps(ties, data, gap):
+    """Products of all columns and the determinant of the starts, though the ties came after."""
     line, old = made(ties, data=data, seed=5), Weights(np.ones(1))
-    new = replace(old, gap=gap)  # data weigh the same
+    here = line.reweighted(old, replace(old, gap=gap))  # data weigh the same
     more = [np.random.default_rng(n).normal(size=(r.count, 3)) for n, r in enumerate(line.rows)]
-    few, columns = line.condensed(more)
-    assert sum(r.count for r in few.rows) <= sum(r.tie + 3 for r in line.rows) + 2 + 3 + 1
-    here, there = line.reweighted(old, new), few.reweighted(old, new)
-
-    def products(line: Linearisation, columns) -> np.ndarray:
-        joined = zip(line.tangent, recast(columns, line.rows, old, new), line.residual, strict=True)
-        whole = np.concatenate(line.cleared([np.column_stack(parts) for parts in joined]))
-        return whole.T @ whole
-
-    assert products(there, columns) == pytest.approx(products(here, more), rel=1e-10, abs=1e-10)
-    assert there.spread == pytest.approx(here.spread, abs=1e-9)
-    starts = np.concatenate(there.starts(there.residual)[:-1])
-    assert starts == pytest.approx(np.concatenate(here.starts(here.residual)), abs=1e-8)
+    chain = Chain.of(line, [np.column_stack(parts) for parts in zip(line.tangent, more, strict=True)], old.gap)
+    found, spread = chain.eliminated(gap)
+    there = zip(here.tangent, recast(more, line.rows, old, replace(old, gap=gap)), strict=True)
+    whole = np.concatenate(here.cleared([np.column_stack(parts) for parts in there]))
+    assert found.T @ found == pytest.approx(whole.T @ whole, rel=1e-10, abs=1e-10)
+    assert spread == pytest.approx(here.spread, abs=1e-9)
 
 
 def test_innovations_do_not_know_what_comes_later():

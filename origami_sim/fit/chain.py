@@ -1,0 +1,117 @@
+"""Tied segments as a chain of few rows, of which the starts are eliminated for any size of the gaps.
+
+A start reaches as many combinations of a segment's data as it has numbers, and other segments only through the gaps. So
+all else is condensed once. What is left is a block-bidiagonal least squares, in which every other start is eliminated
+at once, then every other one of those that remain (cyclic reduction; Golub & Van Loan 2013, section 4.5), by orthogonal
+transformations.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from origami_sim.fit.linear import Linearisation, triangle
+from origami_sim.threads import shared
+
+SEGMENTS = 30
+"""Segments that one core condenses while others do the next ones: some 20 ms of work.
+
+Twice as many leave cores idle where a recording has 200 segments; half of them take as long together.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Columns of S segments, of which the starts have L numbers, in the rows that these reach, and in all others.
+
+    Attributes:
+        slopes: [S, L, L] of the rows of the data that a start reaches, by it. own: [S, L, k] these rows.
+        ends: [S, L, L] of the rows of the gaps. over: [S, L, k] these rows. tie: [S, L] as in a `Linearisation`; zero
+            where a segment is not tied to the next.
+        beyond: [., k] a triangle with the same least squares as all rows that no start reaches.
+        gap: for which size of the gaps these rows are.
+    """
+
+    slopes: np.ndarray
+    own: np.ndarray
+    ends: np.ndarray
+    over: np.ndarray
+    tie: np.ndarray
+    beyond: np.ndarray
+    gap: float
+
+    @classmethod
+    def of(cls, line: Linearisation, columns: Sequence[np.ndarray], gap: float) -> "Chain":
+        """Columns [r, k] of all segments of a linearisation, which was made for this size of the gaps."""
+        segments = range(len(line.rows))
+        parts = [segments[n : n + SEGMENTS] for n in range(0, len(segments), SEGMENTS)]
+        made = shared([partial(_condensed, line, columns, part) for part in parts])
+        slopes, own, ends, over, beyond = (np.concatenate(each) for each in zip(*made, strict=True))
+        tie = np.array([np.zeros(slopes.shape[1]) if t is None else t for t in line.tie])
+        return cls(slopes, own, ends, over, tie, triangle(beyond), gap)
+
+    def eliminated(self, gap: float) -> tuple[np.ndarray, float]:
+        """The columns [., k] without what starts explain, and half of the log determinant of the starts' precision.
+
+        For another size of the gaps; of the determinant, the gaps' own is taken off.
+        """
+        tied, size = np.flatnonzero(self.tie.any(axis=1)), self.slopes.shape[1]
+        if not len(tied):
+            return self.beyond, _log_determinant(self.slopes)
+        share = self.gap / gap
+        before = np.concatenate([self.slopes, share * self.ends], axis=1)
+        after = np.concatenate([np.zeros_like(self.ends), -share * self.tie[:, :, None] * np.eye(size)], axis=1)
+        rows = np.concatenate([self.own, share * self.over], axis=1)
+        left, spread = [self.beyond], -float(np.log(share * self.tie[tied]).sum())
+        while len(rows) > 1:  # a segment and the next one become one
+            even = slice(0, len(rows) // 2 * 2, 2)
+            odd, rest = slice(1, None, 2), slice(len(rows) // 2 * 2, None)
+            none = np.zeros_like(before[odd])
+            both = [_below(after[even], before[odd]), _below(before[even], none), _below(none, after[odd])]
+            q, r = np.linalg.qr(np.concatenate(both, axis=2), mode="complete")
+            joined = np.swapaxes(q, 1, 2) @ _below(rows[even], rows[odd])
+            left.append(joined[:, 3 * size :].reshape(-1, rows.shape[2]))
+            spread += _log_determinant(r[:, :size, :size])
+            kept = slice(size, 3 * size)
+            before = np.concatenate([r[:, kept, size : 2 * size], before[rest]])
+            after = np.concatenate([r[:, kept, 2 * size :], after[rest]])
+            rows = np.concatenate([joined[:, kept], rows[rest]])
+        q, r = np.linalg.qr(before[0], mode="complete")
+        left.append((q.T @ rows[0])[size:])
+        return np.concatenate(left), spread + _log_determinant(r[None, :size])
+
+
+def _condensed(line: Linearisation, columns: Sequence[np.ndarray], segments: Sequence[int]) -> tuple[np.ndarray, ...]:
+    """Slopes and rows that starts reach, the same of the gaps, and a triangle of what no start reaches."""
+    size, count = line.slopes[segments[0]].shape[1], columns[0].shape[1]
+    slopes, ends = np.zeros((2, len(segments), size, size))
+    own, over = np.zeros((2, len(segments), size, count))
+    beyond, alike = [np.zeros((0, count))], {}
+    for place, n in enumerate(segments):
+        alike.setdefault(line.rows[n].count - line.rows[n].tie, []).append((place, n))
+    for length, mine in alike.items():
+        places = [place for place, _ in mine]
+        slope, part = (np.stack([each[n][:length] for _, n in mine]) for each in (line.slopes, columns))
+        slope[~np.isfinite(slope).all(axis=(1, 2))] = 0.0
+        q, r = np.linalg.qr(slope)
+        reached = np.swapaxes(q, 1, 2) @ part
+        slopes[places, : r.shape[1]], own[places, : r.shape[1]] = r, reached
+        beyond.append((part - q @ reached).reshape(-1, count))
+    for place, n in enumerate(segments):
+        if line.rows[n].tie:
+            slope = line.slopes[n]
+            ends[place] = slope[-size:] if np.isfinite(slope).all() else 0.0
+            over[place] = columns[n][-size:]
+    return slopes, own, ends, over, triangle(np.concatenate(beyond))
+
+
+def _below(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Rows of pairs, those of the first above those of the second."""
+    return np.concatenate([a, b], axis=1)
+
+
+def _log_determinant(factors: np.ndarray) -> float:
+    """Log of the product of the diagonals of factors [n, L, L], or of their sizes."""
+    return float(np.log(np.maximum(np.abs(np.diagonal(factors, axis1=1, axis2=2)), 1e-300)).sum())
