@@ -156,8 +156,9 @@ class Articulation:
             shifts[child] = turns[parent] @ pivot + shifts[parent] - turns[child] @ pivot
         out = np.empty((len(x), pose.worlds, 3))
         for panel, turn in turns.items():
-            mine = self._owned[panel]
-            out[mine] = np.swapaxes(x[mine] @ np.swapaxes(turn, 1, 2) + shifts[panel][:, None], 0, 1)
+            mine = self._owned[panel]  # all worlds in one product
+            turned = (turn.reshape(-1, 3) @ x[mine].T).reshape(len(turn), 3, len(mine))
+            out[mine] = turned.transpose(2, 0, 1) + shifts[panel]
         return out
 
     def poses_of(self, x: np.ndarray, angles: np.ndarray) -> Pose:

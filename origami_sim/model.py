@@ -262,9 +262,8 @@ class Parameters:
         out = object.__new__(cls)
         out._values = {}
         for key, first in parts[0]._values.items():
-            columns = [p._values[key] for p in parts]
-            same = all(np.array_equal(c, first) for c in columns[1:])
-            out._values[key] = first.copy() if same else np.repeat(np.concatenate(columns, axis=1), repeat, axis=1)
+            columns = np.concatenate([p._values[key] for p in parts], axis=1)
+            out._values[key] = first.copy() if np.all(columns == first) else np.repeat(columns, repeat, axis=1)
         return out
 
     def copy(self) -> "Parameters":

@@ -43,7 +43,7 @@ class Chain:
     gap: float
 
     @classmethod
-    def of(cls, line: Linearisation, columns: Sequence[np.ndarray], gap: float) -> "Chain":
+    def of(cls, line: Linearisation, columns: Sequence[np.ndarray], gap: float = 1.0) -> "Chain":
         """Columns [r, k] of all segments of a linearisation, which was made for this size of the gaps."""
         segments = range(len(line.rows))
         parts = [segments[n : n + SEGMENTS] for n in range(0, len(segments), SEGMENTS)]
@@ -52,19 +52,16 @@ class Chain:
         tie = np.array([np.zeros(slopes.shape[1]) if t is None else t for t in line.tie])
         return cls(slopes, own, ends, over, tie, triangle(beyond), gap)
 
-    def eliminated(self, gap: float) -> tuple[np.ndarray, float]:
-        """The columns [., k] without what starts explain, and half of the log determinant of the starts' precision.
-
-        For another size of the gaps; of the determinant, the gaps' own is taken off.
-        """
+    def eliminated(self, gap: float = 1.0) -> "Eliminated":
+        """The same without what starts explain, for another size of the gaps."""
         tied, size = np.flatnonzero(self.tie.any(axis=1)), self.slopes.shape[1]
         if not len(tied):
-            return self.beyond, _log_determinant(self.slopes)
+            return Eliminated(self.beyond, _log_determinant(self.slopes), [], self.slopes, self.own)
         share = self.gap / gap
         before = np.concatenate([self.slopes, share * self.ends], axis=1)
         after = np.concatenate([np.zeros_like(self.ends), -share * self.tie[:, :, None] * np.eye(size)], axis=1)
         rows = np.concatenate([self.own, share * self.over], axis=1)
-        left, spread = [self.beyond], -float(np.log(share * self.tie[tied]).sum())
+        left, levels, spread = [self.beyond], [], -float(np.log(share * self.tie[tied]).sum())
         while len(rows) > 1:  # a segment and the next one become one
             even = slice(0, len(rows) // 2 * 2, 2)
             odd, rest = slice(1, None, 2), slice(len(rows) // 2 * 2, None)
@@ -73,14 +70,55 @@ class Chain:
             q, r = np.linalg.qr(np.concatenate(both, axis=2), mode="complete")
             joined = np.swapaxes(q, 1, 2) @ _below(rows[even], rows[odd])
             left.append(joined[:, 3 * size :].reshape(-1, rows.shape[2]))
+            levels.append((r[:, :size], joined[:, :size]))
             spread += _log_determinant(r[:, :size, :size])
             kept = slice(size, 3 * size)
             before = np.concatenate([r[:, kept, size : 2 * size], before[rest]])
             after = np.concatenate([r[:, kept, 2 * size :], after[rest]])
             rows = np.concatenate([joined[:, kept], rows[rest]])
-        q, r = np.linalg.qr(before[0], mode="complete")
-        left.append((q.T @ rows[0])[size:])
-        return np.concatenate(left), spread + _log_determinant(r[None, :size])
+        q, r = np.linalg.qr(before, mode="complete")
+        joined = np.swapaxes(q, 1, 2) @ rows
+        left.append(joined[0, size:])
+        first = r[:, :size]
+        return Eliminated(np.concatenate(left), spread + _log_determinant(first), levels, first, joined[:, :size])
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Columns of a chain without what starts explain.
+
+    Attributes:
+        rows: [., k] columns with the same least squares. spread: half of the log determinant of the starts' precision,
+            less that of the gaps: what eliminating them costs a marginal likelihood.
+        levels: the factors [n, L, 3 L] by which every other start follows from those beside it, and columns [n, L, k].
+        slopes, own: the factor and columns of the starts that are left.
+    """
+
+    rows: np.ndarray
+    spread: float
+    levels: list[tuple[np.ndarray, np.ndarray]]
+    slopes: np.ndarray
+    own: np.ndarray
+
+    def starts(self, by: np.ndarray) -> np.ndarray:
+        """The changes of the starts [S, L, ...] that explain sums of the columns by weights [k, ...] best."""
+        found = _solved(self.slopes, self.own @ by)
+        for factor, columns in reversed(self.levels):
+            size, pairs = factor.shape[1], len(factor)
+            following = np.concatenate([found[1:], np.zeros_like(found[:1])])[:pairs]
+            beside = np.concatenate([found[:pairs], following], axis=1)
+            middle = _solved(factor[:, :, :size], columns @ by - factor[:, :, size:] @ beside)
+            both = np.stack([found[:pairs], middle], axis=1).reshape(2 * pairs, *found.shape[1:])
+            found = np.concatenate([both, found[pairs:]])
+        return found
+
+
+def _solved(factors: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solutions [n, L, ...] with triangular factors [n, L, L]; what these do not tell stays where it is, at zero."""
+    diagonal = np.abs(np.diagonal(factors, axis1=1, axis2=2))
+    told = diagonal > 1e-12 * diagonal.max(axis=1, initial=1e-300, keepdims=True)
+    known = np.where(told[:, :, None], factors, np.eye(factors.shape[1]))
+    return np.linalg.solve(known, np.where(told[:, :, None], right, 0.0))
 
 
 def _condensed(line: Linearisation, columns: Sequence[np.ndarray], segments: Sequence[int]) -> tuple[np.ndarray, ...]:

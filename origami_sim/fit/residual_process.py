@@ -29,7 +29,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     Args:
         columns: (n,) residuals of each segment [SI], nan where missing. noise: standard deviation of a reading [SI].
     """
-    longest = max(len(c) for c in columns)
+    longest = max(map(len, columns))
     order = min(ORDER, longest // 3)
     products, count = autocovariance(columns, order)
     level = max(float(np.sqrt(products[0])), noise)

@@ -107,9 +107,9 @@ class OwnColumns:
 
     def problem(self, chain: Chain, gap: float, count: int) -> Problem:
         """What is left of columns `beside_numbers`, of which so many are of effects, for a size of the gaps."""
-        cleared, spread = chain.eliminated(gap)
-        whole = with_priors([cleared], self.precision[self.nominal], self.away[self.nominal])
-        return without_numbers(whole, len(self.nominal), count, -spread)
+        left = chain.eliminated(gap)
+        whole = with_priors([left.rows], self.precision[self.nominal], self.away[self.nominal])
+        return without_numbers(whole, len(self.nominal), count, -left.spread)
 
     def sets(self, count: int) -> Sets:
         """The set of all of them, in a problem of so many columns."""

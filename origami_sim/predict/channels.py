@@ -30,8 +30,9 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
         weights = np.zeros(len(model.position))
         np.add.at(weights, triangles, 1.0 / triangles.size)
         np.add.at(weights, axis, -0.5)
-        along = np.moveaxis(x, 2, 0).reshape(x.shape[2], len(x), -1) @ np.kron(weights, np.eye(3)[::2]).T
-        return np.moveaxis(np.arctan2(along[..., 0], along[..., 1]), 0, 1)[:, None]
+        by = (weights[:, None] * np.eye(3)[::2, None]).reshape(2, -1)
+        along = x.transpose(2, 0, 1, 3).reshape(x.shape[2], len(x), -1) @ by.T
+        return np.arctan2(along[..., 0], along[..., 1]).T[:, None]
     if channel.kind == "marker":
         return np.moveaxis(_points(model, channel, x), 2, 1)
     if channel.kind == "marker_2d":

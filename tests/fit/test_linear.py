@@ -86,11 +86,13 @@ def test_a_chain_says_the_same_for_any_size_of_the_gaps(ties, data, gap):
     here = line.reweighted(old, replace(old, gap=gap))  # data weigh the same
     more = [np.random.default_rng(n).normal(size=(r.count, 3)) for n, r in enumerate(line.rows)]
     chain = Chain.of(line, [np.column_stack(parts) for parts in zip(line.tangent, more, strict=True)], old.gap)
-    found, spread = chain.eliminated(gap)
+    left = chain.eliminated(gap)
     there = zip(here.tangent, recast(more, line.rows, old, replace(old, gap=gap)), strict=True)
     whole = np.concatenate(here.cleared([np.column_stack(parts) for parts in there]))
-    assert found.T @ found == pytest.approx(whole.T @ whole, rel=1e-10, abs=1e-10)
-    assert spread == pytest.approx(here.spread, abs=1e-9)
+    assert left.rows.T @ left.rows == pytest.approx(whole.T @ whole, rel=1e-10, abs=1e-10)
+    assert left.spread == pytest.approx(here.spread, abs=1e-9)
+    starts = np.stack(here.starts([t[:, :1] for t in here.tangent]))
+    assert left.starts(np.eye(5)[:, :1]) == pytest.approx(starts, abs=1e-8)
 
 
 def test_innovations_do_not_know_what_comes_later():
