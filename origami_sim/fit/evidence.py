@@ -13,6 +13,7 @@ approximation for strengths (MacKay 1992; Kennedy & O'Hagan 2001; George & McCul
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import erfcx, log_ndtr
@@ -149,8 +150,13 @@ class Sets:
     def of(cls, sets: Sequence[tuple[int, ...]], groups: Sequence[Group], own: int, count: int) -> "Sets":
         """Lays out sets of groups, of which the first `own` are those that a problem of `count` columns is about."""
 
+        used = sorted({g for row in sets for g in row})
+        ends = np.cumsum([0, *(len(groups[g].columns) for g in used)]).tolist()
+        place = {g: range(*span) for g, span in zip(used, pairwise(ends), strict=True)}
+        index = np.array([[c for g in row for c in place[g]] for row in sets], int).reshape(len(sets), -1)
+
         def each(take, dtype=float) -> np.ndarray:
-            return np.array([[v for g in row for v in take(groups[g])] for row in sets], dtype).reshape(len(sets), -1)
+            return np.concatenate([np.zeros(0, dtype), *(np.array(take(groups[g]), dtype) for g in used)])[index]
 
         back = np.zeros((len(sets), count))
         for k in range(own):
@@ -193,8 +199,10 @@ class Summed:
         known = np.asarray(self.log)[..., None]
         n, k = sets.columns.shape
         if np.any(sets.back):
-            lacking = sets.back @ gram
-            square = square + np.sum(sets.back * (2.0 * right[..., None, :] + lacking), axis=-1)
+            own = np.flatnonzero(np.any(sets.back, axis=0))
+            back = sets.back[:, own]
+            lacking = back @ gram[..., own, :]
+            square = square + np.sum(back * (2.0 * right[..., None, own] + lacking[..., own]), axis=-1)
             b = right[..., sets.columns] + lacking[..., np.arange(n)[:, None], sets.columns]
         else:
             b = right[..., sets.columns]

@@ -66,13 +66,14 @@ def measured(
     times: np.ndarray,
     shown: np.ndarray,
     *,
-    rested: bool,
+    rested: bool | None,
 ) -> np.ndarray:
     """Channels [n, D, W] as distorted measurements show them; what is `shown` first (K,) is the grid's start.
 
     Args:
         distort: effects of the measurement. channels: [F, D + k, W] on the grid (F,). times: (n,) of frames [s].
-        rested: whether the motion was at rest before the grid's start.
+        rested: whether the motion was at rest before the grid's start; None: the grid begins with the times of frames,
+            and they are read at no others.
     """
     worlds = channels.shape[2]
     shown = np.repeat(shown, worlds // len(shown))
@@ -127,11 +128,13 @@ def _wrapped(effect, inner, given):
     return lambda t: effect.apply(inner, t, **given)
 
 
-def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: bool):
+def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: bool | None):
     """values [F, d, W] as a function of times [n, W], of which `shown` (W,) is the grid's start.
 
-    Before it the motion rested, or went on as it began; many worlds may share a column.
+    Before it the motion rested, or went on as it began; many worlds may share a column. Of None, see `measured`.
     """
+    if rested is None:
+        return lambda times: values[: len(times)]
     curve = spline(grid, values)
 
     def at(times: np.ndarray) -> np.ndarray:

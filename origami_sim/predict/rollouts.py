@@ -279,7 +279,8 @@ class Rollouts(Worlds, ABC):
         clocked = bool(ends and np.any(longer))
         distort = [e for e in model.effects if get(e).family == "measurement"]
         frames = len(times)
-        as_filmed = not distort and np.allclose(times, np.arange(frames) * step, atol=1e-6 * step)
+        timed = any(not get(e).channels for e in distort)  # what reads angles or places has no time of its own
+        as_filmed = not timed and np.allclose(times, np.arange(frames) * step, atol=1e-6 * step)
         if not as_filmed:
             last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
             frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
@@ -304,7 +305,7 @@ class Rollouts(Worlds, ABC):
         grid = np.arange(len(raw)) * step
         if distort:
             parameters = Parameters.join([p for _, p in worlds], repeat=count)
-            rested = self.start != "fit"
+            rested = None if as_filmed else self.start != "fit"
             values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
         elif as_filmed:
             values = plain[: len(times)]
