@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import erfcx, log_ndtr
 
+from origami_sim.fit.chain import Chain
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.linear import Linearisation
 
@@ -90,9 +91,14 @@ def problem(
         effects: per segment [r, C]. smooth: per segment [r, K].
     """
     more = [np.concatenate(both, axis=1) for both in zip(effects, smooth, strict=True)]
-    parts = beside_numbers(line, nominal, more)
-    whole = with_priors(line.cleared(parts), precision[nominal], away[nominal])
-    return without_numbers(whole, len(nominal), effects[0].shape[1], -line.spread)
+    chain = Chain.of(line, beside_numbers(line, nominal, more))
+    return reduced(chain, precision[nominal], away[nominal], effects[0].shape[1])
+
+
+def reduced(chain: Chain, precision: np.ndarray, away: np.ndarray, columns: int) -> Problem:
+    """The problem of columns `beside_numbers`, of which so many are of effects; see `with_priors`."""
+    left = chain.eliminated()
+    return without_numbers(with_priors(left.rows, precision, away), len(precision), columns, -left.spread)
 
 
 def beside_numbers(line: Linearisation, nominal: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
@@ -103,13 +109,13 @@ def beside_numbers(line: Linearisation, nominal: np.ndarray, columns: list[np.nd
     ]
 
 
-def with_priors(cleared: list[np.ndarray], precision: np.ndarray, away: np.ndarray) -> np.ndarray:
-    """All segments, and below them a row for what is known of each of the numbers, whose columns come first."""
+def with_priors(rows: np.ndarray, precision: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """Rows, and below them one for what is known of each of the numbers, whose columns come first."""
     p = len(precision)
-    below = np.zeros((p, cleared[0].shape[1]))
+    below = np.zeros((p, rows.shape[1]))
     below[:, :p] = np.diag(precision)
     below[:, -1] = precision * away
-    return np.concatenate([*cleared, below])
+    return np.concatenate([rows, below])
 
 
 def without_numbers(whole: np.ndarray, p: int, columns: int, constant: float) -> Problem:

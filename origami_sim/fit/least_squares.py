@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.fit.chain import Chain
 from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Prediction, Predictor
@@ -429,7 +428,7 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = line.tangent[0].shape[1]
     change = np.zeros(len(free))
-    chain = Chain.of(line, [np.column_stack(p) for p in zip(line.tangent, line.residual, strict=True)]).eliminated()
+    chain = line.chain.eliminated()
     whole = chain.rows
     if width:
         prior = precision(free)
@@ -483,7 +482,7 @@ def _covariance(free: Sequence[Free], line: Linearisation) -> np.ndarray:
     if not line.tangent[0].shape[1]:
         return np.zeros((len(free), len(free)))
     scale = np.array([f.scale for f in free])
-    a = np.concatenate([Chain.of(line, line.tangent).eliminated().rows, np.diag(precision(free))])
+    a = np.concatenate([line.chain.eliminated().rows[:, :-1], np.diag(precision(free))])
     return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
 
 

@@ -11,11 +11,10 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from origami_sim.fit.chain import Chain
+from origami_sim.fit.chain import Chain, triangle
 from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import triangle
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, patterns, recast
 from origami_sim.infer.implied import OwnColumns, left_by
@@ -50,13 +49,12 @@ class Foresight:
         line = f.linear.reweighted(f.weights, plain)
         theirs = recast(effects, line.rows, f.weights, plain)
         columns, count = beside_numbers(line, own.nominal, theirs), len(own.nominal)
-        left = Chain.of(line, columns).eliminated()
-        whole = with_priors([left.rows], own.precision[own.nominal], own.away[own.nominal])
+        left = Chain.shared(line, columns).eliminated()
+        whole = with_priors(left.rows, own.precision[own.nominal], own.away[own.nominal])
         root = triangle(whole)
         white = summed(without_numbers(whole, count, theirs[0].shape[1], -left.spread), 0.0, hyper.flaws[0])
-        starts = left.starts(np.eye(whole.shape[1]))
-        each = zip(columns, line.slopes, starts, line.rows, strict=True)
-        parts = np.concatenate([c[: r.data] - s[: r.data] @ x for c, s, x, r in each])
+        smoothed = line.smoothed(columns, list(left.starts(np.eye(whole.shape[1]))))
+        parts = np.concatenate([s[: r.data] for s, r in zip(smoothed, line.rows, strict=True)])
         return cls(forward, f, plain, own.groups, count, white, root, parts)
 
     def gains(self, sets: Sequence[Sequence[Group]], hyper: Hyper) -> np.ndarray:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from origami_sim.fit.chain import Chain
-from origami_sim.fit.evidence import Group, Problem, Sets, beside_numbers, summed, with_priors, without_numbers
+from origami_sim.fit.evidence import Group, Problem, Sets, reduced, summed
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.hypothesis import usual
 from origami_sim.fit.least_squares import Fit, precision, smoothed
@@ -61,10 +61,10 @@ def best_gap(f: Fit, hyper: Hyper) -> float:
         return f.weights.gap
     own = OwnColumns(f)
     laid = own.sets(len(own.columns))
-    chain = Chain.of(line, beside_numbers(line, own.nominal, [t[:, own.columns] for t in line.tangent]), f.weights.gap)
+    chain, now = line.chain.columns(np.array([*own.nominal, *own.columns, -1])), f.weights.gap
 
     def log_evidence(gap: float) -> float:
-        cell = summed(own.problem(chain, gap, len(own.columns)), 0.0, 0.0)
+        cell = summed(own.problem(chain.regapped(now / gap), len(own.columns)), 0.0, 0.0)
         return float(cell.of(laid, hyper)[0][0] - np.log(gap))
 
     return hyper.gaps[int(np.argmax(shared([partial(log_evidence, gap) for gap in hyper.gaps])))]
@@ -105,11 +105,9 @@ class OwnColumns:
             self.groups.append(Group(columns, len(strong), at, side, spread, low, high, sizes))
             place += len(inner)
 
-    def problem(self, chain: Chain, gap: float, count: int) -> Problem:
-        """What is left of columns `beside_numbers`, of which so many are of effects, for a size of the gaps."""
-        left = chain.eliminated(gap)
-        whole = with_priors([left.rows], self.precision[self.nominal], self.away[self.nominal])
-        return without_numbers(whole, len(self.nominal), count, -left.spread)
+    def problem(self, chain: Chain, count: int) -> Problem:
+        """What is left of columns `beside_numbers`, of which so many are of effects."""
+        return reduced(chain, self.precision[self.nominal], self.away[self.nominal], count)
 
     def sets(self, count: int) -> Sets:
         """The set of all of them, in a problem of so many columns."""

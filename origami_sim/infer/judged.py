@@ -37,10 +37,10 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
     out.smooth = out.smooth or cosines(forward, f, line)
     both = [np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)]
-    chain = Chain.of(line, beside_numbers(line, own.nominal, both), weights.gap)
+    chain = Chain.shared(line, beside_numbers(line, own.nominal, both))
 
     def of_gap(gap: float) -> tuple[Problem, list[Summed]]:
-        made = own.problem(chain, gap, width)
+        made = own.problem(chain.regapped(weights.gap / gap), width)
         made = replace(made, constant=made.constant + volume)
         return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
 

@@ -8,7 +8,6 @@ import pytest
 from scipy.linalg import lstsq
 
 from origami_sim.fit import weights
-from origami_sim.fit.chain import Chain
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows, Weights, recast
 
@@ -62,10 +61,12 @@ def test_the_sweep_is_the_dense_problem(ties, data, seed):
     x, *_ = lstsq(a, y)
     squares = sum(float(v @ v) for v in line.cleared(line.residual))
     assert squares == pytest.approx(np.sum((y - a @ x) ** 2), rel=1e-10)
-    assert np.concatenate(line.starts(line.residual)) == pytest.approx(x, abs=1e-9)
-    assert np.concatenate(line.smoothed(line.residual)) == pytest.approx(y - a @ x, abs=1e-9)
+    chain = line.chain.eliminated()
+    starts = list(chain.starts(np.eye(3)[:, 2:])[:, :, 0])
+    assert np.concatenate(starts) == pytest.approx(x, abs=1e-9)
+    assert np.concatenate(line.smoothed(line.residual, starts)) == pytest.approx(y - a @ x, abs=1e-9)
     ties_ = sum(float(np.sum(np.log(t))) for t in line.tie if t is not None)
-    assert line.spread == pytest.approx(0.5 * np.linalg.slogdet(a.T @ a)[1] - ties_, abs=1e-9)
+    assert chain.spread == pytest.approx(0.5 * np.linalg.slogdet(a.T @ a)[1] - ties_, abs=1e-9)
 
 
 @cases
@@ -81,18 +82,15 @@ def test_products_of_cleared_columns_are_those_without_the_starts(ties):
 @lengths
 @pytest.mark.parametrize("gap", [1.0, 0.05])
 def test_a_chain_says_the_same_for_any_size_of_the_gaps(ties, data, gap):
-    """Products of all columns and the determinant of the starts, though the ties came after."""
+    """Products of columns, and the chain of other weights, though the ties came after."""
     line, old = made(ties, data=data, seed=5), Weights(np.ones(1))
-    here = line.reweighted(old, replace(old, gap=gap))  # data weigh the same
-    more = [np.random.default_rng(n).normal(size=(r.count, 3)) for n, r in enumerate(line.rows)]
-    chain = Chain.of(line, [np.column_stack(parts) for parts in zip(line.tangent, more, strict=True)], old.gap)
-    left = chain.eliminated(gap)
-    there = zip(here.tangent, recast(more, line.rows, old, replace(old, gap=gap)), strict=True)
-    whole = np.concatenate(here.cleared([np.column_stack(parts) for parts in there]))
+    new = replace(old, gap=gap)  # data weigh the same
+    here = line.reweighted(old, new)
+    left, there = line.chain.regapped(old.gap / gap).eliminated(), here.chain.eliminated()
+    whole = np.concatenate(here.cleared([np.column_stack(p) for p in zip(here.tangent, here.residual, strict=True)]))
     assert left.rows.T @ left.rows == pytest.approx(whole.T @ whole, rel=1e-10, abs=1e-10)
-    assert left.spread == pytest.approx(here.spread, abs=1e-9)
-    starts = np.stack(here.starts([t[:, :1] for t in here.tangent]))
-    assert left.starts(np.eye(5)[:, :1]) == pytest.approx(starts, abs=1e-8)
+    assert left.spread == pytest.approx(there.spread, abs=1e-9)
+    assert left.starts(np.eye(3)) == pytest.approx(there.starts(np.eye(3)), abs=1e-8)
 
 
 def test_innovations_do_not_know_what_comes_later():
@@ -123,9 +121,10 @@ def test_gaps_without_doubt_join_segments_into_one():
     y = np.append(np.concatenate([r[:6] for r in residual]), np.zeros(2))
     squares = sum(float(v @ v) for v in line.cleared(residual))
     assert squares == pytest.approx(np.sum((y - one @ lstsq(one, y)[0]) ** 2), rel=1e-6)
-    assert line.starts(residual)[0] == pytest.approx(lstsq(one, y)[0], abs=1e-6)
+    chain = line.chain.eliminated()
+    assert chain.starts(np.eye(1))[0, :, 0] == pytest.approx(lstsq(one, y)[0], abs=1e-6)
     # what is left of the determinant is that of the one start
-    assert line.spread == pytest.approx(0.5 * np.linalg.slogdet(one.T @ one)[1], abs=1e-6)
+    assert chain.spread == pytest.approx(0.5 * np.linalg.slogdet(one.T @ one)[1], abs=1e-6)
 
 
 def test_other_weights_scale_data_and_gaps_and_nothing_else():
@@ -139,7 +138,7 @@ def test_other_weights_scale_data_and_gaps_and_nothing_else():
         assert other.slopes[n] == pytest.approx(by[:, None] * line.slopes[n])
     assert line.reweighted(old, old) is line
     back = other.reweighted(new, old)
-    assert back.spread == pytest.approx(line.spread)
+    assert back.chain.eliminated().spread == pytest.approx(line.chain.eliminated().spread)
 
 
 def test_missing_values_weigh_nothing():
