@@ -21,7 +21,7 @@ from origami_sim.fit.weights import Weights
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.screen import Signature, screen
-from origami_sim.predict.track import track
+from origami_sim.predict.track import followed
 
 UNLISTED = EFFECT.name
 
@@ -67,7 +67,8 @@ def motion(forward: Predictor) -> tuple[np.ndarray, np.ndarray] | None:
     """
     if forward.prescribed:
         return None
-    tracks = [t for r in forward.recordings if (t := track(forward, r)) is not None and len(t.times) > WINDOW]
+    every = [followed(forward, r) for r in range(len(forward.recordings))]
+    tracks = [t for t in every if t is not None and len(t.times) > WINDOW]
     folds = len(forward.articulation.creases)
     if not tracks or not folds:
         return None

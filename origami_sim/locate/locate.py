@@ -21,7 +21,7 @@ from origami_sim.infer.diagnosis import REVERSAL, Curve, Place
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.curves import PASSIVE
 from origami_sim.predict.rollouts import Rollouts
-from origami_sim.predict.track import track
+from origami_sim.predict.track import followed
 from origami_sim.solve.batch import Batch
 
 BINS = 13
@@ -85,13 +85,13 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     see `impulses`.
     """
     recording, arm = forward.recordings[index], forward.articulation
-    followed = track(forward, recording)
-    if followed is None or not np.any(followed.told) or not (arm.floating or np.all(followed.told)):
+    path = followed(forward, index)
+    if path is None or not np.any(path.told) or not (arm.floating or np.all(path.told)):
         return None
     times = recording.times - recording.times[0]
     step = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1], step)
-    q, noise, told = np.stack([np.interp(grid, times, row) for row in followed.q]), followed.noise, followed.told
+    q, noise, told = np.stack([np.interp(grid, times, row) for row in path.q]), path.noise, path.told
     half = _half_window(q[told], noise[told])
     if q.shape[1] < 4 * half + 2:
         return None
@@ -104,7 +104,7 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     )
     model, parameters = forward.world(fit.hypothesis, fit.theta, fit.hypothesis.effects)
     without, parameters = loose(model, parameters)
-    pose = followed.at(grid + recording.times[0], smooth)
+    pose = path.at(grid + recording.times[0], smooth)
     drive = distorted(without, parameters, forward.drives[index], float(grid[-1]))
     frozen = drive.replace(**{n: Signal(offset=_at(s, grid)) for n, s in drive.signals.items()})
     inertia, free, gaps = dynamics(forward, without, parameters, frozen, pose, rate)

@@ -88,11 +88,18 @@ def track(forward, recording: Recording, values: np.ndarray | None = None) -> Tr
     return Track(times, pose, np.concatenate([pose.centre.T, turns.T, folds]), spread, told)
 
 
+def followed(forward, index: int) -> Track | None:
+    """The motion of a recording, which is found once; see `track`."""
+    if index not in forward.tracked:
+        forward.tracked[index] = track(forward, forward.recordings[index])
+    return forward.tracked[index]
+
+
 def coordinates(forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Folds [m, n] of all frames of a recording and their noise (m,); None if channels do not give the whole pose."""
     if forward.articulation.floating:
         return None
-    found = track(forward, forward.recordings[index])
+    found = followed(forward, index)
     return (found.q, found.noise) if found is not None and np.all(found.told) else None
 
 

@@ -20,6 +20,7 @@ from origami_sim.weight import weighed
 
 if TYPE_CHECKING:
     from origami_sim.predict.cache import Cache
+    from origami_sim.predict.track import Track
 
 World = tuple[Model, Parameters]
 
@@ -44,6 +45,7 @@ class Worlds(ABC):
         self._built: dict[tuple, World] = {}
         self._arms: dict[bytes, Articulation] = {self.model.position.tobytes(): self.articulation}
         self.components = component_names(self.recordings[0])
+        self.tracked: dict[int, Track | None] = {}
         self.blocks: list[Block] = []
         self.drives: list[Drive] = []
 
