@@ -123,7 +123,7 @@ def averaged(channel: Channel, every: int, times: np.ndarray, even: np.ndarray) 
     out = values[at]
     out[1:-1] = np.where(whole[:, None] & np.isfinite(inner), inner, out[1:-1])
     for k, d in np.argwhere(whole[:, None] & np.isnan(inner)).tolist():
-        frames = np.arange(n)[first[k] : last[k] + 1]
+        frames = np.arange(first[k], last[k] + 1)
         part, x = values[frames, d], frames - at[k + 1]
         seen = np.isfinite(part)
         if seen.sum() >= 2 * every and np.any(seen & (x < 0)) and np.any(seen & (x > 0)):

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import erfcx, log_ndtr
 
 from origami_sim.fit.chain import Chain
@@ -254,7 +255,7 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     cross = p.gram[: c + k][:, rows] * scale[:, None]
     m = np.eye(c + k) + u
     root = np.linalg.cholesky(m)
-    by = np.linalg.solve(root, cross)
+    by = solve_triangular(root, cross, lower=True, check_finite=False)
     gram = p.gram[np.ix_(rows, rows)] - by.T @ by
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
 

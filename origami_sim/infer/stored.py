@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed
@@ -66,7 +67,7 @@ class Reduced:
         gram = self.gram - (self.cross * by) @ self.cross.T
         log = self.constant - 0.5 * float(np.sum(np.log1p(smooth**2 * self.size)))
         root = np.linalg.cholesky(np.eye(c) + gram[:c, :c] * scale[:, None] * scale)
-        left = np.linalg.solve(root, gram[:c] * scale[:, None])
+        left = solve_triangular(root, gram[:c] * scale[:, None], lower=True, check_finite=False)
         return Summed(gram - left.T @ left, log - float(np.sum(np.log(np.diag(root)))))
 
 
