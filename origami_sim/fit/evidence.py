@@ -13,6 +13,7 @@ approximation for strengths (MacKay 1992; Kennedy & O'Hagan 2001; George & McCul
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -60,6 +61,13 @@ class Group:
     def sizes(self) -> np.ndarray:
         """Usual values (k,) of the columns, infinite where there are none."""
         return np.full(len(self.columns), np.inf) if self.usual is None else self.usual
+
+    @cached_property
+    def laid(self) -> np.ndarray:
+        """[8, k] what `Sets` are laid out from, in the order of its attributes."""
+        place = np.arange(len(self.columns))
+        side, strength = np.where(place == 0, self.side, 0), place < self.strengths
+        return np.array([self.columns, self.at, self.spread, side, strength, *self.bounds(), self.sizes()], float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,25 +170,14 @@ class Sets:
         place = {g: range(*span) for g, span in zip(used, pairwise(ends), strict=True)}
         index = np.array([[c for g in row for c in place[g]] for row in sets], int).reshape(len(sets), -1)
 
-        def each(take, dtype=float) -> np.ndarray:
-            return np.concatenate([np.zeros(0, dtype), *(np.array(take(groups[g]), dtype) for g in used)])[index]
-
+        each = np.concatenate([np.zeros((8, 0)), *(groups[g].laid for g in used)], axis=1)[:, index]
         back = np.zeros((len(sets), count))
         for k in range(own):
             g = groups[k]
             lacks = np.array([k not in row for row in sets])
             back[np.ix_(lacks, np.array(g.columns[: g.strengths], int))] = g.at[: g.strengths]
-        return cls(
-            each(lambda g: g.columns, int),
-            each(lambda g: g.at),
-            each(lambda g: g.spread),
-            each(lambda g: [g.side] + [0] * (len(g.columns) - 1), int),
-            each(lambda g: [n < g.strengths for n in range(len(g.columns))], bool),
-            each(lambda g: g.bounds()[0]),
-            each(lambda g: g.bounds()[1]),
-            each(lambda g: g.sizes()),
-            back,
-        )
+        columns, at, spread, side, strength, low, high, usual = each
+        return cls(columns.astype(int), at, spread, side, strength > 0.0, low, high, usual, back)
 
 
 @dataclass(frozen=True, eq=False)
