@@ -11,10 +11,11 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
-from origami_sim.model import Parameters, State, node_mass
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.predict.rollouts import Motion, Rollouts, Shots, Simulated, film, joined_poses
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
+from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import RigidBatch, Topology, check_inertia
 
 FEWEST = 8
@@ -198,6 +199,10 @@ class RigidRollouts(Rollouts):
         if ends is not None:
             ends[..., lost] = np.nan
         return out, ends
+
+    def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
+        tree = self._tree if np.array_equal(model.position, self.model.position) else None
+        return super()._batch(model, parameters, drive, state, tree=tree, **options)
 
     def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
         """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other.

@@ -38,7 +38,7 @@ class RigidBatch(Batch):
 
     Args:
         model: with `panels` "rigid" (see `bodies.rigid`). tolerance: error of one step [rad]; 0: steps as given.
-        The rest as for `Batch`.
+        tree: the model's, if it is known. The rest as for `Batch`.
 
     Raises:
         InputError: panels that are not joined by creases, held in a way that is no rigid motion, without mass or
@@ -46,9 +46,17 @@ class RigidBatch(Batch):
     """
 
     def __init__(
-        self, model: Model, parameters: Parameters, drive: Drive, state: State, *, tolerance=TOLERANCE, **options
+        self,
+        model: Model,
+        parameters: Parameters,
+        drive: Drive,
+        state: State,
+        *,
+        tolerance=TOLERANCE,
+        tree: "Topology | None" = None,
+        **options,
     ):
-        self.tree_of = Topology(model)
+        self.tree_of = tree or Topology(model)
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
         super().__init__(model, parameters, drive, state, **options)
@@ -543,12 +551,13 @@ def batch_of(
     *,
     among: Sequence[str] = (),
     tolerance: float = TOLERANCE,
+    tree: Topology | None = None,
     **options,
 ) -> Batch:
     """A batch of worlds of whichever kind the model's panels ask for.
 
-    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance` is of
-    rigid panels, see `RigidBatch`; the rest is as for `Batch`.
+    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance` and
+    `tree` are of rigid panels, see `RigidBatch`; the rest is as for `Batch`.
     """
     if model.panels != "rigid":
         return Batch(model, parameters, drive, state, among=among, **options)
@@ -556,7 +565,7 @@ def batch_of(
         unit = parameters.copy()
         unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
         return Batch(model, unit, drive, state, among=among, **options)
-    return RigidBatch(model, parameters, drive, state, among=among, tolerance=tolerance, **options)
+    return RigidBatch(model, parameters, drive, state, among=among, tolerance=tolerance, tree=tree, **options)
 
 
 def check_inertia(model: Model, tree: Topology, x: np.ndarray, mass: np.ndarray) -> None:
