@@ -577,8 +577,7 @@ def check_inertia(model: Model, tree: Topology, x: np.ndarray, mass: np.ndarray)
     Raises:
         InputError: names the panel.
     """
-    _, by = tree.positions(x, np.zeros((len(tree.turns) + len(tree.joints), 1)))
-    by = by[:, :, 0]
+    by = tree.rates(x[:, None])[:, :, 0]
     heavy = np.einsum("mna,n,mna->m", by, mass, by)
     light = np.flatnonzero(heavy <= 1e-15 * heavy.max(initial=0.0))
     if len(light):
