@@ -33,11 +33,11 @@ def distinct(fits: Sequence[Fit]) -> list[str]:
 
 
 def say(f: Fit, *, only: Collection[str] | None = None) -> str:
-    """The effects of a fit, all or `only` some, with their sites and strengths: those of the device first.
+    """The effects of a fit, all or `only` some, with their sites and strengths: those of the device first, each once.
 
     Intervals are left to the table where there are more than two: a headline has to be read at a glance.
     """
-    out = []
+    sites: dict[str, list[str]] = {}
     every = [s for s in f.hypothesis.suspects if only is None or s.effect in only]
     every.sort(key=lambda s: s.kind == "measurement")
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
@@ -52,10 +52,10 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
         if s.more:
             what = f"{'more' if t > 0 else 'less'} {what} than stated"
         strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
-        where = f" at {s.site}" if s.site not in WHOLE else ""
+        where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
-        out.append(f"{what}{where} ({strength}{interval})")
-    return joined(out)
+        sites.setdefault(what, []).append(f"{where}({strength}{interval})")
+    return joined([f"{what} {joined(each)}" for what, each in sites.items()])
 
 
 def elsewhere(f: Fit) -> str:

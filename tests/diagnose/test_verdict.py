@@ -1,20 +1,22 @@
 """What a verdict is made of: sets of explanations, and words for what is left."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.hypothesis import Free, Suspect
+from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.verdict import credible, decide, in_all, undecided
-from origami_sim.infer.words import joined, said, title
+from origami_sim.infer.words import joined, said, say, title
 from origami_sim.locate.describe import described
 
 
@@ -157,3 +159,14 @@ def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
     p.log = {key: np.where(HYPER.clean, log, -np.inf) for key, log in p.total.items()}
     p.nodes = cast(dict, dict.fromkeys(p.total))
     return p
+
+
+def test_an_effect_at_two_sites_is_named_once():
+    numbers = [Free("crease_friction", "friction_moment", "N m", 0.0, 1e-3) for _ in range(2)]
+    suspects = [Suspect("crease_friction", f"fold{n}", "crease", (f,), (n,)) for n, f in enumerate(numbers)]
+    values, sd = np.array([1e-3, 2e-3]), np.full(2, 1e-5)
+    ends = values - 2.0 * sd, values + 2.0 * sd
+    made = {"free": numbers, "theta": values, "deviations": lambda: sd, "intervals": lambda: ends}
+    text = say(cast(Fit, SimpleNamespace(hypothesis=Hypothesis(tuple(suspects)), **made)))
+    assert text.count("dry friction in a crease") == 1
+    assert "at fold0 (friction moment 1.00 mN m" in text and " and at fold1 (friction moment 2.000" in text
