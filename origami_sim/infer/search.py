@@ -279,14 +279,14 @@ def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
 def polished(out: Posterior, forward: Predictor) -> bool:
     """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
 
-    Leaders are those of the sets that may be named that hold part of the posterior, or would if they gained as much as
-    others did.
+    Leaders are the best set, which is believed by what its fit reaches and not by what derivatives promise, and those
+    that may be named that hold part of the posterior, or would if they gained as much as others did.
     """
     prior, some = log_priors(out.signatures), False
     while True:
         fitted = _named(out)
         least = max(out.total[k] for k in fitted) + np.log(UNFITTED) - max(0.0, _most(list(out.polished.values())))
-        leaders = [k for k in fitted if out.total[k] >= least and k not in out.polished]
+        leaders = [k for k in [*fitted, out.leader] if out.total[k] >= least and k not in out.polished]
         if not leaders:
             return some
         key, some = max(leaders, key=lambda k: out.total[k]), True
@@ -431,11 +431,11 @@ def _judge(
     white = node.foresight.white if foresee and node.foresight is not None else None
     count = every.gram.shape[-1] - 1
 
-    def judged(mine: list[int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    def of_sets(mine: list[int]) -> list[tuple[np.ndarray, np.ndarray]]:
         rows = Sets.of([sets[n] for n in mine], node.groups, own, count)
         return [each.of(rows, out.hyper) for each in (every, white) if each is not None]
 
-    judgements = list(zip(alike, shared([partial(judged, mine) for mine in alike]), strict=True))
+    judgements = list(zip(alike, shared([partial(of_sets, mine) for mine in alike]), strict=True))
     log_prior = np.array([_log_prior(key, prior, out.hyper) for key in keys])
     for mine, ((log, value), *_) in judgements:
         found[np.ix_(mine, order)] = (log + cells[order, None] + log_prior[mine]).T
