@@ -26,7 +26,8 @@ Of 32,000 by 190 in 0.6 of the time of 8,000 rows at once, by one thread; 500 an
 """
 
 WIDE = 4000
-"""Rows of a long matrix that one core factors while others do the next ones: some 20 ms of work."""
+"""Rows of a long matrix that one core factors while others do the next ones: some 20 ms of work. It decides on time and
+rounding alone."""
 
 SEGMENTS = 30
 """Segments that one core condenses while others do the next ones: some 20 ms of work.

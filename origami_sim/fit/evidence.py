@@ -217,7 +217,7 @@ class Summed:
         # shapes have normal priors about where they began; strengths a wide one, so that what does not show is finite
         wide = np.where(np.isfinite(sets.spread), sets.spread, 1e6)
         tight = np.where(sets.strength, norm / hyper.slabs[-1], 1.0 / wide)
-        full, value, move, force = a, sets.at, sets.at, sets.at
+        full, value, move, force = a, sets.at, sets.at, np.zeros_like(sets.at)
         for turn in range(ROUNDS):
             if turn:  # as narrow as the normals are that a strength of this size may come from
                 slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
@@ -283,7 +283,8 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
     """Where x' A x / 2 - b' x is least within bounds, and its slope there: none but in numbers that a bound holds.
 
     A sweep over coordinates finds which numbers are held, and a Newton step up to the next bound moves the others, in
-    turn (as in gradient projection, More & Toraldo 1991): no turn makes it worse.
+    turn (as in gradient projection, More & Toraldo 1991): no turn makes it worse. All problems at once, of which
+    scipy's `lsq_linear` solves one at a time.
 
     Args:
         a: [..., n, k, k]. b: [..., n, k]. low, high: [n, k].

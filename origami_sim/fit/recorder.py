@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.noise import STATED, infer
+from origami_sim.fit.noise import infer
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.residual_process import autocovariance
+from origami_sim.fit.residual_process import autocovariance, level_prior
 from origami_sim.fit.weights import Weights
 
 FILTER = 10
@@ -33,23 +33,28 @@ def recorder_noise(forward: Predictor, f: Fit) -> np.ndarray:
     return np.array([flat_level([r[:, d] for r in whole], float(n)) for d, n in enumerate(noise)])
 
 
-def recorder_weights(forward: Predictor, f: Fit) -> Weights:
-    """Level and colour of noise as a recorder's may be that a fit leaves, read where no motion reaches (see `infer`).
+def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
+    """Noise that a recorder may have, of which a fit would leave nothing else: white, or as a tracker colours it.
 
-    Of curves it is white, as large as neighbouring points show.
+    White noise is as large as what is left; that of a tracker is read where no motion reaches (see `infer`), and of
+    curves, which have none, white noise as large as neighbouring points show.
     """
     own, noise = f.weights, forward.blocks[0].noise
     assert own is not None
+
+    def of(level: np.ndarray, colour: tuple[np.ndarray, ...] = ()) -> Weights:
+        prior = sum(level_prior(float(a), float(n)) for a, n in zip(level, noise, strict=True))
+        return Weights(level, colour, own.gap, prior)
+
     if forward.curve:
         rough = [np.diff(r, 2, axis=0) / np.sqrt(6.0) for r in f.residuals if len(r) > 2]
         level = np.sqrt(np.nanmean(np.concatenate(rough) ** 2, axis=0)) if rough else noise
-        return Weights(np.maximum(np.nan_to_num(level), noise), gap=own.gap, log_prior=own.log_prior)
+        return [of(own.deviation), of(np.maximum(np.nan_to_num(level), noise))]
     longest = max(joined(forward, f), key=len)
     times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(longest))
     found = [infer(times, column, stated=float(n)) for column, n in zip(longest.T, noise, strict=True)]
     level = np.maximum([n.deviation for n in found], noise)
-    log_prior = -0.5 * float(np.sum((np.log(level / noise) / STATED) ** 2))
-    return Weights(level, tuple(n.colour for n in found), own.gap, log_prior)
+    return [of(own.deviation), of(level, tuple(n.colour for n in found))]
 
 
 def joined(forward: Predictor, f: Fit) -> list[np.ndarray]:

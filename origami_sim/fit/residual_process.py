@@ -33,7 +33,7 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     order = min(ORDER, longest // 3)
     products, count = autocovariance(columns, order)
     level = max(float(np.sqrt(products[0])), noise)
-    log_prior = -0.5 * float(np.log(level / noise) / STATED) ** 2
+    log_prior = level_prior(level, noise)
     best, found = 0.0, np.zeros(0)
     for p in range(1, order + 1 if products[0] > 0.0 and count > order else 1):
         a = solve_toeplitz(products[:p], products[1 : p + 1])
@@ -50,6 +50,11 @@ def residual_process(columns: Sequence[np.ndarray], noise: float) -> tuple[float
     colour = covariance / covariance[0]
     last = int(np.flatnonzero(np.abs(colour) > NEGLIGIBLE)[-1])
     return level, np.ascontiguousarray(colour[: last + 1]), log_prior - 0.5 * len(found) * float(np.log(count))
+
+
+def level_prior(level: float, noise: float) -> float:
+    """Log prior probability of the level of residuals, normal in its logarithm over the noise of a reading."""
+    return -0.5 * float(np.log(level / noise) / STATED) ** 2
 
 
 def autocovariance(columns: Sequence[np.ndarray], lags: int) -> tuple[np.ndarray, int]:

@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import expit, logsumexp
 
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_weights
+from origami_sim.infer.budget import Budget, budget
 from origami_sim.infer.judged import judged
 from origami_sim.infer.posterior import Key, Posterior
+
+
+def mismatch(p: Posterior, forward: Predictor, given: Fit, base: Fit, key: Key) -> Budget:
+    """The budget of a fitted set, and how probable it is that what it leaves is real."""
+    return replace(budget(forward, given, base, p.nodes[key].fit), real=remainder(p, forward, key))
 
 
 def remainder(p: Posterior, forward: Predictor, key: Key) -> float:
@@ -23,7 +30,7 @@ def remainder(p: Posterior, forward: Predictor, key: Key) -> float:
     assert own is not None
     if not own.colour:
         return 0.0
-    recorders = [recorder_weights(forward, node.fit), replace(own, colour=())]
+    recorders = recorder_weights(forward, node.fit)
     judge = [judged(p, forward, key, node.fit.reweighted(w))[0].evidence for w in recorders]
     plain = logsumexp(judge, axis=0) - np.log(len(recorders)) + p.hyper.log_cells
     coloured = float(logsumexp(node.evidence + p.hyper.log_cells)) + np.log(p.hyper.unlisted)

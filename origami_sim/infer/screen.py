@@ -88,7 +88,8 @@ def screen(
     """
     single = [s for s in suspects if not _together(s, suspects)]
     groups = [single[k : k + CHUNK] for k in range(0, len(single), CHUNK)]
-    jobs = [partial(_signatures, forward, group, base, weights) for group in groups]
+    goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
+    jobs = [partial(_signatures, forward, group, base, weights, goal) for group in groups]
     each = side_by_side(jobs, forward.threads, progress)
     found = {id(s): one for group, mine in zip(groups, each, strict=True) for s, one in zip(group, mine, strict=True)}
     for s in suspects:
@@ -157,9 +158,10 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
     )
 
 
-def _signatures(forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights) -> list[Signature]:
-    """Signatures of suspects that are simulated together; strengths are such that they change as much as is missed."""
-    goal = np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks))
+def _signatures(
+    forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights, goal: float
+) -> list[Signature]:
+    """Signatures of suspects that are simulated together, at strengths that change about as much as `goal`."""
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
     parts = _changes(forward, group, size, base, weights)

@@ -11,7 +11,7 @@ diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +25,9 @@ from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.budget import Budget, Share, budget
+from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.posterior import Key, Node, Posterior
-from origami_sim.infer.remainder import remainder
+from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.search import enter, log_priors, place
 from origami_sim.infer.verdict import COMPARED, best_of, decide, unnamed_verdict
@@ -106,10 +106,7 @@ class Stored:
             p.hyper.gaps,
             nodes,
             list(p.failed),
-            {
-                k: replace(budget(forward, given, base, n.fit), real=remainder(p, forward, k))
-                for k, n in p.nodes.items()
-            },
+            {k: mismatch(p, forward, given, base, k) for k in p.nodes},
             quiet,
             compared,
             frozenset(k for k, n in p.nodes.items() if n.wide),
@@ -176,8 +173,8 @@ class Stored:
         arrays: dict[str, np.ndarray] = {}
         nodes = []
         for n, (key, (members, groups, others, problems)) in enumerate(self.nodes.items()):
-            mismatch = self.budgets[key]
-            shares = [[s.name, s.kind, s.share] for s in mismatch.shares]
+            found = self.budgets[key]
+            shares = [[s.name, s.kind, s.share] for s in found.shares]
             told = [
                 [list(g.columns), g.strengths, g.at.tolist(), g.side]
                 + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), g.sizes())]
@@ -185,8 +182,8 @@ class Stored:
             ]
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
-                | {"wide": key in self.wide, "over": mismatch.over}
-                | {"pushed": mismatch.pushed, "real": mismatch.real}
+                | {"wide": key in self.wide, "over": found.over}
+                | {"pushed": found.pushed, "real": found.real}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))

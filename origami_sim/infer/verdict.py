@@ -9,12 +9,12 @@ from scipy.special import logsumexp
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.budget import FAR, Budget, Share, budget, over_noise
+from origami_sim.infer.budget import FAR, Budget, Share, over_noise
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
-from origami_sim.infer.remainder import remainder
+from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
 
@@ -136,8 +136,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
 
     def budgeted(key: Key) -> Budget:
         if key not in budgets:
-            mismatch = budget(forward, given, base, p.nodes[key].fit)
-            budgets[key] = replace(mismatch, real=remainder(p, forward, key))
+            budgets[key] = mismatch(p, forward, given, base, key)
         return budgets[key]
 
     d = decide(p, budgeted)
