@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import orth
 from threadpoolctl import threadpool_limits
 
 from origami_sim.diagnose.arrange import arranged
@@ -151,7 +152,7 @@ def _diagnosed(
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
     noise = forward.blocks[0].noise
     scores = attempt(noted, "The screening cannot be shown", lambda: scored(posterior), [])
-    shown = [s for s, _ in scores[:12] if s.norm > 0]
+    shown = [s for s, _ in scores[:12] if np.any(s.norm > 0)]
     missed = float(sum(s.share for s in judged.budget) and base.cost)
     lap("verdict")
     out = Diagnosis(
@@ -242,21 +243,24 @@ def share_compared(forward: Predictor) -> float:
     return float(min(seen / max(whole, 1), 1.0))
 
 
-def scored(p: Posterior) -> list[tuple[Signature, float]]:
-    """Signatures with the z by which each alone explains what the model without an effect misses, best first."""
+def scored(p: Posterior) -> list[tuple[Signature, np.ndarray]]:
+    """Signatures with the z (k,) by which each strength alone explains what the model without an effect misses.
+
+    The best one comes first.
+    """
     node = p.nodes[frozenset()]
     cell = node.grid[0]
     assert cell is not None
     gram = cell.gram
-    z = np.zeros(len(p.signatures))
-    for n, o in enumerate(node.others):
-        size = np.sqrt(max(gram[n, n], 0.0))
-        z[o] = gram[n, -1] / size if size > 0 else 0.0
-        if p.signatures[o].side * z[o] < 0:
-            z[o] = 0.0
-    order = np.argsort(-np.abs(z), kind="stable")
+    z = [np.zeros(len(s.size)) for s in p.signatures]
+    for g, o in zip(node.groups, node.others, strict=True):
+        mine = list(g.columns)
+        size = np.sqrt(np.maximum(gram[mine, mine], 1e-300))
+        z[o] = np.where(gram[mine, mine] > 0, gram[mine, -1] / size, 0.0)
+        z[o] = np.where(g.side * z[o] < 0, 0.0, z[o])
+    order = np.argsort([-np.max(np.abs(each)) for each in z], kind="stable")
     seen = [k for k in order if p.signatures[k].parts or p.signatures[k].status]  # of others there is no signature
-    return [(p.signatures[k], float(z[k])) for k in seen]
+    return [(p.signatures[k], z[k]) for k in seen]
 
 
 def alike(signatures: Sequence[Signature], base: Fit) -> dict:
@@ -265,16 +269,20 @@ def alike(signatures: Sequence[Signature], base: Fit) -> dict:
 
 
 def overlap(signatures: Sequence[Signature], base: Fit) -> list[list[float]]:
-    """|cos| between signatures, without what starts and numbers could explain: 1 where two look the same."""
+    """|cos| between signatures, without what starts and numbers could explain: 1 where two look the same.
+
+    Of those with several strengths, of what is most alike (the cosine of the smallest principal angle).
+    """
     if not signatures or base.linear is None:
         return []
     line = base.linear
-    stacked_ = [np.stack([s.parts[n] for s in signatures], axis=1) for n in range(len(line.rows))]
+    stacked_ = [np.concatenate([s.parts[n] for s in signatures], axis=1) for n in range(len(line.rows))]
     whole = np.concatenate(
         line.cleared([np.concatenate([t, x], 1) for t, x in zip(line.tangent, stacked_, strict=True)])
     )
     width = line.tangent[0].shape[1]
     q, _ = np.linalg.qr(whole[:, :width])
     shapes = whole[:, width:] - q @ (q.T @ whole[:, width:])
-    shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
-    return np.abs(shapes.T @ shapes).tolist()
+    ends = np.cumsum([len(s.size) for s in signatures])[:-1]
+    each = [orth(x / max(np.linalg.norm(x), 1e-300)) for x in np.split(shapes, ends, axis=1)]
+    return [[float(np.linalg.norm(a.T @ b, 2)) if a.size and b.size else 0.0 for b in each] for a in each]

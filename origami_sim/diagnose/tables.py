@@ -90,11 +90,16 @@ def numbers(f: Fit) -> list[Number]:
     ]
 
 
-def suspected(s: Signature, z: float, total: float) -> Suspected:
-    """A suspect in the screening, with the score z by which it alone would explain what the base fit misses."""
-    u = s.suspect
-    strength = z / s.norm * s.size if s.norm > 0 else 0.0
-    error = abs(s.size) / s.norm if s.norm > 0 else np.inf
+def suspected(s: Signature, scores: np.ndarray, total: float) -> Suspected:
+    """A suspect in the screening, with that of its strengths which alone explains most of what the base fit misses.
+
+    Args:
+        scores: (k,) of its strengths, in standard deviations.
+    """
+    u, n = s.suspect, int(np.argmax(np.abs(scores)))
+    z, norm, size = float(scores[n]), float(s.norm[n]), float(s.size[n])
+    strength = z / norm * size if norm > 0 else 0.0
+    error = abs(size) / norm if norm > 0 else np.inf
     share = z**2 / total if total > 0 else 0.0
     return Suspected(u.label, u.effect, u.site, u.kind, z, strength, error, u.free[0].unit, share, s.status)
 

@@ -38,7 +38,7 @@ class Group:
     Attributes:
         columns: their indices. strengths: how many of them, the first ones, are strengths.
         at: (k,) values where the problem is linearised, from where they begin, over the scale of the column.
-        side: 1 or -1 where physics allows one sign of the first strength, else 0.
+        side: 1 or -1 where physics allows one sign of the strengths, else 0.
         spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
         low, high: (k,) bounds from where they begin, over the scale; None: there are none.
         usual: (k,) strengths as they usually are, over the scale; infinite where that depends on the device.
@@ -66,7 +66,8 @@ class Group:
     def laid(self) -> np.ndarray:
         """[8, k] what `Sets` are laid out from, in the order of its attributes."""
         place = np.arange(len(self.columns))
-        side, strength = np.where(place == 0, self.side, 0), place < self.strengths
+        strength = place < self.strengths
+        side = np.where(strength, self.side, 0)
         return np.array([self.columns, self.at, self.spread, side, strength, *self.bounds(), self.sizes()], float)
 
 
@@ -269,6 +270,16 @@ def log_slab(d: np.ndarray, hyper: Hyper) -> np.ndarray:
     log = log_slabs(d, hyper)
     most = log.max(axis=-1, keepdims=True)
     return most[..., 0] + np.log(np.exp(log - most).sum(axis=-1))  # what scipy does, in less than half its time
+
+
+def log_occam(gain: float, part: np.ndarray, hyper: Hyper) -> float:
+    """Log evidence that strengths cost which gain so much log likelihood: of each, its prior over how sharp it is.
+
+    Args:
+        part: (k,) what each of them changes, in any unit.
+    """
+    d = np.sqrt(2.0 * max(gain, 0.0)) * np.abs(part) / max(float(np.linalg.norm(part)), 1e-300)
+    return float(np.sum(log_slab(d, hyper) + 0.5 * np.log(2.0 * np.pi)))
 
 
 def log_usual(c: np.ndarray, hyper: Hyper) -> np.ndarray:

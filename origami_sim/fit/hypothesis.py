@@ -77,6 +77,11 @@ class Suspect:
         return f"{self.effect} at {self.site}"
 
     @property
+    def form(self) -> tuple:
+        """What tells it from other suspects of the search: where it is, and where its numbers begin."""
+        return self.label, tuple((f.name, f.start) for f in self.free)
+
+    @property
     def strengths(self) -> tuple[Free, ...]:
         """The strength, and what else is a component of it: an offset has three."""
         first, *rest = self.free
@@ -582,19 +587,16 @@ def at_several_times(every: Sequence[Suspect], shortest: float, longest: float) 
     return out
 
 
-def along_every_axis(every: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects; those of which the strength has a direction, with each component first: it is the one screened."""
+def along_each_axis(s: Suspect) -> list[Suspect]:
+    """A suspect with each of its strengths first: what only one of them does."""
     out = []
-    for s in every:
-        out.append(s)
-        for n, f in enumerate(s.free):
-            if n and f in s.strengths and not f.start and not s.more:
-                lead = replace(f, scale=s.free[0].scale, spread=np.inf)
-                rest = [replace(g, start=0.0, spread=PLAUSIBLE * g.scale) if g is s.free[0] else g for g in s.free]
-                out.append(replace(s, free=(lead, *(g for k, g in enumerate(rest) if k != n))))
+    for f in s.strengths:
+        rest = (replace(g, spread=PLAUSIBLE * g.scale) if g is s.free[0] else g for g in s.free if g is not f)
+        out.append(replace(s, free=(replace(f, spread=np.inf), *rest)))
     return out
 
 
-def scaled(suspect: Suspect, scale: float) -> Suspect:
-    """The suspect with another scale for its strength."""
-    return replace(suspect, free=(replace(suspect.free[0], scale=scale), *suspect.free[1:]))
+def scaled(suspect: Suspect, scales: Sequence[float] | np.ndarray) -> Suspect:
+    """The suspect with other scales for its strengths."""
+    of = {id(f): abs(float(scale)) for f, scale in zip(suspect.strengths, scales, strict=True)}
+    return replace(suspect, free=tuple(replace(f, scale=of.get(id(f), f.scale)) for f in suspect.free))

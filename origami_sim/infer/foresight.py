@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from origami_sim.fit.chain import Chain, triangle
-from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_slab, summed, with_priors, without_numbers
+from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_occam, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -60,22 +60,22 @@ class Foresight:
     def gains(self, sets: Sequence[Sequence[Group]], hyper: Hyper) -> np.ndarray:
         """Log evidence that sets of effects gain over the fit, each in noise of its own."""
         likely = shared([partial(self._likely, groups) for groups in sets])
-        new = np.array([sum(g.strengths for g in groups if g not in self.own) for groups in sets])
-        gain = np.array(likely) - self._before
-        d = np.sqrt(2.0 * np.maximum(gain, 1.0) / np.maximum(new, 1))
-        return gain + new * (log_slab(d, hyper) + 0.5 * np.log(2.0 * np.pi))
+        return np.array([log - self._before + log_occam(log - self._before, part, hyper) for log, part in likely])
 
     @cached_property
     def _before(self) -> float:
-        return self._likely(self.own)
+        return self._likely(self.own)[0]
 
     @cached_property
     def _seen(self) -> np.ndarray:
         """[n, D] which values were measured, in all segments."""
         return np.concatenate([self.forward.blocks[b].seen() for b in self.fit.blocks])
 
-    def _likely(self, groups: Sequence[Group]) -> float:
-        """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part."""
+    def _likely(self, groups: Sequence[Group]) -> tuple[float, np.ndarray]:
+        """Log likelihood of what is left once these effects, within bounds, and all numbers explain their part.
+
+        And what each of the strengths changes that the fit does not have.
+        """
         use = [*range(self.numbers), *(self.numbers + c for g in groups for c in g.columns)]
         none = np.full(self.numbers, np.inf)
         low = np.concatenate([-none, *(np.minimum(g.bounds()[0] - g.at, -1e-12) for g in groups)])
@@ -90,4 +90,5 @@ class Foresight:
         out = noise.log_prior - log_volume(noise, rows)
         for mine in patterns(rows):
             out -= 0.5 * float(np.sum(noise.whitened(np.stack([left[n] for n in mine]), rows[mine[0]]) ** 2))
-        return out
+        new = [self.numbers + c for g in groups if g not in self.own for c in g.columns[: g.strengths]]
+        return out, change[[use.index(c) for c in new]] * np.linalg.norm(self.root[:, new], axis=0)

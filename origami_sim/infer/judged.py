@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from origami_sim.fit.chain import Chain
-from origami_sim.fit.evidence import Group, Problem, Summed, beside_numbers, summed
+from origami_sim.fit.evidence import Problem, Summed, beside_numbers, summed
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import log_volume, recast
@@ -21,19 +21,18 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     """A fit judged by the weights that it has, and the columns of its own and of all further effects, per segment."""
     hyper, line, own = out.hyper, f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
-    # order: the fit's own columns by suspect, then one column for each other suspect
+    # order: the fit's own columns by suspect, then those of the strengths of each other suspect
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
     count, groups = len(own.columns), list(own.groups)
-    for n, o in enumerate(others):
-        one = out.signatures[o]
-        groups.append(Group((count + n,), 1, np.zeros(1), one.side, np.full(1, np.inf), *one.bounds, one.usual))
-    added = [np.zeros((len(t), len(others))) for t in line.tangent]
-    for k, o in enumerate(others):
-        for columns, part in zip(added, out.signatures[o].parts, strict=True):
-            columns[:, k] = part
+    width, known = count, [out.signatures[o] for o in others]
+    for one in known:
+        groups.append(one.group(width))
+        width += len(one.size)
+    none = [np.zeros((len(t), 0)) for t in line.tangent]
+    added = [np.concatenate([n, *(s.parts[b] for s in known)], axis=1) for b, n in enumerate(none)]
     added = recast(added, line.rows, out.weights, f.weights)
     effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
-    width, weights = count + len(others), f.weights
+    weights = f.weights
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
     out.smooth = out.smooth or cosines(forward, f, line)
     both = [np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
@@ -49,18 +50,16 @@ def strained(f: Fit) -> bool:
 def scanned(
     forward: Predictor, hypothesis: Hypothesis, weights: Weights, local: np.ndarray, also: np.ndarray | None
 ) -> np.ndarray | None:
-    """(P,) the given numbers and that strength of one effect, of a few, with which recordings are missed least.
+    """(P,) the given numbers and that strength of one effect, of a few of each, with which recordings are missed least.
 
     None if the model goes unstable with all of them.
 
     Args:
         also: (P,) numbers to try besides.
     """
-    first, *_ = hypothesis.free
-    given = np.array([f.start for f in (*forward.subject.nominals, *hypothesis.free)])
-    strengths = over_range(first)
-    thetas = np.repeat(given[None], len(strengths), axis=0)
-    thetas[:, len(forward.subject.nominals)] = strengths
+    given = np.array([f.start for f in forward.subject.nominals])
+    (suspect,) = hypothesis.suspects
+    thetas = np.array([[*given, *values] for values in over_range(suspect)])
     if also is not None:
         thetas = np.concatenate([thetas, also[None]])
     shot = forward.predict(hypothesis, thetas, np.repeat(local[None], len(thetas), axis=0))
@@ -133,14 +132,12 @@ def from_given_numbers(
         if not s.parts or s.status:
             yield None
             continue
-        change = about.whole([p[:, None] for p in s.parts], away=False)[:, 0]
-        mine = about.rest(change[:, None])[:, 0]
-        strength = np.clip(mine @ rest / max(mine @ mine, 1e-300), *np.concatenate(s.bounds))
-        left = float(np.sum((rest - strength * mine) ** 2))
-        moved = about.explaining(residual - strength * change)
-        numbers = np.clip(given.theta + moved * about.scale, low, high)
-        first, *others = s.suspect.free
-        theta = np.array([*numbers, first.start + strength * s.size, *(f.start for f in others)])
+        change = about.whole(s.parts, away=False)
+        mine = about.rest(change)
+        strength = lsq_linear(mine, rest, s.bounds).x
+        left = float(np.sum((rest - mine @ strength) ** 2))
+        moved = about.explaining(residual - change @ strength)
+        theta = np.concatenate([np.clip(given.theta + moved * about.scale, low, high), s.values(strength)])
         gain = gained(forward, base, before, left)
         yield (theta, gain) if gain > 0.0 else None
 
@@ -161,9 +158,8 @@ def over_their_range(
     for n, s in enumerate(suspects):
         if progress:
             progress(n / len(suspects))
-        rest, richer = [f.start for f in s.free[1:]], base.hypothesis.plus(s)
-        thetas = [np.array([*base.theta, z, *rest]) for z in over_range(s.free[0])]
-        best = _best_of(forward, base, about, richer, thetas)
+        thetas = [np.concatenate([base.theta, values]) for values in over_range(s)]
+        best = _best_of(forward, base, about, base.hypothesis.plus(s), thetas)
         yield best[:2] if best else None
 
 
@@ -210,11 +206,16 @@ def _best_of(
     return (thetas[best], gain, whole[:, best]) if gain > 0.0 else None
 
 
-def over_range(strength: Free) -> np.ndarray:
-    """Strengths of an effect that are tried, of either sign where it may have both."""
-    tried = strength.start + strength.scale * np.concatenate([GRID, -GRID])
-    out = np.unique(np.clip(tried, strength.lower, strength.upper))
-    return out[out != strength.start]
+def over_range(suspect: Suspect) -> list[np.ndarray]:
+    """Numbers of an effect that are tried: each strength alone, of either sign where it may have both."""
+    start, out = np.array([f.start for f in suspect.free]), []
+    for n, f in enumerate(suspect.free):
+        if f not in suspect.strengths:
+            continue
+        for value in np.unique(np.clip(f.start + f.scale * np.concatenate([GRID, -GRID]), f.lower, f.upper)):
+            if value != f.start:
+                out.append(np.where(np.arange(len(start)) == n, value, start))
+    return out
 
 
 def over_shape(shape: Free) -> np.ndarray:

@@ -1,13 +1,14 @@
 """Signatures: what each suspect would change in the predictions, simulated once about a fit."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect, scaled, usual
+from origami_sim.fit.evidence import Group
+from origami_sim.fit.hypothesis import Suspect, along_each_axis, scaled, usual
 from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision, small
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -37,17 +38,18 @@ class Signature:
     """What a suspect would do to the predictions.
 
     Attributes:
-        suspect: with its strength's scale set to `size`.
-        parts: per block, the whitened change [r] of the rows of a linearisation for a change of the strength by `size`.
-        size: that change [SI], signed. norm: of the change, without what starts and numbers could explain of it.
+        suspect: with the scales of its strengths set to `size`.
+        parts: per block, the whitened changes [r, k] of the rows of a linearisation for a change of each strength.
+        size: (k,) those changes [SI], signed. norm: (k,) of what they do, without what starts and numbers could explain
+            of it. raw: (k,) with it.
         status: "", or why the suspect cannot be tested.
     """
 
     suspect: Suspect
     parts: list[np.ndarray]
-    size: float
-    norm: float = 0.0
-    raw: float = 0.0
+    size: np.ndarray
+    norm: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    raw: np.ndarray = field(default_factory=lambda: np.zeros(1))
     status: str = ""
 
     @property
@@ -55,22 +57,27 @@ class Signature:
         """1 or -1 where physics allows only a change like `size`, or only its reverse; 0 for both."""
         f = self.suspect.free[0]
         if f.start <= f.lower:
-            return 1 if self.size > 0 else -1
+            return 1 if self.size[0] > 0 else -1
         if f.start >= f.upper:
-            return -1 if self.size > 0 else 1
+            return -1 if self.size[0] > 0 else 1
         return 0
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest change (1,) of the strength, over `size`."""
-        f = self.suspect.free[0]
-        low, high = sorted(((f.lower - f.start) / self.size, (f.upper - f.start) / self.size))
-        return np.array([low]), np.array([high])
+        """Lowest and highest change (k,) of each strength, over `size`."""
+        ends = np.array([(f.lower - f.start, f.upper - f.start) for f in self.suspect.strengths]) / self.size[:, None]
+        return ends.min(axis=1), ends.max(axis=1)
 
-    @property
-    def usual(self) -> np.ndarray:
-        """The change (1,) as it usually is, over `size`."""
-        return usual(self.suspect, self.suspect.free[:1])
+    def group(self, first: int) -> Group:
+        """The columns of its strengths in a linear problem, from that one on."""
+        k, size = len(self.size), usual(self.suspect, self.suspect.strengths)
+        return Group(tuple(range(first, first + k)), k, np.zeros(k), self.side, np.full(k, np.inf), *self.bounds, size)
+
+    def values(self, change: np.ndarray) -> np.ndarray:
+        """Values of its suspect's numbers [SI] with the strengths (k,) changed, over `size`."""
+        s = self.suspect
+        strong = dict(zip(s.strengths, change * self.size, strict=True))
+        return np.array([np.clip(f.start + strong.get(f, 0.0), f.lower, f.upper) for f in s.free])
 
 
 def screen(
@@ -86,21 +93,22 @@ def screen(
     What all creases (or panels) would do together is the sum of what each would do, so that only single ones are
     simulated.
     """
-    single = [s for s in suspects if not _together(s, suspects)]
+    single = [one for s in suspects if not _together(s, suspects) for one in along_each_axis(s)]
     groups = [single[k : k + CHUNK] for k in range(0, len(single), CHUNK)]
     goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
     jobs = [partial(_signatures, forward, group, base, weights, goal) for group in groups]
     each = side_by_side(jobs, forward.threads, progress)
-    found = {id(s): one for group, mine in zip(groups, each, strict=True) for s, one in zip(group, mine, strict=True)}
+    alone = (one for mine in each for one in mine)
+    found = {id(s): _vector(s, [next(alone) for _ in s.strengths]) for s in suspects if not _together(s, suspects)}
     for s in suspects:
         if not _together(s, suspects):
             continue
         mine = [v for v in found.values() if v.suspect.effect == s.effect and v.parts and not v.suspect.more]
         if not mine:
             continue
-        size = float(np.median([abs(m.size) for m in mine])) * float(np.sign(mine[0].size))
-        parts = [sum(m.parts[n] * (size / m.size) for m in mine) for n in range(len(base.blocks))]
-        found[id(s)] = Signature(s, parts, size)  # type: ignore[arg-type]
+        size = np.median([abs(m.size) for m in mine], axis=0) * np.sign(mine[0].size)
+        parts = [np.sum([m.parts[n] * (size / m.size) for m in mine], axis=0) for n in range(len(base.blocks))]
+        found[id(s)] = Signature(s, parts, size)
     return rated([found[id(s)] for s in suspects if id(s) in found], base)
 
 
@@ -112,10 +120,7 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     if not good:
         return [replace(s, status=s.status or "its simulation goes unstable") for s in found]
     own = len(base.free)
-    stacked = [
-        np.concatenate([t[:, :own], np.stack([s.parts[n] for s in good], axis=1)], axis=1)
-        for n, t in enumerate(line.tangent)
-    ]
+    stacked = [np.concatenate([t[:, :own], *(s.parts[n] for s in good)], axis=1) for n, t in enumerate(line.tangent)]
     prior = precision(base.free)
     whole = np.concatenate(line.cleared(stacked))
     width = line.tangent[0].shape[1]
@@ -127,25 +132,35 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     size = np.abs(np.diag(r))
     q = q[:, size > 1e-8 * size.max(initial=1e-300)]
     norm = np.linalg.norm(whole[:, width:] - q @ (q.T @ whole[:, width:]), axis=0)
-    loud = {id(s): float(np.sqrt(sum(p @ p for p in s.parts))) for s in good}
-    out, place = [], {id(s): n for n, s in enumerate(good)}
+    out, place = [], dict(zip(map(id, good), np.cumsum([0, *(len(s.size) for s in good)]).tolist(), strict=False))
     for s in found:
         if id(s) not in place:
             out.append(replace(s, parts=[], status="its simulation goes unstable"))
             continue
-        n = place[id(s)]
-        reach = max(1.0, _admissible(s.suspect, 10 * np.sign(s.size) * _typical(s.suspect)) / s.size)
-        status = ""
-        if norm[n] * reach < SILENT or norm[n] < 1e-6 * loud[id(s)]:
+        mine = slice(place[id(s)], place[id(s)] + len(s.size))
+        loud = np.sqrt(np.sum([np.sum(p**2, axis=0) for p in s.parts], axis=0))
+        axes = along_each_axis(s.suspect)
+        most = [_admissible(a, 10 * np.sign(z) * _typical(a)) / z for a, z in zip(axes, s.size, strict=True)]
+        reach = np.maximum(1.0, most)
+        status, shows = "", (norm[mine] * reach >= SILENT) & (norm[mine] >= 1e-6 * loud)
+        if not np.any(shows):
             status = (
                 "these recordings do not excite it"
-                if loud[id(s)] * reach < SILENT
+                if np.all(loud * reach < SILENT)
                 else "starts of segments can take its place"
-                if raw[n] * reach < SILENT
+                if np.all(raw[mine] * reach < SILENT)
                 else "nominal parameters can take its place"
             )
-        out.append(replace(s, norm=float(norm[n]), raw=loud[id(s)], status=status))
+        parts = s.parts if np.all(shows) else [np.where(shows, p, 0.0) for p in s.parts]
+        out.append(replace(s, parts=parts, norm=norm[mine], raw=loud, status=status))
     return out
+
+
+def _vector(s: Suspect, axes: Sequence[Signature]) -> Signature:
+    """The signature of a suspect from those of each of its strengths alone."""
+    size = np.concatenate([a.size for a in axes])
+    parts = [np.concatenate(p, axis=1) for p in zip(*(a.parts for a in axes), strict=True)]
+    return Signature(scaled(s, size), parts, size)
 
 
 def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
@@ -161,7 +176,7 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
 def _signatures(
     forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights, goal: float
 ) -> list[Signature]:
-    """Signatures of suspects that are simulated together, at strengths that change about as much as `goal`."""
+    """Signatures of suspects' first strengths, simulated together, such that they change about as much as `goal`."""
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
     parts = _changes(forward, group, size, base, weights)
@@ -174,7 +189,7 @@ def _signatures(
         again = _changes(forward, [group[k] for k in redo], size[redo], base, weights)
         for k, new in zip(redo, again, strict=True):
             parts[k] = new
-    return [Signature(scaled(s, abs(z)), p, float(z)) for s, z, p in zip(group, size, parts, strict=True)]
+    return [Signature(s, [c[:, None] for c in p], np.array([z])) for s, z, p in zip(group, size, parts, strict=True)]
 
 
 def _missed(forward: Predictor, base: Fit, weights: Weights) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import Sets, Summed, log_slab
+from origami_sim.fit.evidence import Sets, Summed, log_occam
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed, small
@@ -97,8 +97,8 @@ def _about_given(out: Posterior, forward: Predictor, base: Fit, given: Fit) -> N
     by = level(forward, base)
     given = fit(forward, Hypothesis(), by, local=given.local, most=0)  # with derivatives by its numbers
     about = screen(forward, [s.suspect for s in out.signatures], given, by)
-    of = {(s.suspect.label, s.suspect.free[1:]): s for s in about}  # their strengths have another scale here
-    alone = {k: of.get((s.label, s.free[1:])) for k in out.estimates if len(k) == 1 for s in map(out.suspect, k)}
+    of = {s.suspect.form: s for s in about}  # their strengths have another scale here
+    alone = {k: of.get(out.suspect(n).form) for k in out.estimates if len(k) == 1 for n in k}
     known = {k: s for k, s in alone.items() if s is not None}
     _promised(out, list(known), from_given_numbers(forward, list(known.values()), given, base, by))
 
@@ -132,7 +132,7 @@ def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
     if not about:
         return
     suspect, begin, gain = max(about, key=lambda one: one[2])
-    every, key = [*out.signatures, Signature(suspect, [], 1.0)], frozenset({len(out.signatures)})
+    every, key = [*out.signatures, Signature(suspect, [], np.ones(1))], frozenset({len(out.signatures)})
     prior = log_priors(every)
     odds = _log_prior(key, prior, out.hyper) - _log_prior(frozenset(), prior, out.hyper)
     if out.total[frozenset()] + gain + odds < best + np.log(UNFITTED):
@@ -156,7 +156,10 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
         if one is None:
             continue
         theta, gain = one
-        occam = float(log_slab(np.sqrt(2.0 * np.array(gain)), out.hyper)) + 0.5 * float(np.log(2.0 * np.pi))
+        (suspect,) = map(out.suspect, key)
+        begun = theta[len(theta) - len(suspect.free) :]
+        change = [(v - f.start) / f.scale for v, f in zip(begun, suspect.free, strict=True) if f in suspect.strengths]
+        occam = log_occam(gain, np.array(change), out.hyper)
         odds = _log_prior(key, prior, out.hyper) - _log_prior(none, prior, out.hyper)
         promise = out.total[none] + gain + occam + odds
         if promise > _promise(out, key):
@@ -508,14 +511,11 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
             steps.append(line.steps[own[g] : own[g + 1]])
         else:
             signature = out.signatures[node.others[g - len(members)]]
-            first, *rest = signature.suspect.free
-            strength = np.clip(first.start + estimate.values[column] * signature.size, first.lower, first.upper)
-            suspects.append(signature.suspect)
-            begin.append(np.array([strength, *(f.start for f in rest)]))
-            strong, part = signature.suspect.strengths, allowed / signature.raw
-            steps.append(
-                np.array([first.scale * part if n in strong else n.scale * forward.nudge for n in (first, *rest)])
-            )
+            suspect, count_of = signature.suspect, len(signature.size)
+            suspects.append(suspect)
+            begin.append(signature.values(estimate.values[column : column + count_of]))
+            part = dict(zip(suspect.strengths, allowed / np.maximum(signature.raw, allowed), strict=True))
+            steps.append(np.array([n.scale * part.get(n, forward.nudge) for n in suspect.free]))
         column += len(node.groups[g].columns)
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
     given = out.begun.get(key)

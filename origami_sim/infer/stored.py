@@ -123,7 +123,9 @@ class Stored:
             allowed = ", ".join(f"{g:g}" for g in self.gaps)
             raise InputError("this size was not stored", field="gaps", value=foreign[0], allowed=allowed)
         signatures = [
-            Signature(s, [] if status else [np.zeros(0)], 1.0 if side >= 0 else -1.0, status=status)
+            Signature(
+                s, [] if status else [np.zeros(0)], np.full(len(s.strengths), 1.0 if side >= 0 else -1.0), status=status
+            )
             for s, side, status in self.suspects
         ]
         out = Posterior(signatures, Weights(np.ones(1)), hyper)

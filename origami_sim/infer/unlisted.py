@@ -97,7 +97,7 @@ def beside(
     assert f.weights is not None and f.linear is not None
     # a constant moment tells at which size the others of its crease change about as much as is missed
     first = {s.site: s for s in coefficients[::-1]}
-    size = {s.suspect.site: abs(s.size) for s in screen(forward, list(first.values()), f, f.weights)}
+    size = {s.suspect.site: s.size for s in screen(forward, list(first.values()), f, f.weights)}
     coefficients = [scaled(s, size[s.site]) for s in coefficients]
     found = [s for s in screen(forward, coefficients, f, f.weights) if s.parts and not s.status]
     sites: dict[str, list[Signature]] = {}
@@ -114,8 +114,7 @@ def beside(
         groups.append(Group(tuple(range(count, count + k)), k, np.zeros(k), 0, np.full(k, np.inf)))
         count += k
     effects = [
-        np.concatenate([t[:, own.columns], *(s.parts[b][:, None] for s in each)], axis=1)
-        for b, t in enumerate(f.linear.tangent)
+        np.concatenate([t[:, own.columns], *(s.parts[b] for s in each)], axis=1) for b, t in enumerate(f.linear.tangent)
     ]
     ahead = Foresight.of(forward, f, own, effects, hyper)
     sets = [(*range(before), before + n) for n in range(len(sites))]
@@ -123,8 +122,8 @@ def beside(
     out = []
     for of, gain, mine in zip(sets, gains, sites.values(), strict=True):
         columns = [c for g in of for c in groups[g].columns]
-        suspect, sizes = _joint(mine, float(np.sqrt(f.cost))), np.array([m.size for m in mine])
-        known = [0.0] * len(own.columns) + [s.size / n.spread for s, n in zip(mine, suspect.free, strict=False)]
+        suspect, sizes = _joint(mine, float(np.sqrt(f.cost))), np.concatenate([m.size for m in mine])
+        known = [0.0] * len(own.columns) + [s.size[0] / n.spread for s, n in zip(mine, suspect.free, strict=False)]
         gram = ahead.white.gram
         values = np.linalg.lstsq(
             gram[np.ix_(columns, columns)] + np.diag(np.square(known)), gram[columns, -1], rcond=None
@@ -149,7 +148,7 @@ def _joint(mine: Sequence[Signature], missed: float) -> Suspect:
         missed: norm of what is missed, over the noise.
     """
     unit = missed * float(np.median([abs(s.size) / s.raw for s in mine]))
-    strengths = [replace(s.suspect.free[0], scale=abs(s.size), spread=WIDE * unit) for s in mine]
+    strengths = [replace(s.suspect.free[0], scale=abs(float(s.size[0])), spread=WIDE * unit) for s in mine]
     first = mine[0].suspect
     return replace(first, free=(*strengths, *first.free[1:]))
 

@@ -17,7 +17,6 @@ from origami_sim.fit.hypothesis import (
     Hypothesis,
     Subject,
     Suspect,
-    along_every_axis,
     at_several_times,
     told_apart,
 )
@@ -142,7 +141,6 @@ class Curves(Worlds, ABC):
         several at once. See also `told_apart`.
         """
         every = [s for s in told_apart(every, len(self.components)) if self.turning or not get(s.effect).on_body]
-        every = along_every_axis(every)
         if all(r.by_step for r in self.recordings):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]
@@ -327,13 +325,12 @@ def with_spectra(every: Sequence[Suspect], shortest: float, longest: float) -> l
         stiffness, time = s.free
         for count in branches[1:]:
             times = np.geomspace(shortest, longest, count + 2)[1:-1]
-            for lead in range(count):  # that of which the signature is looked at first
-                free = []
-                for n, t in enumerate(np.roll(times, -lead), 1):
-                    free.append(replace(stiffness, name=f"stiffness_{n}"))
-                    given = {"start": float(t), "scale": float(t), "spread": PLAUSIBLE * float(t)}
-                    free.append(replace(time, name=f"time_{n}", **given))
-                out.append(replace(s, free=tuple(free)))
+            free = []
+            for n, t in enumerate(times, 1):
+                free.append(replace(stiffness, name=f"stiffness_{n}"))
+                given = {"start": float(t), "scale": float(t), "spread": PLAUSIBLE * float(t)}
+                free.append(replace(time, name=f"time_{n}", **given))
+            out.append(replace(s, free=tuple(free)))
     return out
 
 

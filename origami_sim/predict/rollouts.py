@@ -18,7 +18,6 @@ from origami_sim.fit.hypothesis import (
     Hypothesis,
     Subject,
     Suspect,
-    along_every_axis,
     at_several_times,
     told_apart,
 )
@@ -237,7 +236,7 @@ class Rollouts(Worlds, ABC):
         """See `Predictor.admitted`: those with a time constant with several. See also `told_apart`."""
         frame = float(np.median(np.diff(self.recordings[0].times)))
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
-        every = along_every_axis(told_apart(every, len(self.components)))
+        every = told_apart(every, len(self.components))
         every = at_several_times(every, FASTEST * frame, longest)
         return with_begins(every, self._unsettled(), self.articulation.creases.tolist())
 

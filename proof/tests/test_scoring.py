@@ -311,3 +311,13 @@ def test_the_diagnosis_cannot_open_an_answer(tmp_path):
     home = str(TRUTH.parent)
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=home)
     assert ran.returncode and "sealed answer" in ran.stderr
+
+
+def test_what_two_laws_imitate_is_counted_apart_from_what_they_cannot():
+    answer = {**ANSWER, "kind": "outside", "mechanism": "pushes", "names": [], "d": 20.0}
+    unknown, named = diagnosis("UNKNOWN", [], 0.9), diagnosis("MECHANISM", ["air_drag at panel1"], 0.9)
+    rows = [judge({**answer, "like": {"apart": apart}}, found) for apart, found in ((18.0, unknown), (5.0, named))]
+    assert [r["left"] for r in rows] == pytest.approx([0.81, 0.0625])
+    found = score.scores(rows)["proportions"]
+    assert (found["unknown"]["hits"], found["unknown"]["count"]) == (1, 2)
+    assert (found["unlike"]["hits"], found["unlike"]["count"]) == (1, 1)

@@ -213,8 +213,8 @@ def test_curves_are_screened_whole():
     every = [s for s in forward.admitted(suspected(forward)) if s.effect == "crease_stiffening"]
     (found,) = screen(forward, every, base, weights)
     rest = dict(zip((f.name for f in base.free), base.theta, strict=True))["rest_angle"]
-    exact = -found.size * (forward._q[0][0] - rest) ** 3 / weights.deviation[0]
-    parts = np.concatenate([p[: len(b.times)] for p, b in zip(found.parts, forward.blocks, strict=True)])
+    exact = -found.size[0] * (forward._q[0][0] - rest) ** 3 / weights.deviation[0]
+    parts = np.concatenate([p[: len(b.times), 0] for p, b in zip(found.parts, forward.blocks, strict=True)])
     assert len(found.parts) == 6 and np.abs(np.abs(parts) - np.abs(exact)).max() < 1e-6 * np.abs(exact).max()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim.bodies import rigid
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.hypothesis import Hypothesis, along_every_axis, apply, suspects, told_apart
+from origami_sim.fit.hypothesis import Hypothesis, along_each_axis, apply, suspects, told_apart
 from origami_sim.model import node_mass
 from origami_sim.places import across, along, points, stretches
 from origami_sim.recording import Channel, Recording
@@ -128,7 +128,7 @@ def test_what_has_a_direction_is_absent_in_all_its_components(scenes):
         alike = [f for f in s.free if f.unit == s.free[0].unit]
         assert not any(f.start for f in alike) and list(s.strengths) == alike, s.label
     (stray,) = (s for s in asked(*scenes["mae_cantilever"]) if s.effect == "field_offset")
-    assert [s.free[0].name[-1] for s in along_every_axis([stray])] == ["x", "y", "z"], "each is screened by itself"
+    assert [s.free[0].name[-1] for s in along_each_axis(stray)] == ["x", "y", "z"], "each is simulated by itself"
 
 
 def test_uneven_effects_are_those_of_families_with_stretches():

@@ -263,7 +263,7 @@ def test_a_stored_prediction_is_of_the_numbers_that_were_asked_for(tied, tmp_pat
     monkeypatch.setattr(cache, "WORTH", 0.0)
     forward = copy(tied)
     _, *others = anywhere(forward)
-    one, other = (scaled(s, 1e-4) for s in others[:2])
+    one, other = (scaled(s, [1e-4]) for s in others[:2])
     assert (one.effect, one.entities) == (other.effect, other.entities) and one.free[0].name != other.free[0].name
 
     def predicted(s) -> np.ndarray:
