@@ -21,7 +21,7 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import suspects
+from origami_sim.fit.hypothesis import Suspect, suspects
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
@@ -37,6 +37,7 @@ from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.onset import onset
+from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located
 from origami_sim.possible import Possible
 from origami_sim.predict.channels import stacked, units_of
@@ -191,6 +192,9 @@ def _diagnosed(
         found, actions = located(forward, base)
         return {"places": found, "acting": actions}
 
+    def laws_shown() -> dict:
+        return {"partials": partials(forward, shown_by(posterior, best, judged.chosen))}
+
     def left() -> dict:
         # what acts now and then goes with nothing that the device does
         steady = judged.verdict == "UNKNOWN" and bursts(best).probability < 0.5
@@ -215,6 +219,7 @@ def _diagnosed(
         Part("curves", "Correlations could not be told", rest, quick=True),
         Part("curves", "What looks alike could not be told", lambda: alike(shown, base), quick=True),
         Part("locate", "Where the mismatch is could not be told", places),
+        Part("locate", "What each effect gives could not be told", laws_shown),
         Part("locate", "What is left could not be described", left, quick=True),
         Part("locate", "Impulses could not be told", blows, quick=True),
         Part("locate", "The onset could not be told", since),
@@ -228,6 +233,17 @@ def _diagnosed(
     add(out, parts, tell, keep.stands if keep is not None else lambda _: None)
     tell("done", 1.0)
     return out
+
+
+def shown_by(p: Posterior, best: Fit, labels: Sequence[str]) -> list[tuple[Suspect, Fit]]:
+    """The effects that are named, each with the fit that shows it: the best one, or else the most probable with it."""
+    fits = [best, *(p.nodes[k].fit for k in sorted(p.nodes, key=lambda k: -p.total[k]))]
+    of: dict[str, tuple[Suspect, Fit]] = {}
+    for f in fits:
+        for s in f.hypothesis.suspects:
+            of.setdefault(s.label, (s, f))
+    each = dict.fromkeys(one for label in labels for one in label.split(" + "))
+    return [of[one] for one in each if one in of and get(one.partition(" at ")[0]).family != "measurement"]
 
 
 def possible_of(source: Source) -> Possible:

@@ -144,6 +144,21 @@ class Acting:
 
 
 @dataclass
+class Partial:
+    """The partial residual of a named effect: what the found model lacks without it, and what it gives.
+
+    Attributes:
+        label: of the effect. site: the coordinate that shows it best. curve: what is missing there without it, against
+            what shows it best. law: what the effect gives, in the bins of the curve.
+    """
+
+    label: str
+    site: str
+    curve: Curve
+    law: list[float]
+
+
+@dataclass
 class Impulse:
     """What a contact does to the device in a blow.
 
@@ -229,6 +244,7 @@ class Diagnosis:
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
+        partials: of each named effect, what is missing without it and what it gives.
         impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
@@ -264,6 +280,7 @@ class Diagnosis:
     changed: list[str] = field(default_factory=list)
     places: list[Place] = field(default_factory=list)
     acting: list[Acting] = field(default_factory=list)
+    partials: list[Partial] = field(default_factory=list)
     impulses: list[Impulse] = field(default_factory=list)
     onset: float = float("nan")
     traces: list[Trace] = field(default_factory=list)

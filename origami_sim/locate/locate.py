@@ -8,7 +8,7 @@ root panel. Its product with the rate is the unexplained power.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
@@ -62,6 +62,12 @@ class Motion:
         windows = self._windows(values)
         return windows[..., windows.shape[-1] // 2]
 
+    def thinned(self, by: int) -> "Motion":
+        """Every so many frames."""
+        part = {f.name: getattr(self, f.name)[..., ::by] for f in fields(self) if f.name in _BY_FRAME}
+        drive = {n: v[::by] for n, v in self.drive.items()}
+        return replace(self, **part, pose=self.pose.select(slice(None, None, by)), drive=drive, half=self.half // by)
+
     def _windows(self, values: np.ndarray) -> np.ndarray:
         width, count = self.width, max(1, len(self.times) // self.width)
         return values[..., : count * width].reshape(*values.shape[:-1], count, -1)
@@ -76,6 +82,9 @@ class Motion:
         """Noise of the mean acceleration over a window, which is that of the rates at its ends, by that of one."""
         point = savgol_coeffs(2 * self.half + 1, 4, deriv=2)
         return float(np.linalg.norm(np.convolve(point, np.ones(self.width) / self.width)) / np.linalg.norm(point))
+
+
+_BY_FRAME = ("times", "q", "rate", "acceleration", "missing", "error", "inertia", "modelled")
 
 
 def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
@@ -106,8 +115,7 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     without, parameters = loose(model, parameters)
     pose = path.at(grid + recording.times[0], smooth)
     drive = distorted(without, parameters, forward.drives[index], float(grid[-1]))
-    frozen = drive.replace(**{n: Signal(offset=_at(s, grid)) for n, s in drive.signals.items()})
-    inertia, free, gaps = dynamics(forward, without, parameters, frozen, pose, rate)
+    inertia, free, gaps = dynamics(forward, without, parameters, frozen(drive, grid), pose, rate)
     keep = np.ones(len(grid), bool)
     if arm.floating:
         keep = ~spread_out(touching(gaps, noise[:3].max()), half)
@@ -123,6 +131,11 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     return Motion(
         at, smooth, rate, acceleration, missing, error, inertia, deviation, free[:, keep], pose, told, varying, half
     )
+
+
+def frozen(drive: Drive, times: np.ndarray) -> Drive:
+    """A drive that holds in each world what it gives at one of the times."""
+    return drive.replace(**{n: Signal(offset=_at(s, times)) for n, s in drive.signals.items()})
 
 
 def loose(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:

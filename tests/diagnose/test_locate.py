@@ -9,10 +9,13 @@ from origami_sim.articulation import Articulation
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
+from origami_sim.fit.hypothesis import Hypothesis, suspects
+from origami_sim.fit.least_squares import fit
 from origami_sim.infer.diagnosis import REVERSAL
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.acting import _actions, acting
 from origami_sim.locate.locate import locate, motions_of, phase, reversals, since
+from origami_sim.locate.partial import partials
 from origami_sim.model import dihedral_angles
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
@@ -62,6 +65,27 @@ def test_equation_error_finds_the_crease(rubbing):
     rate = next(c for c in places[0].curves if c.against == "rate")
     moment = np.array(rate.mean)
     assert moment[0] > 0 > moment[-1], "it opposes the motion"
+
+
+def test_each_of_two_effects_is_seen_through_what_is_missing_without_it():
+    """Friction against the rate, a stiffening against the angle, each at its crease and as large as it was."""
+    stiffens = {"crease_stiffening": {"cubic_stiffness": (3e-4, [0])}}
+    recordings = prepared([record(FRICTION | stiffens, duration=4.0, panels=3, rate=100)], 200.0)
+    forward, _ = arranged(subject(3), recordings, Options())
+    base = nominal_fits(forward)[1]
+    every = {s.label: s for s in suspects(forward.model, recordings, forward.drive, forward.parameters)}
+    pair = [every["crease_friction at crease 1"], every["crease_stiffening at crease 0"]]
+    start = np.array([*base.theta, 2e-5, *(f.start for f in pair[0].free[1:]), 3e-4])
+    f = fit(forward, Hypothesis(tuple(pair)), base.weights, theta=start, local=base.local)
+    rubs, bends = partials(forward, [(s, f) for s in pair])
+    assert (rubs.label, rubs.site, rubs.curve.against) == (pair[0].label, "crease 1", "rate")
+    x, law = np.array(rubs.curve.x), np.array(rubs.law)
+    fast = np.abs(x) > 0.3 * np.abs(x).max()
+    assert law[fast] == pytest.approx(-2e-5 * np.sign(x[fast]), rel=0.1)
+    for p in (rubs, bends):
+        seen, given, error = np.array(p.curve.mean), np.array(p.law), np.array(p.curve.error)
+        assert np.sqrt(np.mean((seen - given) ** 2)) < 0.25 * np.sqrt(np.mean(given**2)) + np.median(error)
+    assert (bends.site, bends.curve.against) == ("crease 0", "angle")
 
 
 def acting_alone(recording):

@@ -26,13 +26,13 @@ from origami_sim.infer.diagnosis import (
     Experiment,
     Impulse,
     Number,
+    Partial,
     Place,
     Suspected,
     Trace,
 )
 from origami_sim.pattern import grid
 from origami_sim.report.page import geometry_of, page, read_report, write_report
-from origami_sim.report.page.law import law_of
 from origami_sim.report.page.markup import amount, element, interval, percent, plus_minus
 from origami_sim.report.page.plots import POINTS, Plot, ticks
 from origami_sim.report.page.wording import number_of, worded, words_of
@@ -345,20 +345,6 @@ def test_probabilities_and_shares_have_columns_of_their_own():
     assert "Share of the structure" in " ".join(unknown.words) and "robab" not in " ".join(unknown.words)
 
 
-def test_law_of_the_catalogue_from_fitted_numbers():
-    x = np.array([-2.0, -0.1, 0.1, 2.0])
-    loss = law_of("crease_viscosity", {"viscosity": 3e-5})
-    assert loss.against == "rate" and loss.moment(x) == pytest.approx(-3e-5 * x) and loss.straight(x)
-    rubbing = law_of("crease_friction", {"friction_moment": 2e-5, "yield_angle": 0.01})
-    assert rubbing.against == "rate" and rubbing.moment(x) == pytest.approx(-2e-5 * np.sign(x))
-    assert not rubbing.straight(x) and not rubbing.assumed
-    cubic = law_of("crease_stiffening", {"cubic_stiffness": 1e-4})
-    assert cubic.against == "angle" and cubic.moment(x) == pytest.approx(-1e-4 * x**3)
-    assert cubic.assumed == {"rest_angle": 0.0}
-    for needs_more in ("crease_relaxation", "air_drag", "magnetic_torque", "clock_rate", "no such effect"):
-        assert law_of(needs_more, {"stiffness_1": 1.0}) is None
-
-
 def drawn_law(text: str) -> np.ndarray:
     """Points [n, 2] of the drawn law, in parts of the plot's box."""
     start, steps = re.search(r' d="M([^"]*)" class="law"', text)[1].split("l")
@@ -367,40 +353,20 @@ def drawn_law(text: str) -> np.ndarray:
     return np.vstack([first, first + np.cumsum(rest, axis=0)]) / (2000, 1000)
 
 
-def test_law_is_drawn_through_what_is_missing():
+def test_law_is_drawn_through_what_is_missing_without_it():
     d, site = example(), CREASES[1]
-    row = d.candidates[1]  # dry friction, of which the refitted loss has taken a part
-    d.chosen, row.numbers[1].value = [row.label], 2e-5
-    rate = d.places[0].curves[1]
-    x = np.array(rate.x)
-    rate.mean = (-2e-5 * np.sign(x) + 1.2e-5 * x + 1e-6).tolist()
+    x = np.linspace(-2.0, 2.0, 13)
+    law = -2e-5 * np.sign(x)
+    curve = Curve("rate", "rad/s", x.tolist(), law.tolist(), [1e-7] * 13, [23] * 13)
+    assert "is missing if all acts" not in page(d)
+    d.partials = [Partial(d.chosen[0], site, curve, law.tolist())]
     text = page(d)
-    assert "less the straight line" in text and f"at {site.replace('&', '&amp;').replace('<b>', '&lt;b&gt;')}" in text
+    said = f"The moment at {site} that is missing if all acts that was found but this, against the rate there."
+    assert html.escape(said) in text
     line = drawn_law(text)
-    assert len(line) > 20
-    low, high = (f(np.array(rate.mean)) for f in (np.min, np.max))
-    heights = np.interp((np.array(x) - x[0]) / np.ptp(x), (line[:, 0] - line[0, 0]) / np.ptp(line[:, 0]), line[:, 1])
     dots = re.search(r'class="figures evidence".*', text)[0]
     spots = np.array(re.findall(r'd="M(\d+) (\d+)h0" class="place dots"', dots)[: len(x)], int) / (2000, 1000)
-    far = np.abs(x) > 0.2  # bins beside the jump
-    assert heights[far] == pytest.approx(spots[far, 1], abs=0.01)
-    assert high - low > 0
-
-
-def test_one_missing_thing_is_drawn_by_its_own_size():
-    d, site = example(), CREASES[1]
-    curve = Curve("rate", "rad/s", np.linspace(-2, 2, 9).tolist(), (-2.13e-5 * np.linspace(-2, 2, 9)).tolist(),
-                  [1e-7] * 9, [9] * 9)  # fmt: skip
-    time = Curve("time", "s", [0.1, 0.2], [1e-5, -1e-5], [1e-7] * 2, [9] * 2)
-    d.acting = [Acting("moment at", site, 1.1, [], "", math.nan, "N m", [time, curve])]
-    said = "The moment at middle &lt;b&gt; &amp; crease that is missing, against the rate there."
-    assert said in page(d)
-    rubbing = example()  # a jump, which means over windows would round
-    rubbing.chosen, rubbing.acting = [rubbing.candidates[1].label], d.acting
-    assert said not in page(rubbing)
-    both = example("SEVERAL")  # then it holds the other one as well
-    both.acting = d.acting
-    assert said not in page(both)
+    assert line == pytest.approx(spots, abs=0.002)
 
 
 def test_experiments_that_tell_nothing_are_not_proposed():

@@ -1,0 +1,130 @@
+"""Partial residuals: what a found model lacks without one of its effects, and what that effect gives.
+
+Both are moments along the recorded motion, averaged over the same bins (a component-plus-residual plot; Ezekiel 1924,
+Larsen & McCleary 1972). So each law can be seen through the data, whatever it acts on and whatever else was found.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from origami_sim.distort import distorted
+from origami_sim.drive import Drive
+from origami_sim.effects import get
+from origami_sim.fit.hypothesis import Suspect
+from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.infer.diagnosis import Curve, Partial, Place
+from origami_sim.locate.locate import Motion, dynamics, frozen, locate, loose, motion
+from origami_sim.locate.locate_curves import places
+from origami_sim.model import Model, Parameters, State
+from origami_sim.predict.rollouts import Rollouts
+from origami_sim.solve.batch import Batch
+from origami_sim.solve.settling import levels, per_world
+
+FRAMES = 4000
+"""Frames of a recording along which laws with a memory are followed, at most, evenly spread: a second of time."""
+
+
+def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[Partial]:
+    """Of each effect of a fit its partial residual, at the coordinate and against the quantity that show it best.
+
+    What does not show in the motion has none.
+    """
+    out, fits = [], {id(f): f for _, f in shown}
+    for f in fits.values():
+        mine = [s for s, by in shown if by is f]
+        whole, *without = _places(forward, f, [f.theta, *(_without(f, s) for s in mine)])
+        for suspect, found in zip(mine, without, strict=True):
+            pairs = [(a.site, _laws(a, b)) for a in found for b in whole if a.site == b.site]
+            site, laws = max(pairs, key=lambda pair: max(map(_seen, pair[1]), default=0.0), default=("", []))
+            curve, law = max(laws, key=_ordered, default=(None, np.zeros(0)))
+            if curve is not None and np.any(law):
+                out.append(Partial(suspect.label, site, curve, law.tolist()))
+    return out
+
+
+def _without(f: Fit, suspect: Suspect) -> np.ndarray:
+    """Numbers of a fit (P,) with the strengths of one of its effects at none, and all others as they are."""
+    none = {id(n): n.start for n in suspect.strengths}
+    return np.array([none.get(id(n), value) for n, value in zip(f.free, f.theta, strict=True)])
+
+
+def _laws(without: Place, whole: Place) -> list[tuple[Curve, np.ndarray]]:
+    """Curves of what is missing without an effect, and what the effect gives in their bins."""
+    found = {c.against: c for c in whole.curves}
+    both = [(c, found[c.against]) for c in without.curves if c.against in found and c.x == found[c.against].x]
+    return [(a, np.array(a.mean) - np.array(b.mean)) for a, b in both if len(a.x) > 2]
+
+
+def _seen(one: tuple[Curve, np.ndarray]) -> float:
+    """Mean square of what an effect gives in the bins of a curve, over the error there."""
+    curve, law = one
+    return float(np.mean(law**2) / max(float(np.mean(np.square(curve.error))), 1e-300))
+
+
+def _ordered(one: tuple[Curve, np.ndarray]) -> float:
+    """How much of what an effect gives goes with the quantity of a curve: its variance between bins."""
+    curve, law = one
+    return float(np.cov(law, aweights=curve.count, ddof=0))
+
+
+def _places(forward: Predictor, f: Fit, thetas: Sequence[np.ndarray]) -> list[list[Place]]:
+    """Places of what a fit's hypothesis lacks with each of some numbers."""
+    if forward.curve:
+        return [places(forward.balance(f.hypothesis, theta)) for theta in thetas]  # type: ignore[attr-defined]
+    assert isinstance(forward, Rollouts)
+    each: list[list[Motion]] = [[] for _ in thetas]
+    for r in range(len(forward.recordings)):
+        m = motion(forward, f, r)
+        if m is None:
+            continue
+        for found, one in zip(each, _lacking(forward, f, thetas, r, m), strict=True):
+            found.append(one)
+    return [locate(forward, found) for found in each]
+
+
+def _lacking(forward: Rollouts, f: Fit, thetas: Sequence[np.ndarray], index: int, m: Motion) -> list[Motion]:
+    """The motion of a recording, with what is missing in it with each of some numbers of a fit's hypothesis."""
+    every = [loose(*forward.world(f.hypothesis, theta, f.hypothesis.effects)) for theta in thetas]
+    if any(get(e).memory for e in f.hypothesis.effects):
+        m = m.thinned(max(1, len(m.times) // FRAMES))
+    times = m.times - forward.recordings[index].times[0]
+    drives = [distorted(model, parameters, forward.drives[index], float(times[-1])) for model, parameters in every]
+    out = []
+    for (model, parameters), drive in zip(every, drives, strict=True):
+        inertia, free, _ = dynamics(forward, model, parameters, frozen(drive, times), m.pose, m.rate)
+        if any(get(e).memory for e in model.effects):
+            free = free + _remembered(forward, model, parameters, drive, times, m)
+        missing = np.einsum("mkw,kw->mw", inertia, m.acceleration) - free
+        missing[~m.told] = 0.0
+        out.append(replace(m, missing=missing))
+    return out
+
+
+def _remembered(
+    forward: Rollouts, model: Model, parameters: Parameters, drive: Drive, times: np.ndarray, m: Motion
+) -> np.ndarray:
+    """What laws with a memory of the way add [m, n] to the forces that they give without one."""
+    arm = forward.articulation
+    x = arm.positions(m.pose)
+    jacobian = arm.jacobian(m.pose, x)
+    velocity = np.einsum("mnwa,mw->nwa", jacobian, m.rate)
+    held = per_world(drive, levels(drive, 0.0, 1))
+    still = replace(model, free=np.zeros_like(model.free))
+    make = lambda: Batch(still, parameters, held, State.at_rest(model, 1, position=x[:, 0]), threads=1, supports=model)  # noqa: E731
+    along, fresh = make(), make()
+    out = np.zeros((arm.size, len(times)))
+    for k, t in enumerate(times.tolist()):
+        where = np.ascontiguousarray(x[:, k : k + 1])
+        if k:
+            along.lead(where, float(times[k] - times[k - 1]))
+            fresh._overwrite(fresh._x, where)
+        both = []
+        for batch in (along, fresh):
+            batch.hold(levels(drive, t, 1))
+            batch._overwrite(batch._v, np.ascontiguousarray(velocity[:, k : k + 1]))
+            both.append(batch.total_force(t))
+        out[:, k] = np.einsum("mna,na->m", jacobian[:, :, k], (both[0] - both[1])[:, 0])
+    return out
