@@ -172,9 +172,9 @@ def readers() -> dict[str, Callable[[Path], object]]:
     from origami_sim import load_run, read_pattern, read_recording
     from origami_sim.device import device_module
     from origami_sim.diagnose.command import _earlier
+    from origami_sim.drive.gridded import FieldTable
     from origami_sim.explore.sweep import _Kept
     from origami_sim.folding import read
-    from origami_sim.gridded import FieldTable
     from origami_sim.recording.dataset import read_dataset
     from origami_sim.scene import read_calibration, scene_module, scene_settings
 

@@ -9,8 +9,8 @@ import time
 import numpy as np
 
 from origami_sim import Drive, Sheet, miura, sheet, simulate
-from origami_sim.materials import G
 from origami_sim.model import State
+from origami_sim.physics.materials import G
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.timestep import stable_step
 

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from origami_sim.diagnose import Diagnosis, Subject, diagnose
     from origami_sim.dielectric import Stack
     from origami_sim.drive import Drive, Signal, ramp, series, sine
+    from origami_sim.drive.gridded import FieldTable
+    from origami_sim.drive.sources import coil, coil_pair, dipole, field_table, magnet
     from origami_sim.effects import CATALOGUE
     from origami_sim.errors import InputError
     from origami_sim.explore import Found, Way, gradient, optimise, solve_for, sweep
-    from origami_sim.gridded import FieldTable
-    from origami_sim.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
     from origami_sim.model import Model, Parameters, State
     from origami_sim.pattern import (
         Pattern,
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         write_fold,
         write_mesh,
     )
+    from origami_sim.physics.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
     from origami_sim.quantities import si
     from origami_sim.recording import Recording, read_recording
     from origami_sim.replay import open_replay, screenshot, write_replay
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from origami_sim.solve.sources import field_at
     from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
     from origami_sim.solve.timestep import stable_step
-    from origami_sim.sources import coil, coil_pair, dipole, field_table, magnet
 
 __version__ = "0.1.0"
 
@@ -66,7 +66,7 @@ _HOMES = {
     "drive": "Drive Signal ramp series sine",
     "effects": "CATALOGUE",
     "errors": "InputError",
-    "materials": "MATERIALS bridge_stiffness layered_rigidity material",
+    "physics.materials": "MATERIALS bridge_stiffness layered_rigidity material",
     "model": "Model Parameters State",
     "pattern": "Pattern cross cut grid kresling miura sheet strip uncreased waterbomb triangulate "
     "read_fold read_mesh read_pattern read_svg write_fold write_mesh",
@@ -75,8 +75,8 @@ _HOMES = {
     "results": "format_table load_run save_run",
     "scene": "read_calibration scene_module",
     "shell": "isotropic orthotropic",
-    "gridded": "FieldTable",
-    "sources": "coil coil_pair dipole field_table magnet",
+    "drive.gridded": "FieldTable",
+    "drive.sources": "coil coil_pair dipole field_table magnet",
     "solve.sources": "field_at",
     "solve.dynamics": "Trajectory simulate",
     "solve.quasistatic": "QuasiStatic quasistatic",

@@ -11,10 +11,10 @@ from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
-from origami_sim.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.model import ALIKE, Model, Parameters, dihedral_angles
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
+from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.quantities import converted
 from origami_sim.shell import Shell, assign, matrices, plates, stated
 from origami_sim.statements import statement

@@ -28,7 +28,8 @@ import numpy as np
 from origami_sim import pattern as patterns
 from origami_sim.build import Sheet
 from origami_sim.drive import CHANNELS, Drive, Signal
-from origami_sim.drive_file import as_table, called, check_known, read_drive, stated_in
+from origami_sim.drive.drive_file import as_table, called, check_known, read_drive, stated_in
+from origami_sim.drive.sources import NUMBERS, STRENGTHS
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import read_toml, write_text
 from origami_sim.model import Model, Parameters
@@ -36,7 +37,6 @@ from origami_sim.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.quantities import converted
-from origami_sim.sources import NUMBERS, STRENGTHS
 
 _KEYS = ("about", "pattern", "sheet", "statements", "model", "names", "parameters", "drive", "run")
 _BUILDERS: dict[str, Callable[..., Pattern]] = {

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from origami_sim.effects.crease_table import KNOTS
 from origami_sim.errors import InputError
 from origami_sim.masses import Masses, positive
-from origami_sim.materials import layered_rigidity, material
+from origami_sim.physics.materials import layered_rigidity, material
 from origami_sim.statements import statement
 
 REACH = 0.1

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
 from origami_sim.masses import Masses, barycentric, in_plane, positive
-from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
+from origami_sim.physics.materials import G
 from origami_sim.statements import statement
 
 SINK = 1e-4

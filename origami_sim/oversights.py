@@ -6,8 +6,8 @@ from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.ground import gaps, heights
-from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
+from origami_sim.physics.materials import G
 
 THROWN = 0.01
 """Height, over the device's size, to which a ground that it starts inside may throw it before that is refused.

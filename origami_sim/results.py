@@ -28,8 +28,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from origami_sim.drive import Drive, Signal
+from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import InputError, unwritable
-from origami_sim.gridded import FieldTable
 from origami_sim.model import PADS, Model, Parameters, State
 from origami_sim.replay import write_replay
 from origami_sim.solve.dynamics import Failure, Trajectory

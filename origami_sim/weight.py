@@ -3,8 +3,8 @@
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.materials import G
 from origami_sim.model import Model, Parameters
+from origami_sim.physics.materials import G
 from origami_sim.recording import Gravity
 
 AXES = ("gravity_x", "gravity_y", "gravity_z")

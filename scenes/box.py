@@ -9,10 +9,10 @@ from origami_sim.build import Sheet
 from origami_sim.calibrate.result import table
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.errors import InputError
-from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
+from origami_sim.physics.materials import bridge_stiffness
 from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of, read_calibration
 
 CALIBRATION = "box"

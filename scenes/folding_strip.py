@@ -15,9 +15,9 @@ from origami_sim.beams import along_strip
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
-from origami_sim.materials import bridge_stiffness
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
+from origami_sim.physics.materials import bridge_stiffness
 from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 
 CALIBRATION = "folding_strip"

@@ -18,9 +18,9 @@ import numpy as np
 from origami_sim.beams import along_strip, as_beam, diagonal_share
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
-from origami_sim.materials import MU0
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
+from origami_sim.physics.materials import MU0
 from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "mae_cantilever"

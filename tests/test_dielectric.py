@@ -7,8 +7,8 @@ from origami_sim.build import Sheet
 from origami_sim.dielectric import Stack
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.materials import EPS0, layered_rigidity
 from origami_sim.pattern import strip
+from origami_sim.physics.materials import EPS0, layered_rigidity
 from origami_sim.solve.statics import equilibrium
 
 SIZE = {"layers": 6, "notch": "5 mm"}

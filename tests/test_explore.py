@@ -11,8 +11,8 @@ from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.explore import Way, angle, find, gradient, moved, optimise, solve_for, sweep
 from origami_sim.explore.found import number
-from origami_sim.materials import MU0
 from origami_sim.pattern import miura, strip
+from origami_sim.physics.materials import MU0
 from origami_sim.quantities import si
 
 WIDTH, LENGTH, PATCH, REMANENCE = 0.02, 0.018, 3e-3, 0.13

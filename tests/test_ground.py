@@ -7,9 +7,9 @@ from origami_sim.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.ground import LANDING, SINK, gaps, heights
-from origami_sim.materials import G
 from origami_sim.model import State
 from origami_sim.pattern import grid, strip
+from origami_sim.physics.materials import G
 from origami_sim.solve.dynamics import simulate
 
 MASS = 1010 * 1e-3 * 0.06 * 0.04

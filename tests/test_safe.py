@@ -11,9 +11,9 @@ from origami_sim import cli, rescue
 from origami_sim.calibrate.curves import read_columns
 from origami_sim.calibrate.stated import read_text
 from origami_sim.design import is_design, read_design
+from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import DiskFull, InputError, unwritable
 from origami_sim.files import LARGEST_TOML, read_bytes, read_toml, write_text
-from origami_sim.gridded import FieldTable
 from origami_sim.pattern import read_mesh, read_svg
 from origami_sim.recording import read_recording
 from origami_sim.recording.dataset import read_dataset

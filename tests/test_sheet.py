@@ -5,10 +5,10 @@ import pytest
 
 from origami_sim.build import Sheet
 from origami_sim.errors import InputError
-from origami_sim.materials import MATERIALS, layered_rigidity
 from origami_sim.model import dihedral_angles
 from origami_sim.pattern import Pattern, grid, strip
 from origami_sim.pattern.assemble import assemble
+from origami_sim.physics.materials import MATERIALS, layered_rigidity
 
 
 def one_face(corners) -> Pattern:

@@ -29,7 +29,7 @@ from origami_sim import (
     write_design,
 )
 from origami_sim.cli import main
-from origami_sim.materials import MU0, demagnetising_factors
+from origami_sim.physics.materials import MU0, demagnetising_factors
 from origami_sim.solve.batch import Batch
 
 AXIS = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])

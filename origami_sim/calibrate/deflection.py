@@ -13,7 +13,7 @@ from scipy.linalg import solve_banded
 from origami_sim.calibrate.curves import checked_curve
 from origami_sim.calibrate.fitting import Fit, Parameter, fit, identifiability, warned, with_curve
 from origami_sim.errors import InputError
-from origami_sim.materials import MU0
+from origami_sim.physics.materials import MU0
 
 CELLS = 120
 """Intervals along the beam: Numerov's method, error 2e-7 of the length at lambda = 200."""

@@ -31,7 +31,7 @@ from scipy.sparse.linalg import splu
 from origami_sim.calibrate.result import Calibration, Quantity
 from origami_sim.effects.crease_table import KNOTS
 from origami_sim.errors import InputError
-from origami_sim.materials import layered_rigidity
+from origami_sim.physics.materials import layered_rigidity
 
 TOLERANCE = 1e-7
 """Newton stops at this residual, in units of the largest nodal force; round-off leaves 1e-9 at nu = 0.4999."""

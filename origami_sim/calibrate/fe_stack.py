@@ -15,7 +15,7 @@ import numpy as np
 from origami_sim.calibrate.fe import Rubber, _graded, _Section, _skfem
 from origami_sim.calibrate.result import Calibration, Quantity
 from origami_sim.errors import InputError
-from origami_sim.materials import EPS0
+from origami_sim.physics.materials import EPS0
 
 ELASTOMER = Rubber(2 * 1.4999 * 73.7e3, 0.4999)
 """VHB F9473PC: small-strain shear modulus 73.7 kPa of the seed paper's Ogden constants."""

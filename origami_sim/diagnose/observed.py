@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.drive import Drive
+from origami_sim.drive.sources import STRENGTHS
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
@@ -15,7 +16,6 @@ from origami_sim.predict.starts import channel_tangent, seen_first
 from origami_sim.recording import Channel, Recording, by_component
 from origami_sim.recording.drives import UNITS
 from origami_sim.recording.units import quantity
-from origami_sim.sources import STRENGTHS
 
 BENT = 0.3
 """Fold [rad] of a second pose that is asked: flat creases may lie where a channel has an extremum."""

@@ -3,7 +3,7 @@
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
-from origami_sim.kinematics import corner_rows
+from origami_sim.physics.kinematics import corner_rows
 
 
 @wp.func

@@ -5,8 +5,8 @@ import math
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
-from origami_sim.kinematics import corner_rows
-from origami_sim.materials import MU0
+from origami_sim.physics.kinematics import corner_rows
+from origami_sim.physics.materials import MU0
 
 
 @wp.func

@@ -6,8 +6,8 @@ import warp as wp
 
 from origami_sim.effects import magnetic_torque as nominal
 from origami_sim.effects._effect import Effect, Parameter, scalar
-from origami_sim.kinematics import corner_rows
-from origami_sim.materials import MU0
+from origami_sim.physics.kinematics import corner_rows
+from origami_sim.physics.materials import MU0
 
 
 @wp.func

@@ -5,7 +5,7 @@ import math
 import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
-from origami_sim.materials import EPS0
+from origami_sim.physics.materials import EPS0
 
 
 @wp.func

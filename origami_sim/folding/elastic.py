@@ -19,8 +19,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from origami_sim.materials import MEMBRANE_POISSON
 from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulate
+from origami_sim.physics.materials import MEMBRANE_POISSON
 
 if TYPE_CHECKING:
     from .contact import Contact, Touching

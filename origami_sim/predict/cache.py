@@ -26,7 +26,16 @@ from origami_sim.threads import leads, told
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
 
-_SOURCES = ("*.py", "effects/*.py", "solve/*.py", "recording/*.py", "fit/*.py", "predict/*.py")
+_SOURCES = (
+    "*.py",
+    "physics/*.py",
+    "drive/*.py",
+    "effects/*.py",
+    "solve/*.py",
+    "recording/*.py",
+    "fit/*.py",
+    "predict/*.py",
+)
 
 
 class Cache:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from origami_sim.drive import Drive, Signal, held_to, series
-from origami_sim.drive_file import read_signal, read_sources, stated_in
+from origami_sim.drive.drive_file import read_signal, read_sources, stated_in
+from origami_sim.drive.sources import Source
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import Recording
 from origami_sim.recording.table import Table
 from origami_sim.recording.units import si_unit, unit_factor
-from origami_sim.sources import Source
 
 
 def columns_of(stated: Any) -> Iterator[str]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from origami_sim.drive.sources import Source
 from origami_sim.errors import InputError
 from origami_sim.recording.camera import Camera
-from origami_sim.sources import Source
 
 if TYPE_CHECKING:
     from origami_sim.recording.noise import NoiseReport

@@ -11,7 +11,8 @@ parts in that stretch.
 
 import warp as wp
 
-from origami_sim import _warp, kinematics  # noqa: F401  settings
+from origami_sim import _warp  # noqa: F401  settings
+from origami_sim.physics import kinematics
 
 scalar = wp.float64
 vec3 = wp.vec3d

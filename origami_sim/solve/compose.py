@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from origami_sim import kinematics, magnetostatics
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
+from origami_sim.physics import kinematics, magnetostatics
 from origami_sim.solve import articulated, plates, runge_kutta, sources, templates, touching
 from origami_sim.solve.compose_rigid import Rigid, is_steady
 from origami_sim.solve.compose_sheets import Sheets, Text

@@ -2,7 +2,8 @@
 
 import warp as wp
 
-from origami_sim import _warp, kinematics  # noqa: F401  settings
+from origami_sim import _warp  # noqa: F401  settings
+from origami_sim.physics import kinematics
 
 scalar = wp.float64
 

@@ -3,11 +3,11 @@
 import numpy as np
 import warp as wp
 
-from origami_sim import magnetostatics
 from origami_sim.drive import CHANNELS, Drive
+from origami_sim.drive.sources import KINDS, NUMBERS
 from origami_sim.errors import InputError
-from origami_sim.magnetostatics import Near
-from origami_sim.sources import KINDS, NUMBERS
+from origami_sim.physics import magnetostatics
+from origami_sim.physics.magnetostatics import Near
 
 scalar = wp.float64
 

@@ -10,7 +10,8 @@ over until the nodes have moved far enough to close its gap. So the list changes
 
 import warp as wp
 
-from origami_sim import _warp, kinematics  # noqa: F401  settings
+from origami_sim import _warp  # noqa: F401  settings
+from origami_sim.physics import kinematics
 from origami_sim.solve import nearness
 from origami_sim.solve.nearness import between, crossing, edge_near, from_triangle, off_edge, off_triangle
 

@@ -18,8 +18,8 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.drive import Drive
 from origami_sim.files import write_text
-from origami_sim.materials import MU0
 from origami_sim.pattern.assemble import assemble
+from origami_sim.physics.materials import MU0
 from origami_sim.recording import read_recording
 from origami_sim.report.page import geometry_of, write_report
 from origami_sim.scene import scene_module, scene_settings

@@ -12,8 +12,8 @@ from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.screen import screen
 from origami_sim.locate.locate_curves import sign_changes
-from origami_sim.materials import MU0
 from origami_sim.observe import follow, observe_equilibria
+from origami_sim.physics.materials import MU0
 from origami_sim.predict.curves import Static, clocked
 from origami_sim.predict.prescribed import Prescribed, curves
 from origami_sim.recording import Channel, Recording

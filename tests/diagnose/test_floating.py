@@ -18,9 +18,9 @@ from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.locate import locate, motion, motions_of, touching
-from origami_sim.materials import MU0
 from origami_sim.pattern import strip
 from origami_sim.pattern.assemble import assemble
+from origami_sim.physics.materials import MU0
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.track import placed, track
 from origami_sim.recording import Camera, Channel, Recording

@@ -13,8 +13,8 @@ from origami_sim.build import Sheet
 from origami_sim.drive import Drive, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.materials import yielding_crease
 from origami_sim.pattern import strip
+from origami_sim.physics.materials import yielding_crease
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.quasistatic import quasistatic

@@ -9,9 +9,9 @@ from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import suspects
-from origami_sim.materials import MU0
 from origami_sim.model import magnets
 from origami_sim.pattern import strip
+from origami_sim.physics.materials import MU0
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.scene import read_calibration, scene_module

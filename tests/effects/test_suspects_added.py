@@ -11,8 +11,8 @@ from effects.test_suspects_fields import MAGNET, MOMENT, plate, under
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.materials import MU0
 from origami_sim.model import Parameters, node_mass
+from origami_sim.physics.materials import MU0
 from origami_sim.solve.batch import Batch, forces
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import stable_step

@@ -8,7 +8,7 @@ from effects.kit import hinge, hinge_positions, make_model, quiet, random_rotati
 
 from origami_sim.drive import Drive, series
 from origami_sim.effects import CATALOGUE
-from origami_sim.materials import EPS0, MU0
+from origami_sim.physics.materials import EPS0, MU0
 from origami_sim.solve.batch import forces
 from origami_sim.solve.dynamics import simulate
 

@@ -5,7 +5,7 @@ import pytest
 
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
-from origami_sim.materials import EPS0
+from origami_sim.physics.materials import EPS0
 from origami_sim.scene import follow, read_calibration
 from origami_sim.scenes import bifold
 from origami_sim.solve.dynamics import simulate

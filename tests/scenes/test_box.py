@@ -103,7 +103,7 @@ def lumped(settings, fields) -> np.ndarray:
     from scipy.optimize import brentq
 
     from origami_sim.calibrate.result import table
-    from origami_sim.materials import MU0
+    from origami_sim.physics.materials import MU0
 
     law = read_calibration("crease_bridge")
     moment = table(law, "resisting_moment") * settings.patch_width / law.width
@@ -126,7 +126,7 @@ def test_crease_by_finite_elements_folds_a_little_further(settings):
 
 def test_default_crease_is_that_of_finite_elements_at_rest(settings):
     """End correction 0.66 of the default against the 0.674 of the shipped finite elements."""
-    from origami_sim.materials import bridge_stiffness
+    from origami_sim.physics.materials import bridge_stiffness
 
     linear = bridge_stiffness(
         settings.modulus, settings.patch_width, settings.thickness, settings.gap, poisson=settings.poisson,

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from origami_sim.errors import InputError
-from origami_sim.materials import EPS0, MU0
+from origami_sim.physics.materials import EPS0, MU0
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import multi_field_sheet as sheet
 

@@ -13,9 +13,9 @@ from solve.test_touch import letter, made, plates
 
 from origami_sim import Drive, FieldTable, Sheet, coil, field_at, field_table, magnet, ramp, series, simulate, strip
 from origami_sim.bodies import rigid
-from origami_sim.materials import G
 from origami_sim.model import State
 from origami_sim.pattern import sheet as mesh
+from origami_sim.physics.materials import G
 
 MM = 1e-3
 SHIFT = 1e-15

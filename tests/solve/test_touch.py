@@ -14,8 +14,8 @@ from origami_sim import sheet as mesh
 from origami_sim.bodies import rigid
 from origami_sim.cli import main
 from origami_sim.errors import InputError
-from origami_sim.materials import G
 from origami_sim.model import State, node_mass
+from origami_sim.physics.materials import G
 from origami_sim.results import load_run, save_run
 from origami_sim.solve.batch import Batch
 

@@ -11,8 +11,8 @@ from origami_sim.errors import InputError
 from origami_sim.quantities import ANY, converted
 
 if TYPE_CHECKING:
-    from origami_sim.gridded import FieldTable
-    from origami_sim.sources import Source
+    from origami_sim.drive.gridded import FieldTable
+    from origami_sim.drive.sources import Source
 
 CHANNELS = (
     "field_x",
@@ -215,7 +215,7 @@ class Drive:
 
     def _place(self, sources: Sequence["Source | Sequence[Source]"]) -> None:
         if sources:
-            from origami_sim.sources import NUMBERS, flattened  # which need signals
+            from origami_sim.drive.sources import NUMBERS, flattened  # which need signals
 
             found = flattened(sources)
             self.placed = tuple((s.kind, s.table) for s in found)

@@ -13,10 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from origami_sim.drive import UNITS, Drive, Signal, ramp, series, sine
+from origami_sim.drive.drive import UNITS, Drive, Signal, ramp, series, sine
+from origami_sim.drive.sources import STRENGTHS, coil, coil_pair, dipole, field_table, flattened, magnet
 from origami_sim.errors import InputError, nearest
 from origami_sim.quantities import converted
-from origami_sim.sources import STRENGTHS, coil, coil_pair, dipole, field_table, flattened, magnet
 
 _WAVES = {"ramp": (ramp, "final"), "sine": (sine, "amplitude")}
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.drive import Signal, Value, as_signal
+from origami_sim.drive.drive import Signal, Value, as_signal
+from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import InputError
-from origami_sim.gridded import FieldTable
 from origami_sim.quantities import converted
 
 KINDS = ("dipole", "coil", "magnet", "table")

@@ -5,7 +5,7 @@ import math
 import warp as wp
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.materials import MU0
+from origami_sim.physics.materials import MU0
 
 scalar = wp.float64
 

@@ -1,0 +1,1 @@
+"""Formulas that know no model: materials, the kinematics of hinges and triangles, fields of magnets."""
