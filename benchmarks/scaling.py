@@ -17,8 +17,8 @@ from crawler_strip import strip
 from rollout import batch, setting
 from timing import interleave, table, verdict
 
-from origami_sim.bodies import rigid
 from origami_sim.model import State
+from origami_sim.model.bodies import rigid
 from origami_sim.solve.batch import default_threads
 from origami_sim.solve.rigid import RigidBatch
 

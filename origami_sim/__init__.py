@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from origami_sim.bodies import rigid
     from origami_sim.build import Sheet
     from origami_sim.design import Design, read_design, write_design
     from origami_sim.device import device_module
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from origami_sim.errors import InputError
     from origami_sim.explore import Found, Way, gradient, optimise, solve_for, sweep
     from origami_sim.model import Model, Parameters, State
+    from origami_sim.model.bodies import rigid
     from origami_sim.pattern import (
         Pattern,
         cross,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "bodies": "rigid",
+    "model.bodies": "rigid",
     "build": "Sheet",
     "design": "Design read_design write_design",
     "device": "device_module",

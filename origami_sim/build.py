@@ -5,13 +5,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from origami_sim.bodies import rigid
 from origami_sim.dielectric import Electrodes
 from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
 from origami_sim.ground import Contact, Ground, Grounds
 from origami_sim.masses import Stated, positive
 from origami_sim.model import ALIKE, Model, Parameters, dihedral_angles
+from origami_sim.model.bodies import rigid
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
 from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material

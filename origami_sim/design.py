@@ -33,7 +33,7 @@ from origami_sim.drive.sources import NUMBERS, STRENGTHS
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import read_toml, write_text
 from origami_sim.model import Model, Parameters
-from origami_sim.model_file import model_tables, read_model
+from origami_sim.model.model_file import model_tables, read_model
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.quantities import converted

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from origami_sim.errors import InputError
 from origami_sim.masses import Masses, barycentric, in_plane, positive
 from origami_sim.model import Model, Parameters
+from origami_sim.model.clearance import gaps, upward
 from origami_sim.physics.materials import G
 from origami_sim.statements import statement
 
@@ -466,27 +467,3 @@ def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
         allowed = ", ".join(map(str, QUADRATURES))
         raise InputError("no such number of points to a triangle", field="points", value=points, allowed=allowed)
     return QUADRATURES[points]
-
-
-def upward(tilt: float, azimuth: float) -> np.ndarray:
-    """Normal (3,) of a ground that rises by `tilt` in the horizontal direction `azimuth` [rad]."""
-    s = np.sin(tilt)
-    return np.array([-s * np.cos(azimuth), -s * np.sin(azimuth), np.cos(tilt)])
-
-
-def heights(parameters: Parameters, x: np.ndarray) -> np.ndarray:
-    """Heights [..., W] of places x [..., W, 3] above the ground [m]."""
-    plane = [parameters["plane", n][0] for n in ("tilt", "azimuth", "height")]
-    worlds = [np.broadcast_to(p, (x.shape[-2],)) for p in plane]
-    up = np.array([upward(t, a) for t, a in zip(*worlds[:2], strict=True)])
-    return (x * up).sum(-1) - worlds[2]
-
-
-def gaps(model: Model, parameters: Parameters, x: np.ndarray) -> np.ndarray:
-    """Heights [..., K, W] of the contact points above the ground [m], at node positions x [..., N, W, 3]."""
-    corners = np.moveaxis(x[..., model.contacts, :, :], -3, 0)
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-300)
-    weights = model.contact_weights.T[:, :, None, None]
-    at = sum(w * c for w, c in zip(weights, corners, strict=True)) + model.contact_offsets[:, None, None] * normal
-    return heights(parameters, at)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
-from origami_sim.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, second_moments, triangle
 from origami_sim.errors import InputError
 from origami_sim.model import BODY
+from origami_sim.model.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, second_moments, triangle
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.triangulate import Triangulation
 from origami_sim.physics.materials import G

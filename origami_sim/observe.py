@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal, series
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.distort import distorted
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import Trajectory

@@ -5,8 +5,8 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
-from origami_sim.ground import gaps, heights
 from origami_sim.model import Model, Parameters
+from origami_sim.model.clearance import gaps, heights
 from origami_sim.physics.materials import G
 
 THROWN = 0.01

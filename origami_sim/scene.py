@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import read_toml
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.bodies import rigid
 from origami_sim.quantities import parsed
 from origami_sim.solve.accuracy import check_accuracy
 from origami_sim.solve.dynamics import Trajectory, simulate

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from origami_sim import curvature
 from origami_sim.effects._plate import BRANCHES, COMPONENTS
 from origami_sim.errors import InputError
-from origami_sim.model import ALIKE, Model, Parameters
+from origami_sim.model import ALIKE, Model, Parameters, curvature
 
 if TYPE_CHECKING:
     from origami_sim.build import Sheet

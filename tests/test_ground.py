@@ -6,8 +6,9 @@ import pytest
 from origami_sim.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.ground import LANDING, SINK, gaps, heights
+from origami_sim.ground import LANDING, SINK
 from origami_sim.model import State
+from origami_sim.model.clearance import gaps, heights
 from origami_sim.pattern import grid, strip
 from origami_sim.physics.materials import G
 from origami_sim.solve.dynamics import simulate

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from origami_sim import Drive, Sheet, equilibrium, simulate, strip
-from origami_sim.articulation import Articulation
-from origami_sim.bodies import body_of
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import body_of
 
 G = 9.80665
 MOUNT = 0.04

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.articulation import Articulation
 from origami_sim.diagnose.inertia import calmer, inertia
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
@@ -14,6 +13,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.nominal import nominal_fits
+from origami_sim.model.articulation import Articulation
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.channels import stacked, units_of
 from origami_sim.predict.prescribed import curves

@@ -14,10 +14,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from origami_sim.device import lasting
-from origami_sim.distort import distorted
 from origami_sim.errors import InputError
 from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, found
 from origami_sim.model import State
+from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid_sensitivity import followed
 from origami_sim.solve.statics import tangent

@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 
-from origami_sim.bodies import rigid
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.effects._effect import Effect
-from origami_sim.entities import tune
 from origami_sim.model import Model, Parameters, magnets
-from origami_sim.places import across, points, stretches
+from origami_sim.model.bodies import rigid
+from origami_sim.model.entities import tune
+from origami_sim.model.places import across, points, stretches
 from origami_sim.recording import Recording
 from origami_sim.scene import Settings
 

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.articulation import Articulation
 from origami_sim.infer.diagnosis import REVERSAL, Acting, Curve
 from origami_sim.locate.locate import Motion, against, bins, way
+from origami_sim.model.articulation import Articulation
 
 SAME = 0.999
 """|cos| from which on two actions are one."""

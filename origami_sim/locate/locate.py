@@ -13,12 +13,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from origami_sim.articulation import Pose
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
 from origami_sim.fit.least_squares import Fit
 from origami_sim.infer.diagnosis import REVERSAL, Curve, Place
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.articulation import Pose
+from origami_sim.model.distort import distorted
 from origami_sim.predict.curves import PASSIVE
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.predict.track import followed

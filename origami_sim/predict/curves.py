@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
@@ -22,6 +21,7 @@ from origami_sim.fit.hypothesis import (
 )
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.distort import distorted
 from origami_sim.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of

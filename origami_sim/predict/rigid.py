@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.articulation import Pose
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.articulation import Pose
 from origami_sim.predict.rollouts import Motion, Rollouts, Shots, Simulated, film, joined_poses
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording

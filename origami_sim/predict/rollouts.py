@@ -9,8 +9,6 @@ from itertools import chain
 import numpy as np
 from scipy.signal import savgol_filter
 
-from origami_sim.articulation import Articulation, Pose
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.fit.begun import begins, with_begins
@@ -23,6 +21,8 @@ from origami_sim.fit.hypothesis import (
 )
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.articulation import Articulation, Pose
+from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import angle_mask, channel_values, depths, stacked, turned_axes
 from origami_sim.predict.drives import drive_of, shifted
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import depths, turned_axes
 from origami_sim.predict.curves import PIECES, Balance, Curves, channels_of, measures_force
 from origami_sim.predict.measured import measured

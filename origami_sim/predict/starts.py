@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.articulation import Articulation, Pose
 from origami_sim.model import Model
+from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.predict.channels import angle_mask, channel_values
 from origami_sim.predict.track import placed
 from origami_sim.recording import Recording

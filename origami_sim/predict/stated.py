@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.articulation import Articulation
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.predictor import Block
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.solve.statics import equilibrium
 from origami_sim.weight import weighed

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.effects import CATALOGUE, Parameter, get
-from origami_sim.entities import OWNERS, WAYS, located
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.infer.diagnosis import Candidate, Diagnosis
 from origami_sim.model import BODY, Model, Parameters
+from origami_sim.model.entities import OWNERS, WAYS, located
 from origami_sim.scene import Settings
 
 _WORDS = ("site", "source", "at")

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.distort import distorted
 from origami_sim.oversights import (
     below_the_ground,
     idle_drives,

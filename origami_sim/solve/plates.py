@@ -3,8 +3,8 @@
 import numpy as np
 import warp as wp
 
-from origami_sim import _warp, curvature  # noqa: F401  settings
-from origami_sim.model import Model, dihedral_angles
+from origami_sim import _warp  # noqa: F401  settings
+from origami_sim.model import Model, curvature, dihedral_angles
 
 scalar = wp.float64
 

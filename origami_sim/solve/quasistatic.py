@@ -16,11 +16,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.distort import distorted
 from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
-from origami_sim.articulation import Articulation
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.articulation import Articulation
 from origami_sim.solve import articulated
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.runge_kutta import TABLEAU

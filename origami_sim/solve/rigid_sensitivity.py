@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, dihedral_angles
+from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import Topology, screw
 from origami_sim.solve.rigid_statics import NEUTRAL, REDUNDANT, STEP

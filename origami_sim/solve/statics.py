@@ -15,10 +15,10 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.distort import distorted
 from origami_sim.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid_statics import RigidSystem
 from origami_sim.solve.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting

@@ -15,10 +15,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from scipy.linalg.lapack import dpotrf, dpotrs
 
-from origami_sim import curvature
 from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, PAIRS, get
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, curvature
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.skin import clear_share, near_pairs, surface
 from origami_sim.solve.timestep import gradient_norms

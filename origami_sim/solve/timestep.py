@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from origami_sim import curvature
 from origami_sim.effects import CONTACTS, HINGES, PAIRS, Effect, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, node_mass
+from origami_sim.model import Model, Parameters, curvature, node_mass
 
 SAFETY = 0.8
 """Fraction of the stability limit that is used unless a step is given."""

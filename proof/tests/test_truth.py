@@ -128,9 +128,9 @@ def test_a_concealed_couple_of_magnets_conserves_energy(truth):
 @pytest.mark.parametrize("structure", ["hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold"])
 def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
     """Rigid bodies in MuJoCo and panels of bars move alike, within the half step by which MuJoCo's velocities lag."""
-    from origami_sim.articulation import Articulation
     from origami_sim.drive import Drive, sine
     from origami_sim.model import State
+    from origami_sim.model.articulation import Articulation
     from origami_sim.solve.dynamics import simulate
 
     o = truth["objects"].draw(structure, np.random.default_rng(3))

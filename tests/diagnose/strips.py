@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from origami_sim.articulation import Articulation
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Subject, factor
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.articulation import Articulation
 from origami_sim.pattern import strip
 from origami_sim.recording import Recording
 from origami_sim.recording.recording import Channel

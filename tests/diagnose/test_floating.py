@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from origami_sim.articulation import Articulation
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
@@ -18,6 +17,7 @@ from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.locate import locate, motion, motions_of, touching
+from origami_sim.model.articulation import Articulation
 from origami_sim.pattern import strip
 from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import MU0

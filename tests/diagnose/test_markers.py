@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.articulation import Articulation
-from origami_sim.bodies import rigid
 from origami_sim.diagnose import Subject, diagnose
 from origami_sim.diagnose.arrange import starting
 from origami_sim.drive import Drive, ramp
 from origami_sim.fit.hypothesis import suspects
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import rigid
 from origami_sim.observe import observe
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.dynamics import simulate

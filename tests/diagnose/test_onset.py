@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from origami_sim.articulation import Articulation
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
@@ -11,6 +10,7 @@ from origami_sim.drive import Drive
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.onset import onset
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
 from origami_sim.recording import Channel, Recording
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, record, subject

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.articulation import Articulation
 from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
 from origami_sim.observe import body_point, observe
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Camera, Channel, Recording

@@ -7,10 +7,10 @@ import pytest
 from effects.kit import hinge
 from scipy.spatial.transform import Rotation
 
-from origami_sim.distort import distorted
 from origami_sim.drive import CHANNELS, Drive, ramp, series, sine
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
 from origami_sim.model import Parameters
+from origami_sim.model.distort import distorted
 from origami_sim.recording.recording import CHANNEL_KINDS
 
 DRIVES = [n for n, e in CATALOGUE.items() if e.family == "drive"]

@@ -7,9 +7,9 @@ import pytest
 from effects.kit import make_model, quiet, start
 from effects.test_catalogue import NOW, give, responsible, the_drive
 
-from origami_sim.articulation import Articulation
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, SHELLS
 from origami_sim.model import node_mass
+from origami_sim.model.articulation import Articulation
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.rigid import RigidBatch

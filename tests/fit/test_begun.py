@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.bodies import rigid
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Subject, factor
 from origami_sim.drive import Drive, sine
@@ -13,6 +12,7 @@ from origami_sim.fit.begun import within
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.weights import Weights
+from origami_sim.model.bodies import rigid
 from origami_sim.pattern import strip
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, DriveChannel, Recording

@@ -7,8 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from origami_sim.articulation import Articulation
-from origami_sim.bodies import rigid
 from origami_sim.build import Sheet
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
@@ -17,6 +15,8 @@ from origami_sim.fit.least_squares import fit
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.unlisted import anywhere
 from origami_sim.model import State
+from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import rigid
 from origami_sim.pattern import strip
 from origami_sim.predict import cache, rollouts
 from origami_sim.predict.bars import BarRollouts

@@ -8,7 +8,7 @@ import scipy.sparse.linalg as spla
 
 from origami_sim.drive import Drive, sine
 from origami_sim.gait import strides
-from origami_sim.ground import gaps
+from origami_sim.model.clearance import gaps
 from origami_sim.physics.materials import layered_rigidity, material
 from origami_sim.scene import read_calibration
 from origami_sim.scenes import crawler

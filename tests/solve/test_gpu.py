@@ -12,8 +12,8 @@ from solve.sheets import rimmed_end
 from solve.test_touch import letter, made, plates
 
 from origami_sim import Drive, FieldTable, Sheet, coil, field_at, field_table, magnet, ramp, series, simulate, strip
-from origami_sim.bodies import rigid
 from origami_sim.model import State
+from origami_sim.model.bodies import rigid
 from origami_sim.pattern import sheet as mesh
 from origami_sim.physics.materials import G
 

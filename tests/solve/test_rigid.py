@@ -10,10 +10,10 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from origami_sim import Drive, Sheet, equilibrium, grid, miura, simulate, strip, waterbomb
-from origami_sim.articulation import Articulation
-from origami_sim.bodies import body_of, mass_points, rigid
 from origami_sim.errors import InputError
 from origami_sim.model import State, dihedral_angles
+from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import body_of, mass_points, rigid
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid import RigidBatch, batch_of
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from origami_sim import Sheet, cross, simulate, strip
-from origami_sim.articulation import Articulation
-from origami_sim.bodies import body_of
 from origami_sim.model import Model, Parameters, State, dihedral_angles
+from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import body_of
 
 mujoco = pytest.importorskip("mujoco", reason="the comparison needs MuJoCo: pip install mujoco")
 

@@ -23,8 +23,8 @@ from origami_sim import (
     stable_step,
     uncreased,
 )
-from origami_sim.curvature import curvature
 from origami_sim.model import dihedral_angles
+from origami_sim.model.curvature import curvature
 from origami_sim.physics.materials import material
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import tangent

@@ -11,10 +11,10 @@ from effects.kit import random_rotation
 
 from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
-from origami_sim.bodies import rigid
 from origami_sim.cli import main
 from origami_sim.errors import InputError
 from origami_sim.model import State, node_mass
+from origami_sim.model.bodies import rigid
 from origami_sim.physics.materials import G
 from origami_sim.results import load_run, save_run
 from origami_sim.solve.batch import Batch

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.model import ALIKE, Model
+from origami_sim.model.model import ALIKE, Model
 
 VARIATION, BESIDE_HELD = 0.2, 1.2
 """Weights of the energy of differences of curvature across a line, per third of the two areas; the second beside held

@@ -11,7 +11,7 @@ import numpy as np
 
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model.model import Model, Parameters
 
 TETRAHEDRON = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Corners whose mean is zero and whose mean square along every axis is one."""

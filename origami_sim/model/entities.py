@@ -7,7 +7,7 @@ import numpy as np
 
 from origami_sim.effects import CATALOGUE, CONTACTS, get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model.model import Model, Parameters
 
 _LABEL = re.compile(r"(\w+)\.(\w+)(?:\[(.*)\])?")
 _NAMED = {"crease": "crease", "triangle": "panel", "node": "node", "panel": "panel"} | dict.fromkeys(

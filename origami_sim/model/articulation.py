@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from origami_sim.model import Model, beside, carried_sides, dihedral_angles
+from origami_sim.model.model import Model, beside, carried_sides, dihedral_angles
 
 
 @dataclass(frozen=True)

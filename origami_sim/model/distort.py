@@ -2,7 +2,7 @@
 
 from origami_sim.drive import Drive
 from origami_sim.effects import get
-from origami_sim.model import Model, Parameters
+from origami_sim.model.model import Model, Parameters
 
 
 def distorted(model: Model, parameters: Parameters, drive: Drive, duration: float) -> Drive:

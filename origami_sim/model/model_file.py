@@ -22,7 +22,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError, nearest
-from origami_sim.model import PADS, Model, Parameters
+from origami_sim.model.model import PADS, Model, Parameters
 
 _COLUMNS = {
     "position": 3, "free": 3, "bars": 2, "creases": 4, "bends": 4, "triangles": 3, "triangle_panel": 0,

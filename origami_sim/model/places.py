@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.model import Model
+from origami_sim.model.model import Model
 
 Place = tuple[str, str, tuple[int, ...]]
 """A place in words, its kind (crease, panel or body), and the entities of a family that are there."""

@@ -1,0 +1,29 @@
+"""The discrete model that everything else is about: nodes, hinges and triangles, their numbers and their state."""
+
+from origami_sim.model.model import (
+    ALIKE,
+    BODY,
+    PADS,
+    Model,
+    Parameters,
+    State,
+    beside,
+    carried_sides,
+    dihedral_angles,
+    magnets,
+    node_mass,
+)
+
+__all__ = [
+    "ALIKE",
+    "BODY",
+    "PADS",
+    "Model",
+    "Parameters",
+    "State",
+    "beside",
+    "carried_sides",
+    "dihedral_angles",
+    "magnets",
+    "node_mass",
+]
