@@ -141,7 +141,7 @@ def build(gap="2 mm", field="50 mT", layers=2):
 
 def documented_design() -> bytes:
     """The design file of the page on them, which is the module's docstring, with waves of every kind."""
-    from origami_sim import design
+    from origami_sim.design.design_file import design_file as design
 
     shown = (line[4:] for line in (design.__doc__ or "").splitlines() if line.startswith("    "))
     text = "\n".join(shown).replace('"2 A"', '{ sine = "2 A", frequency = 2 }')

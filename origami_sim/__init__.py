@@ -7,11 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from origami_sim.build import Sheet
-    from origami_sim.design import Design, read_design, write_design
+    from origami_sim.design.build import Sheet
+    from origami_sim.design.design_file import Design, read_design, write_design
+    from origami_sim.design.dielectric import Stack
+    from origami_sim.design.shell import isotropic, orthotropic
     from origami_sim.device import device_module
     from origami_sim.diagnose import Diagnosis, Subject, diagnose
-    from origami_sim.dielectric import Stack
     from origami_sim.drive import Drive, Signal, ramp, series, sine
     from origami_sim.drive.gridded import FieldTable
     from origami_sim.drive.sources import coil, coil_pair, dipole, field_table, magnet
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from origami_sim.replay import open_replay, screenshot, write_replay
     from origami_sim.results import format_table, load_run, save_run
     from origami_sim.scene import read_calibration, scene_module
-    from origami_sim.shell import isotropic, orthotropic
     from origami_sim.solve.dynamics import Trajectory, simulate
     from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
     from origami_sim.solve.sources import field_at
@@ -56,10 +56,10 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "model.bodies": "rigid",
-    "build": "Sheet",
-    "design": "Design read_design write_design",
+    "design.build": "Sheet",
+    "design.design_file": "Design read_design write_design",
     "device": "device_module",
-    "dielectric": "Stack",
+    "design.dielectric": "Stack",
     "explore": "Found Way gradient optimise solve_for sweep",
     "quantities": "si",
     "diagnose": "Diagnosis Subject diagnose",
@@ -74,7 +74,7 @@ _HOMES = {
     "replay": "open_replay screenshot write_replay",
     "results": "format_table load_run save_run",
     "scene": "read_calibration scene_module",
-    "shell": "isotropic orthotropic",
+    "design.shell": "isotropic orthotropic",
     "drive.gridded": "FieldTable",
     "drive.sources": "coil coil_pair dipole field_table magnet",
     "solve.sources": "field_at",

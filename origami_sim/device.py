@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.build import Sheet
-from origami_sim.design import Design, is_design, read_design
+from origami_sim.design.build import Sheet
+from origami_sim.design.design_file import Design, is_design, read_design
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.design import write_design
+from origami_sim.design.design_file import write_design
 from origami_sim.device import device_module, source_of
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError

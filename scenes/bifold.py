@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters

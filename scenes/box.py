@@ -5,8 +5,8 @@ python -m origami_sim.scenes.box
 
 import numpy as np
 
-from origami_sim.build import Sheet
 from origami_sim.calibrate.result import table
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters

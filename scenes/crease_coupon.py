@@ -12,7 +12,7 @@ times L as the moment (a lever of length L turns by u / L), K is the force per s
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip

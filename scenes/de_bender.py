@@ -5,7 +5,7 @@
 The strip is a chain of panels; a hinge in the middle of each of the equal parts of a segment stands for that part. The
 stack lies on the tape and, getting longer under voltage, bends the strip down, away from itself.
 
-The section of a hinge, of layers on tape, is that of `origami_sim.dielectric`.
+The section of a hinge, of layers on tape, is that of `origami_sim.design.dielectric`.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.beams import along_strip, as_beam
-from origami_sim.build import Sheet
-from origami_sim.dielectric import Stack
+from origami_sim.design.beams import along_strip, as_beam
+from origami_sim.design.build import Sheet
+from origami_sim.design.dielectric import Stack
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters

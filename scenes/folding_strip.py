@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.beams import along_strip
-from origami_sim.build import Sheet
+from origami_sim.design.beams import along_strip
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.beams import along_strip, as_beam, diagonal_share
-from origami_sim.build import Sheet
+from origami_sim.design.beams import along_strip, as_beam, diagonal_share
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip

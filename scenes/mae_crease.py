@@ -5,7 +5,7 @@ python -m origami_sim.scenes.mae_crease
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip

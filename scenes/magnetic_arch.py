@@ -22,7 +22,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, Signal, ramp, series
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, series
 from origami_sim.effects.crease_thermal import bilayer_turn
 from origami_sim.errors import InputError

@@ -9,7 +9,7 @@ from the upright vertical.
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State
 from origami_sim.observe import observe, panel_angle

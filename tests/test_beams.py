@@ -3,7 +3,7 @@
 import numpy as np
 
 from origami_sim import Drive, Sheet, State, strip
-from origami_sim.beams import as_beam, crossed
+from origami_sim.design.beams import as_beam, crossed
 from origami_sim.solve.batch import Batch
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from origami_sim import cli
-from origami_sim.build import Sheet
-from origami_sim.design import read_design, write_design
+from origami_sim.design.build import Sheet
+from origami_sim.design.design_file import read_design, write_design
 from origami_sim.device import device_module, lasting
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
-from origami_sim.dielectric import Stack
+from origami_sim.design.build import Sheet
+from origami_sim.design.dielectric import Stack
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import strip

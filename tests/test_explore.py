@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from origami_sim import cli
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.explore import Way, angle, find, gradient, moved, optimise, solve_for, sweep

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
+from origami_sim.design.ground import LANDING, SINK
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.ground import LANDING, SINK
 from origami_sim.model import State
 from origami_sim.model.clearance import gaps, heights
 from origami_sim.pattern import grid, strip

@@ -10,7 +10,7 @@ import pytest
 from origami_sim import cli, rescue
 from origami_sim.calibrate.curves import read_columns
 from origami_sim.calibrate.stated import read_text
-from origami_sim.design import is_design, read_design
+from origami_sim.design.design_file import is_design, read_design
 from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import DiskFull, InputError, unwritable
 from origami_sim.files import LARGEST_TOML, read_bytes, read_toml, write_text

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.errors import InputError
 from origami_sim.model import dihedral_angles
 from origami_sim.pattern import Pattern, grid, strip

@@ -20,11 +20,11 @@ from origami_sim import (
     strip,
     write_design,
 )
+from origami_sim.design.thick import GIVE, Edge, meeting
 from origami_sim.errors import InputError
 from origami_sim.model import State, dihedral_angles
 from origami_sim.model.articulation import Articulation
 from origami_sim.solve.rigid import Topology
-from origami_sim.thick import GIVE, Edge, meeting
 
 MM = 1e-3
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
+from origami_sim.design.touch import SQUEEZE
 from origami_sim.pattern.intersections import crossing_pairs
 from origami_sim.solve.skin import Pairs, near_pairs
-from origami_sim.touch import SQUEEZE
 
 from .elastic import Elastic
 

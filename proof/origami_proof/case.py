@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Diagnosis, Options, Subject, diagnose, factor
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Subject, factor
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State

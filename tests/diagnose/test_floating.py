@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines

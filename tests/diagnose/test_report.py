@@ -11,7 +11,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.effects import CATALOGUE
 from origami_sim.errors import InputError
 from origami_sim.infer.budget import Share

@@ -9,7 +9,7 @@ from effects.kit import hinge, hinge_positions, quiet, start
 from effects.test_suspects_mechanical import loss, moments, path, under
 from scipy.integrate import solve_ivp
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError

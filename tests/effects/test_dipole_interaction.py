@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from effects.kit import make_model, quiet, random_rotation, slope, start
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError

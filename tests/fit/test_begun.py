@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Subject, factor
 from origami_sim.drive import Drive, sine
 from origami_sim.fit.begun import within

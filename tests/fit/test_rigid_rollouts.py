@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
 from origami_sim.fit.hypothesis import Hypothesis, scaled, suspects

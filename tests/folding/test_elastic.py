@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.folding import fold
 from origami_sim.folding.elastic import Elastic, angle_gradients, bar_sections
 from origami_sim.folding.motion import model_of, trajectory_of

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
 from origami_sim.cli import main
+from origami_sim.design.build import Sheet
 from origami_sim.errors import InputError
 from origami_sim.pattern import grid, kresling, sheet
 from origami_sim.pattern.intersections import crossing_pairs, overlapping_pairs

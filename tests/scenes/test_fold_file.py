@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import miura, write_mesh

@@ -23,11 +23,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from origami_sim.design.masses import Masses, positive
+from origami_sim.design.statements import statement
 from origami_sim.effects.crease_table import KNOTS
 from origami_sim.errors import InputError
-from origami_sim.masses import Masses, positive
 from origami_sim.physics.materials import layered_rigidity, material
-from origami_sim.statements import statement
 
 REACH = 0.1
 """Curvature times the height of a stack up to which a crease table goes; beyond, it is continued straight.

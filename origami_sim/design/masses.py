@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
+from origami_sim.design.statements import Statements, statement
 from origami_sim.errors import InputError
 from origami_sim.model import BODY
 from origami_sim.model.bodies import SYMMETRIC, check_body, inertia_tensor, rectangle, second_moments, triangle
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.triangulate import Triangulation
 from origami_sim.physics.materials import G
-from origami_sim.statements import Statements, statement
 
 LEVEL = 1e-6
 """Part of a panel's size by which a mass may lie off its plane and still count as in it: rounding of stated places.

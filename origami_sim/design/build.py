@@ -5,21 +5,21 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from origami_sim.dielectric import Electrodes
+from origami_sim.design.dielectric import Electrodes
+from origami_sim.design.ground import Contact, Ground, Grounds
+from origami_sim.design.masses import Stated, positive
+from origami_sim.design.shell import Shell, assign, matrices, plates, stated
+from origami_sim.design.statements import statement
+from origami_sim.design.thick import Hinge, Thick
+from origami_sim.design.touch import Touch, refuse_overlap
 from origami_sim.effects import PAIRS
 from origami_sim.errors import InputError
-from origami_sim.ground import Contact, Ground, Grounds
-from origami_sim.masses import Stated, positive
 from origami_sim.model import ALIKE, Model, Parameters, dihedral_angles
 from origami_sim.model.bodies import rigid
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
 from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.quantities import converted
-from origami_sim.shell import Shell, assign, matrices, plates, stated
-from origami_sim.statements import statement
-from origami_sim.thick import Hinge, Thick
-from origami_sim.touch import Touch, refuse_overlap
 
 
 class Sheet(Grounds, Electrodes, Thick):

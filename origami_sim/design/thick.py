@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
+from origami_sim.design.masses import positive
+from origami_sim.design.statements import statement
+from origami_sim.design.touch import Touches
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.masses import positive
 from origami_sim.model import Model, Parameters, beside
 from origami_sim.quantities import converted
-from origami_sim.statements import statement
-from origami_sim.touch import Touches
 
 STIFF = 100.0
 """Stiffness of edges that meet, over that of their crease.

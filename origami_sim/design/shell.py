@@ -12,7 +12,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import ALIKE, Model, Parameters, curvature
 
 if TYPE_CHECKING:
-    from origami_sim.build import Sheet
+    from origami_sim.design.build import Sheet
 
 PLACES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "66": (2, 2), "16": (0, 2), "26": (1, 2)}
 """Row and column of the components of a stiffness matrix."""

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from origami_sim import pattern as patterns
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.drive import CHANNELS, Drive, Signal
 from origami_sim.drive.drive_file import as_table, called, check_known, read_drive, stated_in
 from origami_sim.drive.sources import NUMBERS, STRENGTHS

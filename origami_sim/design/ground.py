@@ -7,12 +7,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from origami_sim.design.masses import Masses, barycentric, in_plane, positive
+from origami_sim.design.statements import statement
 from origami_sim.errors import InputError
-from origami_sim.masses import Masses, barycentric, in_plane, positive
 from origami_sim.model import Model, Parameters
 from origami_sim.model.clearance import gaps, upward
 from origami_sim.physics.materials import G
-from origami_sim.statements import statement
 
 SINK = 1e-4
 """Depth to which a sheet's weight presses the whole of it into the ground, over the sheet's longest side.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from origami_sim.build import Sheet
+from origami_sim.design.build import Sheet
 from origami_sim.effects import get
 from origami_sim.model import Model, Parameters
 

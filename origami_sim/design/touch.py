@@ -5,10 +5,10 @@ from typing import Self
 
 import numpy as np
 
+from origami_sim.design.masses import Masses, positive
+from origami_sim.design.statements import statement
 from origami_sim.errors import InputError
-from origami_sim.masses import Masses, positive
 from origami_sim.model import Model, Parameters
-from origami_sim.statements import statement
 
 SQUEEZE = 0.2
 """Stiffness of a pair that touches, over modulus times thickness of its panels, which is what a corner of a panel
