@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from planar_crawler import library, walk
 
-from origami_sim.scene import Settings, read_calibration
+from origami_sim.device.scene import Settings, read_calibration
 from origami_sim.studies.crawler_maps import (
     AXES,
     MAPS,

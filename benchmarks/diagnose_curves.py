@@ -2,7 +2,7 @@
 
     python benchmarks/diagnose_curves.py [torque | relaxation | beam] ... [--json FOLDER]
 
-Needs the recordings (`origami_sim.scene.recordings_folder`). Prints verdict, candidates, places and next experiments.
+Needs the recordings (`origami_sim.device.scene.recordings_folder`). Prints verdict, candidates, places, next experiments.
 """
 
 import argparse
@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.device.scene import read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.diagnose import Diagnosis, Subject, diagnose
 from origami_sim.locate.locate_curves import sign_changes
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
-from origami_sim.scene import read_calibration, recordings_folder, scene_module, scene_settings
 
 LENGTH = 0.08
 """Gauge length of the VHB strips [m]: the lever on which force becomes moment and displacement angle."""

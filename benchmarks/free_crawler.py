@@ -14,8 +14,8 @@ import time
 
 import planar_crawler
 
-from origami_sim.gait import strides
-from origami_sim.scene import read_calibration
+from origami_sim.device.scene import read_calibration
+from origami_sim.observation.gait import strides
 from origami_sim.scenes import crawler
 from origami_sim.solve.timestep import stable_step
 

@@ -141,7 +141,7 @@ def build(gap="2 mm", field="50 mT", layers=2):
 
 def documented_design() -> bytes:
     """The design file of the page on them, which is the module's docstring, with waves of every kind."""
-    from origami_sim.design.design_file import design_file as design
+    from origami_sim.design import design_file as design
 
     shown = (line[4:] for line in (design.__doc__ or "").splitlines() if line.startswith("    "))
     text = "\n".join(shown).replace('"2 A"', '{ sine = "2 A", frequency = 2 }')
@@ -170,13 +170,13 @@ def small_run(folder: Path) -> dict[str, bytes]:
 def readers() -> dict[str, Callable[[Path], object]]:
     """What is done with the files of each kind, in their folder."""
     from origami_sim import load_run, read_pattern, read_recording
-    from origami_sim.device import device_module
+    from origami_sim.device.device import device_module
+    from origami_sim.device.scene import read_calibration, scene_module, scene_settings
     from origami_sim.diagnose.command import _earlier
     from origami_sim.drive.gridded import FieldTable
     from origami_sim.explore.sweep import _Kept
     from origami_sim.folding import read
     from origami_sim.recording.dataset import read_dataset
-    from origami_sim.scene import read_calibration, scene_module, scene_settings
 
     box = scene_module("box")
 

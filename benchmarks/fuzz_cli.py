@@ -151,8 +151,8 @@ LONG = (
     "origami_sim.studies.bifold_tables.run",
     "origami_sim.scenes.crawler.walk",
     "origami_sim.demo.run",
-    "origami_sim.replay.open_replay",
-    "origami_sim.replay.screenshot",
+    "origami_sim.view.viewer.open_replay",
+    "origami_sim.view.viewer.screenshot",
 )
 """What would take minutes or open a window."""
 

@@ -13,6 +13,7 @@ import argparse
 
 import numpy as np
 
+from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.command import read_recordings
@@ -22,7 +23,6 @@ from origami_sim.fit.least_squares import fit
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.predict.starts import local_line
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P
-from origami_sim.scene import read_calibration, scene_module
 
 SPREADS = {
     "mass_1": 0.00094, "centre_1": 0.0011, "inertia_1": 4.4e-5, "inertia_2": 1.3e-4, "viscosity_1": 1.2e-4,

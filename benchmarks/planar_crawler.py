@@ -307,7 +307,7 @@ def walk(
 
 
 def main(argv=None):
-    from origami_sim.scene import read_calibration
+    from origami_sim.device.scene import read_calibration
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calibration", default="crawler_reference")

@@ -13,10 +13,10 @@ import numpy as np
 from timing import table
 
 from origami_sim import Drive, Sheet, cross, scene_module, sine, strip
+from origami_sim.device.scene import scene_settings
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
-from origami_sim.scene import scene_settings
 from origami_sim.solve.rigid import TOLERANCE, batch_of
 from origami_sim.solve.timestep import stable_step
 

@@ -12,7 +12,7 @@ from timing import table, verdict
 _FIRST_FRAME = """
 import time
 began = time.perf_counter()
-from origami_sim.scene import read_calibration
+from origami_sim.device.scene import read_calibration
 from origami_sim.scenes import crawler
 from origami_sim.solve.dynamics import simulate
 imported = time.perf_counter()

@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from origami_sim.results import save_run
-from origami_sim.scene import scene_module, scene_settings
+from origami_sim.device.scene import scene_module, scene_settings
+from origami_sim.results.run_folder import save_run
 from origami_sim.view.export import export
 
 IMAGES = Path(__file__).with_name("images")

@@ -124,7 +124,7 @@ def _described(name: str, thing) -> list[str]:
 
 def settings() -> str:
     """What `--set` takes, by device."""
-    from origami_sim.scene import NAMES, scene_module, scene_settings
+    from origami_sim.device.scene import NAMES, scene_module, scene_settings
 
     out = ["# Settings of devices", "", "`origami-sim run NAME --set SETTING=VALUE`; every number with its source.", ""]
     for name in NAMES:

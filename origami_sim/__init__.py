@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from origami_sim.design.design_file import Design, read_design, write_design
     from origami_sim.design.dielectric import Stack
     from origami_sim.design.shell import isotropic, orthotropic
-    from origami_sim.device import device_module
+    from origami_sim.device.device import device_module
+    from origami_sim.device.scene import read_calibration, scene_module
     from origami_sim.diagnose import Diagnosis, Subject, diagnose
     from origami_sim.drive import Drive, Signal, ramp, series, sine
     from origami_sim.drive.gridded import FieldTable
@@ -43,14 +44,14 @@ if TYPE_CHECKING:
     from origami_sim.physics.materials import MATERIALS, bridge_stiffness, layered_rigidity, material
     from origami_sim.quantities import si
     from origami_sim.recording import Recording, read_recording
-    from origami_sim.replay import open_replay, screenshot, write_replay
-    from origami_sim.results import format_table, load_run, save_run
-    from origami_sim.scene import read_calibration, scene_module
+    from origami_sim.results.run_folder import format_table, load_run, save_run
     from origami_sim.solve.dynamics import Trajectory, simulate
     from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
     from origami_sim.solve.sources import field_at
     from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
     from origami_sim.solve.timestep import stable_step
+    from origami_sim.view.replay import write_replay
+    from origami_sim.view.viewer import open_replay, screenshot
 
 __version__ = "0.1.0"
 
@@ -58,7 +59,7 @@ _HOMES = {
     "model.bodies": "rigid",
     "design.build": "Sheet",
     "design.design_file": "Design read_design write_design",
-    "device": "device_module",
+    "device.device": "device_module",
     "design.dielectric": "Stack",
     "explore": "Found Way gradient optimise solve_for sweep",
     "quantities": "si",
@@ -71,9 +72,10 @@ _HOMES = {
     "pattern": "Pattern cross cut grid kresling miura sheet strip uncreased waterbomb triangulate "
     "read_fold read_mesh read_pattern read_svg write_fold write_mesh",
     "recording": "Recording read_recording",
-    "replay": "open_replay screenshot write_replay",
-    "results": "format_table load_run save_run",
-    "scene": "read_calibration scene_module",
+    "view.replay": "write_replay",
+    "view.viewer": "open_replay screenshot",
+    "results.run_folder": "format_table load_run save_run",
+    "device.scene": "read_calibration scene_module",
     "design.shell": "isotropic orthotropic",
     "drive.gridded": "FieldTable",
     "drive.sources": "coil coil_pair dipole field_table magnet",

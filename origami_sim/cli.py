@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 from origami_sim import __version__
 from origami_sim.errors import InputError
-from origami_sim.printing import print_json as _print_json
+from origami_sim.results.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
+    from origami_sim.device.scene import Outcome
     from origami_sim.recording import Recording
-    from origami_sim.scene import Outcome
     from origami_sim.solve.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
@@ -290,9 +290,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(args) -> int:
-    from origami_sim.device import device_module
-    from origami_sim.results import check_writable
-    from origami_sim.scene import scene_settings
+    from origami_sim.device.device import device_module
+    from origami_sim.device.scene import scene_settings
+    from origami_sim.results.run_folder import check_writable
 
     given = Path(args.scene)
     pattern = given.suffix.lower() in PATTERNS or (given.suffix.lower() not in (".py", ".toml", "") and given.is_file())
@@ -336,7 +336,7 @@ def _sweep(args) -> int:
 
 
 def _replay(args) -> int:
-    from origami_sim.replay import open_replay, screenshot
+    from origami_sim.view.viewer import open_replay, screenshot
 
     path = Path(args.run)
     if path.is_dir():
@@ -355,11 +355,11 @@ def _replay(args) -> int:
 
 
 def _compare(args) -> int:
-    from origami_sim.compare import plot_overlay
-    from origami_sim.device import device_module
+    from origami_sim.device.device import device_module
+    from origami_sim.device.scene import check_recorded_scene, recorded_model, scene_settings
+    from origami_sim.observation.compare import plot_overlay
     from origami_sim.recording import read_recording
-    from origami_sim.results import check_writable
-    from origami_sim.scene import check_recorded_scene, recorded_model, scene_settings
+    from origami_sim.results.run_folder import check_writable
 
     for name in ("duration", "threshold"):
         value = getattr(args, name)
@@ -433,8 +433,8 @@ def _show(args) -> int:
 
 
 def _stride(args) -> int:
-    from origami_sim.gait import strides
-    from origami_sim.scene import scene_module, scene_settings
+    from origami_sim.device.scene import scene_module, scene_settings
+    from origami_sim.observation.gait import strides
 
     stored, module = import_module("origami_sim.studies.strides"), scene_module(args.scene)
     if not hasattr(module, "walk"):
@@ -460,7 +460,7 @@ def _demo(args) -> int:
 
 def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> Path | None:
     """Saves a run and returns where: elsewhere, or nowhere, if the disk is full."""
-    from origami_sim.rescue import save_somewhere
+    from origami_sim.results.rescue import save_somewhere
 
     return save_somewhere(
         folder,
@@ -481,7 +481,7 @@ def _units(tables: dict) -> dict[str, str]:
 
 
 def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
-    from origami_sim.results import format_table
+    from origami_sim.results.run_folder import format_table
     from origami_sim.solve import accuracy
 
     motion = outcome.trajectory
@@ -547,8 +547,8 @@ def _duration(args, recording: "Recording") -> float:
 
 
 def _replicate(module, settings, recording: "Recording", start: float, duration: float, threshold: float):
-    from origami_sim.compare import compare
-    from origami_sim.observe import observe
+    from origami_sim.observation.compare import compare
+    from origami_sim.observation.observe import observe
 
     first = float(recording.times[0]) + start
     part = recording.window(first, first + duration)
@@ -557,7 +557,7 @@ def _replicate(module, settings, recording: "Recording", start: float, duration:
 
 
 def _save_comparison(folder: Path, scene: str, comparison, motion, used, part, overrides: list[str]) -> None:
-    from origami_sim.results import save_run
+    from origami_sim.results.run_folder import save_run
 
     columns = {"time_s": comparison.times}
     for c in comparison.channels.values():

@@ -19,10 +19,10 @@ from origami_sim.cli import (
     _tell,
 )  # fmt: skip
 from origami_sim.demo_page import Section, write_report
+from origami_sim.device.scene import recordings_folder, scene_module, scene_settings
 from origami_sim.recording import read_recording, stand_in_double_pendulum
 from origami_sim.recording.stand_in import write_stand_in_sidecar
-from origami_sim.results import check_writable
-from origami_sim.scene import recordings_folder, scene_module, scene_settings
+from origami_sim.results.run_folder import check_writable
 
 SCENES = ("box", "crawler", "fold_file")
 

@@ -11,9 +11,9 @@ from types import ModuleType
 import numpy as np
 from matplotlib.figure import Figure
 
-from origami_sim.compare import Comparison, plot_overlay
-from origami_sim.results import format_table
-from origami_sim.scene import Outcome
+from origami_sim.device.scene import Outcome
+from origami_sim.observation.compare import Comparison, plot_overlay
+from origami_sim.results.run_folder import format_table
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.view.export import between
 from origami_sim.view.film import Film

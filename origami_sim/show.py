@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from origami_sim.design.design_file import write_design
-from origami_sim.device import device_module, source_of
+from origami_sim.device.device import device_module, source_of
+from origami_sim.device.scene import scene_settings
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.results import format_table
-from origami_sim.scene import scene_settings
+from origami_sim.results.run_folder import format_table
 
 FLAT = 0.02
 """Height over longest side below which a device is drawn from above, and otherwise from the front, right and above.

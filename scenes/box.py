@@ -7,13 +7,13 @@ import numpy as np
 
 from origami_sim.calibrate.result import table
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, is_reference, motion_of, read_calibration
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import bridge_stiffness
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of, read_calibration
 
 CALIBRATION = "box"
 FIELDS = np.array([0.010, 0.020, 0.050, 0.100, 0.150, 0.200])

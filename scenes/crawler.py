@@ -13,13 +13,13 @@ import numpy as np
 from origami_sim.design.beams import as_beam, crossed
 from origami_sim.design.build import Sheet
 from origami_sim.design.shell import isotropic
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive, sine
-from origami_sim.gait import stride_table
 from origami_sim.model import Model, Parameters
+from origami_sim.observation.gait import stride_table
 from origami_sim.pattern import Pattern, strip
 from origami_sim.pattern import sheet as uncreased_sheet
 from origami_sim.physics.materials import layered_rigidity, material
-from origami_sim.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.solve.dynamics import Trajectory
 
 CALIBRATION = "crawler"

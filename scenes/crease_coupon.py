@@ -13,10 +13,10 @@ times L as the moment (a lever of length L turns by u / L), K is the force per s
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, motion_of
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "crease_coupon"
 

@@ -27,10 +27,10 @@ import pyarrow.parquet
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "cube_toss"
 

@@ -16,11 +16,11 @@ import numpy as np
 from origami_sim.design.beams import along_strip, as_beam
 from origami_sim.design.build import Sheet
 from origami_sim.design.dielectric import Stack
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 
 CALIBRATION = "de_bender"
 VOLTAGES = np.array([500.0, 1000.0, 2000.0, 3000.0, 4000.0])

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from origami_sim.device.scene import Outcome, Progress, Settings, is_reference, motion_of, read_calibration
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Outcome, Progress, Settings, is_reference, motion_of, read_calibration
 
 from .de_bender import Segment, chain, exponent, inclinations, settle
 

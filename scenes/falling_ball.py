@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "falling_ball"
 

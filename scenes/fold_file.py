@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import Pattern, read_pattern
 from origami_sim.pattern.mesh import FORMATS as MESHES
-from origami_sim.scene import Outcome, Progress, Settings, motion_of
 
 CALIBRATION = "fold_file"
 

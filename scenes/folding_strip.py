@@ -13,12 +13,12 @@ import numpy as np
 
 from origami_sim.design.beams import along_strip
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import bridge_stiffness
-from origami_sim.scene import Outcome, Progress, Settings, follow, is_reference, motion_of
 
 CALIBRATION = "folding_strip"
 SHARES = np.array([0.1, 0.25, 0.5, 1.0])

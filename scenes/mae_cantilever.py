@@ -17,11 +17,11 @@ import numpy as np
 
 from origami_sim.design.beams import along_strip, as_beam, diagonal_share
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, motion_of
 from origami_sim.drive import Drive, Signal, ramp, sine
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import MU0
-from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "mae_cantilever"
 SHARES = np.array([0.1, 0.2, 0.3, 0.5, 0.75, 1.0])

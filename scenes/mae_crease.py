@@ -6,10 +6,10 @@ python -m origami_sim.scenes.mae_crease
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, motion_of
 from origami_sim.drive import Drive, ramp
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern import strip
-from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 
 CALIBRATION = "mae_crease"
 

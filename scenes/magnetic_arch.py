@@ -23,12 +23,12 @@ from pathlib import Path as File
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of, recordings_folder
 from origami_sim.drive import Drive, Signal, ramp, series
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.pattern import grid, uncreased
 from origami_sim.physics.materials import MU0
-from origami_sim.scene import Outcome, Progress, Settings, motion_of, recordings_folder
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.statics import Path, continuation, equilibrium
 

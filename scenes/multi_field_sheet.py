@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, follow, motion_of
 from origami_sim.drive import Drive, series
 from origami_sim.effects.crease_thermal import bilayer_turn
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import layered_rigidity
-from origami_sim.scene import Outcome, Progress, Settings, follow, motion_of
 from origami_sim.solve.dynamics import Trajectory
 
 CALIBRATION = "multi_field_sheet"

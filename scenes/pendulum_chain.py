@@ -10,13 +10,13 @@ from the upright vertical.
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State
-from origami_sim.observe import observe, panel_angle
+from origami_sim.observation.observe import observe, panel_angle
 from origami_sim.pattern import strip
-from origami_sim.possible import Possible
 from origami_sim.recording import Recording, initial_angles
-from origami_sim.scene import Outcome, Progress, Settings, motion_of
+from origami_sim.recording.possible import Possible
 from origami_sim.solve.dynamics import Trajectory, simulate
 
 CALIBRATION = "pendulum_chain"

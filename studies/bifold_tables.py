@@ -25,11 +25,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from scipy.stats import spearmanr
 
+from origami_sim.device.scene import Settings, scene_module, scene_settings
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.physics.materials import EPS0, MU0
-from origami_sim.results import format_table
-from origami_sim.scene import Settings, scene_module, scene_settings
+from origami_sim.results.run_folder import format_table
 from origami_sim.solve.statics import equilibrium
 
 from .crawler_maps import stack

@@ -24,11 +24,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+from origami_sim.device.scene import Settings, scene_module, scene_settings
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
-from origami_sim.gait import strides
 from origami_sim.model import Model, Parameters
-from origami_sim.scene import Settings, scene_module, scene_settings
+from origami_sim.observation.gait import strides
 from origami_sim.solve.batch import default_threads
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.timestep import stable_step

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.device.scene import Settings
 from origami_sim.errors import InputError
-from origami_sim.gait import summary
-from origami_sim.scene import Settings
+from origami_sim.observation.gait import summary
 
 PAPER = 25.0
 """Stride that the seed paper reports for its crawler [mm per cycle]."""

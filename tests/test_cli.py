@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import __version__, cli, scene
+from origami_sim import __version__, cli
+from origami_sim.device import scene
+from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
 from origami_sim.recording import stand_in_double_pendulum
-from origami_sim.results import load_run
-from origami_sim.scene import read_calibration, scene_module
+from origami_sim.results.run_folder import load_run
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 
@@ -241,7 +242,7 @@ def test_what_no_quasi_static_run_can_do_is_refused(call, arguments, sentence):
 
 def test_code_1_where_the_answer_is_no(call, monkeypatch):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
-    monkeypatch.setattr("origami_sim.replay.screenshot", lambda *_, **__: False)
+    monkeypatch.setattr("origami_sim.view.viewer.screenshot", lambda *_, **__: False)
     code, out, _ = call("replay", "here", "--screenshot", "picture.png", "--json")
     assert code == 1
     assert json.loads(out) == {"picture": None}

@@ -12,14 +12,14 @@ import pytest
 from origami_sim import cli
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import read_design, write_design
-from origami_sim.device import device_module, lasting
+from origami_sim.device.device import device_module, lasting
+from origami_sim.device.scene import scene_settings
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.pattern import kresling, miura, strip, uncreased
 from origami_sim.quantities import parsed, si
 from origami_sim.recording.sidecar import Sidecar
-from origami_sim.results import load_run
-from origami_sim.scene import scene_settings
+from origami_sim.results.run_folder import load_run
 from origami_sim.solve.dynamics import simulate
 
 FLAP = '''
@@ -434,7 +434,7 @@ def test_the_age_of_a_device_is_a_channel_of_a_design(tmp_path):
 def test_a_panel_that_turns_past_half_a_turn_is_noted():
     """A heavy flap without a ground falls below its base and is pulled on from there."""
     from origami_sim import Drive, Sheet, ramp, simulate, strip
-    from origami_sim.device import outcome_of
+    from origami_sim.device.device import outcome_of
 
     sheet = Sheet(strip([0.01, 0.02], 0.02), thickness=1e-3, triangulation="center").patch(
         1, thickness=3e-3, poling=(1, 0, 0)

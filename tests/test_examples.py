@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim.device import device_module, lasting
+from origami_sim.device.device import device_module, lasting
+from origami_sim.device.scene import scene_settings
 from origami_sim.explore import angle, find, gradient, solve_for
-from origami_sim.scene import scene_settings
 from origami_sim.solve.dynamics import simulate
 
 FOLDER = Path(__file__).parents[1] / "examples"

@@ -14,11 +14,12 @@ from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.recording import Channel, Recording
-from origami_sim.replay import COLOURS, TIMELINE, open_replay, read_series, screenshot, write_replay
 from origami_sim.solve.dynamics import Trajectory
 from origami_sim.solve.timestep import TimeStep
 from origami_sim.view.film import Film
-from origami_sim.view.replay import axis_numbers
+from origami_sim.view.palette import COLOURS
+from origami_sim.view.replay import axis_numbers, write_replay
+from origami_sim.view.viewer import TIMELINE, open_replay, read_series, screenshot
 
 FRAMES, WORLDS, SIDE = 13, 2, 0.02
 FIELD, FREQUENCY = 0.06, 2.0

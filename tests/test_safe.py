@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import cli, rescue
+from origami_sim import cli
 from origami_sim.calibrate.curves import read_columns
 from origami_sim.calibrate.stated import read_text
 from origami_sim.design.design_file import is_design, read_design
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import DiskFull, InputError, unwritable
 from origami_sim.files import LARGEST_TOML, read_bytes, read_toml, write_text
@@ -18,8 +19,8 @@ from origami_sim.pattern import read_mesh, read_svg
 from origami_sim.recording import read_recording
 from origami_sim.recording.dataset import read_dataset
 from origami_sim.recording.stand_in import stand_in_double_pendulum, write_stand_in_sidecar
-from origami_sim.results import load_run
-from origami_sim.scene import scene_module, scene_settings
+from origami_sim.results import rescue
+from origami_sim.results.run_folder import load_run
 from tests.test_replay import swing
 
 SVG = (

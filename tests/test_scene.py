@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from origami_sim import scene
+from origami_sim.device import scene
+from origami_sim.device.scene import is_reference, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.errors import InputError
-from origami_sim.scene import is_reference, read_calibration, recordings_folder, scene_module, scene_settings
 
 CALIBRATIONS = Path(importlib.import_module("origami_sim.calibrations").__path__[0])
 

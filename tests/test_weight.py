@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from origami_sim import Sheet, equilibrium, strip
+from origami_sim.predict.weight import weighed
 from origami_sim.recording import Gravity
-from origami_sim.weight import weighed
 
 G = 9.80665
 

@@ -371,7 +371,7 @@ def _number(text: str, dimension: str, option: str) -> float:
 
 
 def _found(path: str) -> Path:
-    from origami_sim.scene import recordings_folder
+    from origami_sim.device.scene import recordings_folder
 
     given = Path(path)
     folder = recordings_folder()

@@ -14,7 +14,17 @@ from importlib import resources
 from pathlib import Path
 from types import ModuleType
 
-from origami_sim.device import device_module, is_device
+from origami_sim.device.device import device_module, is_device
+from origami_sim.device.scene import (
+    NAMES,
+    Settings,
+    check_recorded_scene,
+    read_calibration,
+    recorded_model,
+    scene_module,
+    scene_settings,
+    settings_of,
+)
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import attempt
@@ -27,20 +37,10 @@ from origami_sim.fit.hypothesis import Free, Subject
 from origami_sim.fit.subject import alignments, divided, numbers, split, spreads
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, Parameters
-from origami_sim.observe import check_scene
+from origami_sim.observation.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.report.page import geometry_of, write_report
 from origami_sim.report.patch import patched, write_patch
-from origami_sim.scene import (
-    NAMES,
-    Settings,
-    check_recorded_scene,
-    read_calibration,
-    recorded_model,
-    scene_module,
-    scene_settings,
-    settings_of,
-)
 from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"

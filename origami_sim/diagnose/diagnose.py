@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import orth
 from threadpoolctl import threadpool_limits
 
+from origami_sim.device.scene import scene_module
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
@@ -39,10 +40,9 @@ from origami_sim.locate.impulses import impulses
 from origami_sim.locate.onset import onset
 from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located
-from origami_sim.possible import Possible
 from origami_sim.predict.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
-from origami_sim.scene import scene_module
+from origami_sim.recording.possible import Possible
 from origami_sim.threads import in_step, leads, shared
 
 

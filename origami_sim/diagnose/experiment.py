@@ -26,7 +26,7 @@ from origami_sim.fit.weights import Weights
 from origami_sim.infer.diagnosis import Experiment
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.verdict import widened
-from origami_sim.possible import Possible
+from origami_sim.recording.possible import Possible
 
 LEADING, LEAST = 5, 0.01
 """Explanations that are looked at, and the probability of the least of them; with more, what is told of the leaders

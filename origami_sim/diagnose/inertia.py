@@ -14,10 +14,10 @@ from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.channels import stacked
 from origami_sim.predict.drives import drive_of
+from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics import equilibrium
-from origami_sim.weight import weighed
 
 INSTANTS = 5
 """Instants of a recording at which the model's lowest frequency is asked: its start, its end, and a few between."""

@@ -10,9 +10,9 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block, Predictor
 from origami_sim.model import Parameters
-from origami_sim.possible import UPSIDE_DOWN, Possible
 from origami_sim.predict.curves import Curves
 from origami_sim.predict.rollouts import Rollouts
+from origami_sim.recording.possible import UPSIDE_DOWN, Possible
 
 LENGTH = 8
 """A proposed experiment is simulated in four stretches of this part of a recording."""

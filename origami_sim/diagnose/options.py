@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from origami_sim.errors import InputError
-from origami_sim.possible import Possible
+from origami_sim.recording.possible import Possible
 
 
 @dataclass(frozen=True)

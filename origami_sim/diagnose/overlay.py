@@ -17,7 +17,7 @@ from origami_sim.model import Model, dihedral_angles
 from origami_sim.predict.channels import stacked
 from origami_sim.predict.starts import channel_tangent
 from origami_sim.recording import Channel
-from origami_sim.replay import Overlay, write_overlay
+from origami_sim.view.overlay import Overlay, write_overlay
 
 FRAMES, RATE = 600, 60.0
 """A replay has at most so many frames, and at most so many per second."""

@@ -9,14 +9,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from origami_sim.device import device_module, lasting
+from origami_sim.device.device import device_module, lasting
+from origami_sim.device.scene import Setting, Settings, scene_settings
 from origami_sim.errors import InputError, nearest
 from origami_sim.explore.found import Device, Found, Measure, Way, at
 from origami_sim.explore.sweep import MOST, ROWS, Sweep, sweep
-from origami_sim.printing import print_json
 from origami_sim.quantities import parsed
-from origami_sim.results import check_writable, format_table
-from origami_sim.scene import Setting, Settings, scene_settings
+from origami_sim.results.printing import print_json
+from origami_sim.results.run_folder import check_writable, format_table
 
 NAMED = 8
 """Up to so many creases have a column each; half hides some of a gripper's, double makes tables wider than a page."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from origami_sim.device import built, lasting, valued
+from origami_sim.device.device import built, lasting, valued
 from origami_sim.drive import Drive, Signal
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from origami_sim.device import lasting
+from origami_sim.device.device import lasting
 from origami_sim.errors import InputError
 from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, found
 from origami_sim.model import State

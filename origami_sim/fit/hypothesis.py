@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from origami_sim.device.scene import Settings
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.effects._effect import Effect
@@ -14,7 +15,6 @@ from origami_sim.model.bodies import rigid
 from origami_sim.model.entities import tune
 from origami_sim.model.places import across, points, stretches
 from origami_sim.recording import Recording
-from origami_sim.scene import Settings
 
 NOMINAL = ""
 """Owner of the numbers of the model that was given, as opposed to those of an effect that is suspected."""

@@ -7,13 +7,13 @@ from types import ModuleType
 
 import numpy as np
 
+from origami_sim.device.scene import Setting, Settings, _parse, scene_module, scene_settings
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
-from origami_sim.scene import Setting, Settings, _parse, scene_module, scene_settings
 
 Source = (
     Subject

@@ -4,10 +4,10 @@ import json
 import math
 from pathlib import Path
 
+from origami_sim.device.scene import Settings
 from origami_sim.errors import InputError
 from origami_sim.pattern.mesh import FORMATS as MESHES
-from origami_sim.results import check_writable, format_table, save_run
-from origami_sim.scene import Settings
+from origami_sim.results.run_folder import check_writable, format_table, save_run
 
 from .elastic import BEND
 from .fold import Folding, fold

@@ -4,7 +4,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.model import Model, dihedral_angles
-from origami_sim.observe import _index, body_axes, body_point
+from origami_sim.observation.observe import _index, body_axes, body_point
 from origami_sim.recording import Camera, Channel, Recording
 
 

@@ -22,7 +22,7 @@ from origami_sim.fit.hypothesis import (
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
-from origami_sim.observe import Poses, read_channel
+from origami_sim.observation.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous

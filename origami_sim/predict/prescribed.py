@@ -10,7 +10,7 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.distort import distorted
-from origami_sim.observe import _index
+from origami_sim.observation.observe import _index
 from origami_sim.predict.curves import HOLD, PIECES, Balance, Curves, Static
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch

@@ -15,8 +15,8 @@ from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.model import Model, Parameters
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.channels import component_names
+from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
-from origami_sim.weight import weighed
 
 if TYPE_CHECKING:
     from origami_sim.predict.cache import Cache

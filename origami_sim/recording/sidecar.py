@@ -103,9 +103,9 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
-from origami_sim.possible import Possible
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.placed import columns_of
+from origami_sim.recording.possible import Possible
 from origami_sim.recording.recording import CHANNEL_KINDS
 from origami_sim.recording.section import ATTACHMENT_KEYS, Section
 from origami_sim.recording.stated import MOTIONS, Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from origami_sim.device.scene import Settings
 from origami_sim.effects import CATALOGUE, Parameter, get
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
@@ -29,7 +30,6 @@ from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.infer.diagnosis import Candidate, Diagnosis
 from origami_sim.model import BODY, Model, Parameters
 from origami_sim.model.entities import OWNERS, WAYS, located
-from origami_sim.scene import Settings
 
 _WORDS = ("site", "source", "at")
 _SWITCHES = ("more", "times")

@@ -21,9 +21,9 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
-from origami_sim.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.dynamics import Failure, Trajectory
+from origami_sim.solve.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
 from origami_sim.solve.settling import Settling, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
 

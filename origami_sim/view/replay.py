@@ -483,7 +483,9 @@ def _write_recording(recording: Recording, scene: Film, out: Writer):
 
 def _simulated(recording: Recording, scene: Film, out: Writer) -> dict[str, np.ndarray]:
     """What the recording's channels read in the simulation; nothing, with a note, where that cannot be told."""
-    from origami_sim.observe import observe  # it needs the solvers, which a replay without a recording does not
+    from origami_sim.observation.observe import (
+        observe,  # it needs the solvers, which a replay without a recording does not
+    )
 
     try:
         return observe(scene.trajectory, recording, world=scene.world)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Diagnosis, Options, Subject, diagnose, factor
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.overlay import write_overlays
@@ -22,7 +23,6 @@ from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import MU0
 from origami_sim.recording import read_recording
 from origami_sim.report.page import geometry_of, write_report
-from origami_sim.scene import scene_module, scene_settings
 
 RIGIDITY = 2e5
 """Stiffness of each bar that keeps a panel's shape, over the device's weight [1/m]: panels stretch by some 0.003 mm."""

@@ -8,11 +8,11 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from origami_proof import STRUCTURES, battery, case
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.fit.hypothesis import Hypothesis
-from origami_sim.observe import follow, observe_equilibria
+from origami_sim.observation.observe import follow, observe_equilibria
 from origami_sim.predict.prescribed import curves
 from origami_sim.recording import read_recording
-from origami_sim.scene import scene_module, scene_settings
 
 pytest.importorskip("mujoco", reason="the truth of the proof needs MuJoCo: pip install -e proof")
 

@@ -9,9 +9,9 @@ from origami_sim.calibrate import command
 from origami_sim.calibrate.deflection import elastica
 from origami_sim.calibrate.experiment import calibration, fit_deflection, plot_fit, summary
 from origami_sim.calibrate.result import read_result, write_calibration
+from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.errors import InputError
 from origami_sim.physics.materials import MU0
-from origami_sim.scene import read_calibration, recordings_folder
 from origami_sim.scenes import mae_cantilever
 
 LENGTH, THICKNESS, REMANENCE, MODULUS = 0.0172, 0.00084, 0.143, 909e3

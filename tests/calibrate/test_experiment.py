@@ -27,8 +27,8 @@ from origami_sim.calibrate.experiment import (
     table_basis,
 )
 from origami_sim.calibrate.result import read_result, write_calibration
+from origami_sim.device.scene import recordings_folder
 from origami_sim.errors import InputError
-from origami_sim.scene import recordings_folder
 
 ANGLES = np.linspace(-1.2, 1.6, 60)
 

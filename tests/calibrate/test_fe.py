@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from origami_sim.calibrate.result import read_result, write_calibration
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
 
 pytest.importorskip("skfem", reason="scikit-fem is not installed (the [fe] extra)")
 

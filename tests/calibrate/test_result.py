@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from origami_sim.calibrate.result import Calibration, Quantity, read_result, significant, table, write_calibration
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
 
 RESULT = Calibration(
     "A crease, for the test",

@@ -8,8 +8,8 @@ from calibrate.test_experiment import run
 from origami_sim.calibrate import command
 from origami_sim.calibrate.result import read_result, write_calibration
 from origami_sim.calibrate.stated import Wanted, find, stated
+from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration, recordings_folder
 
 TEXT = """Introduction. A strip of tape, 1.9
 cm wide, was cut; its modulus is 1.6 GPa.\fThe layers are 272.8 µm thick, the field -2 kG to 2 kG.

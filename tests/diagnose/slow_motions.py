@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.physics.materials import MU0
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
-from origami_sim.scene import scene_module, scene_settings
 
 FLAP = scene_module("mae_crease")
 SETTINGS = scene_settings(FLAP)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from origami_sim import cli
-from origami_sim.scene import scene_module, scene_settings
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 
 FRICTION, NOISE = 1.0e-3, 5e-4

@@ -11,6 +11,7 @@ import pytest
 from diagnose.swings import FRICTION, NOISE, QUICK, SIDECAR, WAVE, T, main, recorded_drive, single, swing, table
 
 import origami_sim
+from origami_sim.device.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
 from origami_sim.diagnose.observed import assumed
 from origami_sim.drive import Drive, sine
@@ -20,12 +21,11 @@ from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.subject import spreads
 from origami_sim.predict import cache
 from origami_sim.recording import read_recording
-from origami_sim.replay import read_series
 from origami_sim.report.page import read_report
 from origami_sim.report.patch import Addition, additions, switched_on, write_patch
-from origami_sim.results import load_run
-from origami_sim.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
+from origami_sim.results.run_folder import load_run
 from origami_sim.solve.dynamics import simulate
+from origami_sim.view.viewer import read_series
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
     from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
-    from origami_sim.observe import panel_angle
+    from origami_sim.observation.observe import panel_angle
     from origami_sim.predict.bars import BarRollouts
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from origami_sim.device.scene import read_calibration, scene_module, scene_settings
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.screen import screen
 from origami_sim.locate.locate_curves import sign_changes
-from origami_sim.observe import follow, observe_equilibria
+from origami_sim.observation.observe import follow, observe_equilibria
 from origami_sim.physics.materials import MU0
 from origami_sim.predict.curves import Static, clocked
 from origami_sim.predict.prescribed import Prescribed, curves
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
-from origami_sim.scene import read_calibration, scene_module, scene_settings
 
 COUPON = scene_module("crease_coupon")
 SETTINGS = scene_settings(COUPON).replace(stiffness=2e-3, rest_angle=0.3)

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines
@@ -25,7 +26,6 @@ from origami_sim.predict.drives import drive_of
 from origami_sim.predict.track import placed, track
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import crawler, cube_toss
 from origami_sim.solve.dynamics import simulate
 

@@ -11,11 +11,11 @@ import pytest
 from diagnose.swings import QUICK, main, swing
 from diagnose.test_report import example
 
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, command
 from origami_sim.diagnose.later import Part, add
 from origami_sim.errors import InputError
 from origami_sim.infer import diagnosis
-from origami_sim.scene import scene_module, scene_settings
 
 
 @pytest.fixture(scope="module")

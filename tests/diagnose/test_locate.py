@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
@@ -17,7 +18,6 @@ from origami_sim.locate.locate import locate, motions_of, phase, reversals, sinc
 from origami_sim.locate.partial import partials
 from origami_sim.model import dihedral_angles
 from origami_sim.model.articulation import Articulation
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import box
 from tests.diagnose.strips import hanging, record, subject
 

@@ -13,7 +13,7 @@ from origami_sim.fit.hypothesis import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
-from origami_sim.observe import observe
+from origami_sim.observation.observe import observe
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, subject

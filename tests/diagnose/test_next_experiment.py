@@ -13,8 +13,8 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
 from origami_sim.fit.least_squares import fit
 from origami_sim.infer.nominal import nominal_fits
-from origami_sim.possible import Possible
 from origami_sim.predict.rigid import RigidRollouts
+from origami_sim.recording.possible import Possible
 from origami_sim.recording.sidecar import Sidecar
 from tests.diagnose.strips import record, subject
 
@@ -158,8 +158,8 @@ def test_a_sidecar_states_what_is_possible(tmp_path, line, said):
 
 
 def test_a_scene_states_what_its_set_up_can_do():
+    from origami_sim.device.scene import scene_module, scene_settings
     from origami_sim.diagnose.diagnose import possible_of
-    from origami_sim.scene import scene_module, scene_settings
 
     module = scene_module("pendulum_chain")
     for source in ("pendulum_chain", module, (module, scene_settings(module))):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.diagnose.observed import channel_tangents, check_recording, unobserved
 from origami_sim.errors import InputError
@@ -13,7 +14,6 @@ from origami_sim.predict.curves import Static
 from origami_sim.predict.prescribed import curves
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
-from origami_sim.scene import scene_module, scene_settings
 from tests.diagnose.strips import hanging, record
 
 MODEL, PARAMETERS = hanging(4)

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import read_calibration, scene_module, scene_settings
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, apply, suspects
 from origami_sim.infer.words import say
 from origami_sim.model.entities import located
 from origami_sim.report.patch import additions, read_additions, switched_on, write_patch
-from origami_sim.scene import read_calibration, scene_module, scene_settings
 from tests.diagnose.strips import hanging, record
 
 VISCOSITY = ("crease_viscosity", "viscosity")

@@ -11,7 +11,7 @@ from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
-from origami_sim.observe import body_point, observe
+from origami_sim.observation.observe import body_point, observe
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.dynamics import simulate

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import read_calibration, scene_module, scene_settings
 from origami_sim.diagnose import diagnose, subject_of
 from origami_sim.errors import InputError
 from origami_sim.report.patch import additions, read_additions, switched_on
-from origami_sim.scene import read_calibration, scene_module, scene_settings
 from tests.diagnose.strips import hanging, record
 
 STIFFNESS, REST = ("crease", "stiffness"), ("crease", "rest_angle")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, suspects
@@ -14,7 +15,6 @@ from origami_sim.fit.weights import Weights
 from origami_sim.model import State
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Channel, Recording, read_recording
-from origami_sim.scene import read_calibration, recordings_folder
 from origami_sim.scenes import cube_toss, falling_ball
 from origami_sim.solve.dynamics import simulate
 

@@ -5,13 +5,13 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import scene_settings
 from origami_sim.effects import CATALOGUE
 from origami_sim.fit.hypothesis import Hypothesis, along_each_axis, apply, suspects, told_apart
 from origami_sim.model import node_mass
 from origami_sim.model.bodies import rigid
 from origami_sim.model.places import across, along, points, stretches
 from origami_sim.recording import Channel, Recording
-from origami_sim.scene import scene_settings
 
 UNEVEN = {"crease_softness", "panel_softness", "remanence_error"}
 

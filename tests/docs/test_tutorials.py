@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from origami_sim.effects import Effect
-from origami_sim.results import load_run
+from origami_sim.results.run_folder import load_run
 
 ROOT = Path(__file__).parents[2]
 

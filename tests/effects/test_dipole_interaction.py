@@ -5,6 +5,7 @@ import pytest
 from effects.kit import make_model, quiet, random_rotation, slope, start
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
@@ -14,7 +15,6 @@ from origami_sim.pattern import strip
 from origami_sim.physics.materials import MU0
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
-from origami_sim.scene import read_calibration, scene_module
 from origami_sim.solve.batch import forces
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import tangent

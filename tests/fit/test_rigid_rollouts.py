@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
 from origami_sim.fit.hypothesis import Hypothesis, scaled, suspects
@@ -22,7 +23,6 @@ from origami_sim.predict import cache, rollouts
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
-from origami_sim.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 

@@ -12,12 +12,12 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.fit.hypothesis import Hypothesis, suspects
 from origami_sim.model import Parameters
-from origami_sim.possible import Possible
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.drives import refined, shifted
 from origami_sim.predict.measured import lateness
 from origami_sim.predict.starts import local_line, seen_first
 from origami_sim.recording import Recording
+from origami_sim.recording.possible import Possible
 from origami_sim.recording.recording import DriveChannel
 from tests.diagnose.strips import hanging, record, subject
 

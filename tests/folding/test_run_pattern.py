@@ -9,7 +9,7 @@ from drawings import drawn, frame
 
 from origami_sim import cli
 from origami_sim.pattern import grid, miura, strip, triangulate, waterbomb, write_fold, write_mesh
-from origami_sim.results import load_run
+from origami_sim.results.run_folder import load_run
 
 DEGREES = np.pi / 180
 

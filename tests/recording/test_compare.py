@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from origami_sim.compare import PARTING_WINDOW, compare, first_parting, plot_overlay
 from origami_sim.errors import InputError
+from origami_sim.observation.compare import PARTING_WINDOW, compare, first_parting, plot_overlay
 from origami_sim.recording import Channel, Recording
 
 NOISE = 1e-4

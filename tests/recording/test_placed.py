@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from origami_sim import Drive, Sheet, magnet, series, simulate, strip
-from origami_sim.device import device_module
+from origami_sim.device.device import device_module
+from origami_sim.device.scene import scene_settings
 from origami_sim.errors import InputError
 from origami_sim.predict.drives import drive_of
 from origami_sim.recording import applied_drive, read_recording
 from origami_sim.recording.dataset import _equal_drives
-from origami_sim.scene import scene_settings
 from origami_sim.solve.sources import field_at
 
 SIDECAR = """

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from origami_sim.compare import compare
 from origami_sim.errors import InputError
+from origami_sim.observation.compare import compare
 from origami_sim.recording import (
     Channel,
     Recording,

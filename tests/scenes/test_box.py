@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import follow, read_calibration
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
-from origami_sim.scene import follow, read_calibration
 from origami_sim.scenes import box
 from origami_sim.solve.dynamics import simulate
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive, sine
-from origami_sim.gait import strides
 from origami_sim.model.clearance import gaps
+from origami_sim.observation.gait import strides
 from origami_sim.physics.materials import layered_rigidity, material
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import crawler
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import equilibrium, tangent

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad, solve_bvp
 from scipy.optimize import fsolve
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import de_bender as bender
 from origami_sim.solve.dynamics import simulate
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import de_fold as fold
 from origami_sim.solve.dynamics import simulate
 

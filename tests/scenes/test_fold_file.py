@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import miura, write_mesh
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import fold_file
 from origami_sim.solve.statics import equilibrium
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import folding_strip as strip
 from origami_sim.solve.dynamics import simulate
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad, solve_bvp
 from scipy.optimize import brentq
 
-from origami_sim.scene import read_calibration, recordings_folder
+from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.scenes import mae_cantilever as cantilever
 from origami_sim.solve.dynamics import simulate
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.model import State
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import mae_crease
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import equilibrium

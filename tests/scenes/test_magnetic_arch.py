@@ -6,10 +6,10 @@ from scipy.optimize import brentq, least_squares, minimize_scalar
 from scipy.signal import argrelextrema
 
 from origami_sim.cli import main
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.results import load_run
-from origami_sim.scene import read_calibration
+from origami_sim.results.run_folder import load_run
 from origami_sim.scenes import magnetic_arch as arch
 from origami_sim.solve.dynamics import simulate
 from origami_sim.solve.statics import equilibrium

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.physics.materials import EPS0, MU0
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import multi_field_sheet as sheet
 
 
@@ -139,7 +139,7 @@ def test_cold_mirrors_the_roll_and_a_reversed_voltage_changes_nothing(settings, 
     cold, notes = sheet.settle(settings.replace(temperature=-60.0), "thermal")
     assert not notes
     np.testing.assert_allclose(cold["on"].along_y, -shapes["thermal"]["on"].along_y, rtol=1e-6)
-    from origami_sim.scene import follow
+    from origami_sim.device.scene import follow
 
     model, parameters, _ = sheet.build(settings)
     drives = [sheet.steady(settings, "electric", sign) for sign in (1.0, -1.0)]

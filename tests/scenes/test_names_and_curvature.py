@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from origami_sim import Drive, equilibrium
-from origami_sim.scene import NAMES, scene_module, scene_settings
+from origami_sim.device.scene import NAMES, scene_module, scene_settings
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from origami_sim.compare import compare
+from origami_sim.device.scene import Settings, read_calibration, recordings_folder, scene_settings
 from origami_sim.errors import InputError
-from origami_sim.observe import observe
+from origami_sim.observation.compare import compare
+from origami_sim.observation.observe import observe
 from origami_sim.recording import read_recording, simulate_double_pendulum
 from origami_sim.recording.rigid_pendulum import DoublePendulum
-from origami_sim.scene import Settings, read_calibration, recordings_folder, scene_settings
 from origami_sim.scenes import pendulum_chain
 
 

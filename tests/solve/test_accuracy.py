@@ -8,7 +8,7 @@ import pytest
 from solve.structures import model_of
 
 from origami_sim import Drive, Sheet, rigid, simulate, strip
-from origami_sim.device import device_module
+from origami_sim.device.device import device_module
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, State
 from origami_sim.solve.accuracy import HALVINGS, SLIGHT, SOUND, exchanges, extent, refined, sentence

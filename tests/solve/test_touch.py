@@ -16,7 +16,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import State, node_mass
 from origami_sim.model.bodies import rigid
 from origami_sim.physics.materials import G
-from origami_sim.results import load_run, save_run
+from origami_sim.results.run_folder import load_run, save_run
 from origami_sim.solve.batch import Batch
 
 MM = 1e-3

@@ -7,8 +7,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from origami_sim import cli
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
-from origami_sim.scene import read_calibration
 from origami_sim.scenes import bifold
 from origami_sim.solve.statics import equilibrium
 from origami_sim.studies import bifold_tables as ps

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
-from origami_sim.gait import summary
-from origami_sim.scene import read_calibration
+from origami_sim.observation.gait import summary
 from origami_sim.studies.crawler_maps import (
     AXES,
     Result,

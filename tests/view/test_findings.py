@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from origami_sim import miura
-from origami_sim.compare import compare
 from origami_sim.explore.sweep import Sweep
 from origami_sim.folding import fold
+from origami_sim.observation.compare import compare
 from origami_sim.recording import read_recording, stand_in_double_pendulum
 from origami_sim.recording.stand_in import write_stand_in_sidecar
 

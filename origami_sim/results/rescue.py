@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from origami_sim.errors import DiskFull
-from origami_sim.results import save_run
+from origami_sim.results.run_folder import save_run
 from origami_sim.solve.dynamics import Trajectory
 
 

@@ -488,5 +488,5 @@ def extended(build: Callable) -> Callable:
 def recordings_folder() -> Path | None:
     """Folder of real recordings: $ORIGAMI_RECORDINGS, or shared/recordings beside the checkout; None if absent."""
     given = os.environ.get("ORIGAMI_RECORDINGS")
-    candidates = [Path(given)] if given else [p / "shared" / "recordings" for p in Path(__file__).resolve().parents[:3]]
+    candidates = [Path(given)] if given else [p / "shared" / "recordings" for p in Path(__file__).resolve().parents[:4]]
     return next((p for p in candidates if p.is_dir()), None)

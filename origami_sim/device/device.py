@@ -26,13 +26,7 @@ import numpy as np
 
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import Design, is_design, read_design
-from origami_sim.drive import Drive
-from origami_sim.errors import InputError, nearest
-from origami_sim.model import Model, Parameters
-from origami_sim.quantities import ANY, Quantity, converted, parsed
-from origami_sim.recording import Recording, applied_drive
-from origami_sim.recording.placed import surrounded
-from origami_sim.scene import (
+from origami_sim.device.scene import (
     NAMES,
     Outcome,
     Progress,
@@ -43,6 +37,12 @@ from origami_sim.scene import (
     read_calibration,
     scene_module,
 )
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError, nearest
+from origami_sim.model import Model, Parameters
+from origami_sim.quantities import ANY, Quantity, converted, parsed
+from origami_sim.recording import Recording, applied_drive
+from origami_sim.recording.placed import surrounded
 from origami_sim.solve.dynamics import Trajectory
 
 SETTLE = 1.0

@@ -1,0 +1,1 @@
+"""Devices as files: scenes with their calibrations, and Python or design files of one's own."""

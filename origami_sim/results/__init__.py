@@ -1,0 +1,1 @@
+"""Run folders: what is kept of a run, also where the disk is full, and what is printed for machines."""
