@@ -2,7 +2,7 @@
 
     python benchmarks/diagnose_curves.py [torque | relaxation | beam] ... [--json FOLDER]
 
-Needs the recordings (`origami_sim.device.scene.recordings_folder`). Prints verdict, candidates, places, next experiments.
+Needs recordings (`origami_sim.device.scene.recordings_folder`). Prints verdict, candidates, places, next experiments.
 """
 
 import argparse

@@ -150,7 +150,7 @@ LONG = (
     "origami_sim.studies.crawler_maps.run",
     "origami_sim.studies.bifold_tables.run",
     "origami_sim.scenes.crawler.walk",
-    "origami_sim.demo.run",
+    "origami_sim.commands.demo.run",
     "origami_sim.view.viewer.open_replay",
     "origami_sim.view.viewer.screenshot",
 )
@@ -220,7 +220,7 @@ def spoilt(words: list[str], draw: random.Random) -> list[str]:
 
 def ended(words: list[str], here: Path) -> tuple[str, str]:
     """How a command ended, and what is wrong with that."""
-    from origami_sim.cli import main
+    from origami_sim.commands.cli import main
 
     before, out, err = digests(here), io.StringIO(), io.StringIO()
     code: object = None

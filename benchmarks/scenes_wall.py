@@ -11,7 +11,7 @@ from timing import table, verdict
 def _wall(*arguments: str) -> tuple[float, int]:
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", "origami_sim.cli", *arguments, "--out", f"{folder}/run"],
+        done = subprocess.run([sys.executable, "-m", "origami_sim.commands.cli", *arguments, "--out", f"{folder}/run"],
                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         return time.perf_counter() - began, done.returncode
 

@@ -69,7 +69,7 @@ def effects() -> str:
 
 def command_line() -> str:
     """Every command with its help."""
-    from origami_sim import cli
+    from origami_sim.commands import cli
 
     parser = cli._parser()
     out = ["# Command line", "", (cli.__doc__ or "").strip(), ""]

@@ -282,6 +282,6 @@ if __name__ == "__main__":
         found = float(sys.argv[4]) if len(sys.argv) == 5 else 0.0
         print("\n".join(map(str, convert(sys.argv[1], sys.argv[2], (*sys.argv[3:4], "flight")[0], scale=found))))
     else:
-        from origami_sim.cli import main
+        from origami_sim.commands.cli import main
 
         main(["run", "cube_toss"])

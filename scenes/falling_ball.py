@@ -212,6 +212,6 @@ if __name__ == "__main__":
     if len(sys.argv) == 3:
         print("\n".join(map(str, convert(*sys.argv[1:]))))
     else:
-        from origami_sim.cli import main
+        from origami_sim.commands.cli import main
 
         main(["run", "falling_ball"])

@@ -84,6 +84,6 @@ def run(s: Settings, progress: Progress | None = None) -> Outcome:
 
 
 if __name__ == "__main__":
-    from origami_sim.cli import main
+    from origami_sim.commands.cli import main
 
     main(["run", "fold_file"])

@@ -468,6 +468,6 @@ def draw(s: Settings, outcome: Outcome, folder: str | File) -> File:
 
 
 if __name__ == "__main__":
-    from origami_sim.cli import main
+    from origami_sim.commands.cli import main
 
     main(["run", "magnetic_arch"])

@@ -88,8 +88,8 @@ HEAVY = ("warp", "numpy", "scipy", "rerun", "matplotlib", "pyarrow", "trimesh")
     "code",
     [
         "import origami_sim",
-        "import origami_sim.cli\ntry: origami_sim.cli.main(['--help'])\nexcept SystemExit: pass",
-        "import origami_sim.cli\ntry: origami_sim.cli.main(['run', '--help'])\nexcept SystemExit: pass",
+        "from origami_sim.commands import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass",
+        "from origami_sim.commands import cli\ntry: cli.main(['run', '--help'])\nexcept SystemExit: pass",
     ],
     ids=["import", "help", "help of run"],
 )

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import __version__, cli
+from origami_sim import __version__
+from origami_sim.commands import cli
 from origami_sim.device import scene
 from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.drive import Drive, series
@@ -263,7 +264,7 @@ def test_code_3_names_world_time_place_and_cause(call, tmp_path):
 def test_code_130_and_earlier_results_untouched_after_an_interrupt(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     before = contents(tmp_path)
-    watch = "import origami_sim.cli as c\nc._Bar.__call__ = lambda self, f: print(f, flush=True)\nc.main()"
+    watch = "import origami_sim.commands.cli as c\nc._Bar.__call__ = lambda self, f: print(f, flush=True)\nc.main()"
     arguments = ["run", "fold_file", "--out", "here", "--set", "fold_time=100"]
     process = subprocess.Popen(
         [sys.executable, "-c", watch, *arguments],
@@ -291,14 +292,14 @@ def test_a_disk_that_is_full_is_one_sentence(call, monkeypatch, tmp_path):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "runs" / "positions.npy"))
 
-    monkeypatch.setattr("origami_sim.cli._save", full)
+    monkeypatch.setattr("origami_sim.commands.cli._save", full)
     code, _, err = call("run", "fold_file", *QUICK)
     assert (code, err) == (2, f"origami-sim: {tmp_path}/runs/positions.npy: No space left on device.\n")
 
 
 def test_a_reader_that_leaves_is_no_error(tmp_path):
     code = subprocess.run(
-        f"set -o pipefail; {sys.executable} -m origami_sim.cli effects | head -1",
+        f"set -o pipefail; {sys.executable} -m origami_sim.commands.cli effects | head -1",
         shell=True, executable="/bin/bash", cwd=tmp_path, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert code.returncode == 0

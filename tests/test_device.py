@@ -9,7 +9,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from origami_sim import cli
+from origami_sim.commands import cli
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import read_design, write_design
 from origami_sim.device.device import device_module, lasting

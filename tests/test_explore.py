@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from origami_sim import cli
+from origami_sim.commands import cli
 from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError

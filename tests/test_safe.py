@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import cli
 from origami_sim.calibrate.curves import read_columns
 from origami_sim.calibrate.stated import read_text
+from origami_sim.commands import cli
 from origami_sim.design.design_file import is_design, read_design
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.drive.gridded import FieldTable

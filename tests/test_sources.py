@@ -28,7 +28,7 @@ from origami_sim import (
     strip,
     write_design,
 )
-from origami_sim.cli import main
+from origami_sim.commands.cli import main
 from origami_sim.physics.materials import MU0, demagnetising_factors
 from origami_sim.solve.batch import Batch
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from origami_sim import cli
+from origami_sim.commands import cli
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.solve.dynamics import simulate
 

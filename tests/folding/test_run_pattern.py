@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drawings import drawn, frame
 
-from origami_sim import cli
+from origami_sim.commands import cli
 from origami_sim.pattern import grid, miura, strip, triangulate, waterbomb, write_fold, write_mesh
 from origami_sim.results.run_folder import load_run
 

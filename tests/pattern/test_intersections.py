@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from origami_sim.cli import main
+from origami_sim.commands.cli import main
 from origami_sim.design.build import Sheet
 from origami_sim.errors import InputError
 from origami_sim.pattern import grid, kresling, sheet

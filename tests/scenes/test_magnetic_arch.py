@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq, least_squares, minimize_scalar
 from scipy.signal import argrelextrema
 
-from origami_sim.cli import main
+from origami_sim.commands.cli import main
 from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError

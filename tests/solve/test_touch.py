@@ -11,7 +11,7 @@ from effects.kit import random_rotation
 
 from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
-from origami_sim.cli import main
+from origami_sim.commands.cli import main
 from origami_sim.errors import InputError
 from origami_sim.model import State, node_mass
 from origami_sim.model.bodies import rigid

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from origami_sim import cli
+from origami_sim.commands import cli
 from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.scenes import bifold

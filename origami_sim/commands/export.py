@@ -27,7 +27,7 @@ def register(parser: argparse.ArgumentParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
-    from origami_sim.cli import OK, _Bar, _print_json
+    from origami_sim.commands.cli import OK, _Bar, _print_json
     from origami_sim.results.run_folder import load_run
     from origami_sim.view.export import export as write
 

@@ -120,9 +120,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--screenshot", metavar="PNG", help="write a picture instead of opening the viewer")
     p.add_argument("--time", type=float, help="simulated time of the picture [s] (default: most folded)")
 
-    from origami_sim.view import command as view
+    from origami_sim.commands import export
 
-    view.register(command("export", view.export, view.SUMMARY, view.EXAMPLE))
+    export.register(command("export", export.export, export.SUMMARY, export.EXAMPLE))
 
     p = command(
         "compare",
@@ -418,14 +418,14 @@ def _study(args) -> int:
 
 
 def _effects(args) -> int:
-    from origami_sim import catalogue
+    from origami_sim.commands import catalogue
 
     _print_json(catalogue.entries(args.name)) if args.json else print(catalogue.text(args.name))
     return OK
 
 
 def _show(args) -> int:
-    from origami_sim import show
+    from origami_sim.commands import show
 
     found = show.run(args)
     _print_json(found) if args.json else print(show.text(found))
@@ -450,7 +450,7 @@ def _stride(args) -> int:
 
 
 def _demo(args) -> int:
-    from origami_sim import demo
+    from origami_sim.commands import demo
 
     return demo.run(args)
 

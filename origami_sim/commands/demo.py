@@ -5,7 +5,7 @@ import json
 import time
 from pathlib import Path
 
-from origami_sim.cli import (
+from origami_sim.commands.cli import (
     COMPARED_SECONDS,
     OK,
     STAND_IN_SECONDS,
@@ -18,7 +18,7 @@ from origami_sim.cli import (
     _soundness,
     _tell,
 )  # fmt: skip
-from origami_sim.demo_page import Section, write_report
+from origami_sim.commands.demo_page import Section, write_report
 from origami_sim.device.scene import recordings_folder, scene_module, scene_settings
 from origami_sim.recording import read_recording, stand_in_double_pendulum
 from origami_sim.recording.stand_in import write_stand_in_sidecar
