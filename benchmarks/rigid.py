@@ -17,7 +17,7 @@ from origami_sim.device.scene import scene_settings
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
-from origami_sim.solve.rigid import TOLERANCE, batch_of
+from origami_sim.solve.rigid.batch import TOLERANCE, batch_of
 from origami_sim.solve.timestep import stable_step
 
 WORLDS, SECONDS, FRAME = 8, 0.5, 2e-2

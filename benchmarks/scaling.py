@@ -20,7 +20,7 @@ from timing import interleave, table, verdict
 from origami_sim.model import State
 from origami_sim.model.bodies import rigid
 from origami_sim.solve.batch import default_threads
-from origami_sim.solve.rigid import RigidBatch
+from origami_sim.solve.rigid.batch import RigidBatch
 
 CUDA_WORLDS = 131_072
 

@@ -14,7 +14,7 @@ import time
 began = time.perf_counter()
 from origami_sim.device.scene import read_calibration
 from origami_sim.scenes import crawler
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 imported = time.perf_counter()
 model, parameters, drive = crawler.build(read_calibration("crawler"))
 built = time.perf_counter()

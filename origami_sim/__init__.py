@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from origami_sim.quantities import si
     from origami_sim.recording import Recording, read_recording
     from origami_sim.results.run_folder import format_table, load_run, save_run
-    from origami_sim.solve.dynamics import Trajectory, simulate
-    from origami_sim.solve.quasistatic import QuasiStatic, quasistatic
-    from origami_sim.solve.sources import field_at
-    from origami_sim.solve.statics import Equilibrium, Path, continuation, equilibrium
+    from origami_sim.solve.kernels.sources import field_at
+    from origami_sim.solve.motion.dynamics import Trajectory, simulate
+    from origami_sim.solve.motion.quasistatic import QuasiStatic, quasistatic
+    from origami_sim.solve.statics.equilibria import Equilibrium, Path, continuation, equilibrium
     from origami_sim.solve.timestep import stable_step
     from origami_sim.view.replay import write_replay
     from origami_sim.view.viewer import open_replay, screenshot
@@ -79,10 +79,10 @@ _HOMES = {
     "design.shell": "isotropic orthotropic",
     "drive.gridded": "FieldTable",
     "drive.sources": "coil coil_pair dipole field_table magnet",
-    "solve.sources": "field_at",
-    "solve.dynamics": "Trajectory simulate",
-    "solve.quasistatic": "QuasiStatic quasistatic",
-    "solve.statics": "Equilibrium Path continuation equilibrium",
+    "solve.kernels.sources": "field_at",
+    "solve.motion.dynamics": "Trajectory simulate",
+    "solve.motion.quasistatic": "QuasiStatic quasistatic",
+    "solve.statics.equilibria": "Equilibrium Path continuation equilibrium",
     "solve.timestep": "stable_step",
 }
 _MODULES = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -28,7 +28,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import layered_rigidity
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 CALIBRATION = "bifold"
 FIELDS = 2.67 * np.array([0.025, 0.05, 0.075, 0.1])

@@ -20,7 +20,7 @@ from origami_sim.observation.gait import stride_table
 from origami_sim.pattern import Pattern, strip
 from origami_sim.pattern import sheet as uncreased_sheet
 from origami_sim.physics.materials import layered_rigidity, material
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 
 CALIBRATION = "crawler"
 REGIONS = ("middle", "big end", "small end")

@@ -29,8 +29,8 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.pattern import grid, uncreased
 from origami_sim.physics.materials import MU0
-from origami_sim.solve.dynamics import Trajectory
-from origami_sim.solve.statics import Path, continuation, equilibrium
+from origami_sim.solve.motion.dynamics import Trajectory
+from origami_sim.solve.statics.equilibria import Path, continuation, equilibrium
 
 CALIBRATION = "magnetic_arch"
 MESHES = ((10, 2), (20, 2), (20, 4))

@@ -21,7 +21,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, dihedral_angles
 from origami_sim.pattern.assemble import assemble
 from origami_sim.physics.materials import layered_rigidity
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 
 CALIBRATION = "multi_field_sheet"
 SHAPES = {"magnetic": "stair step", "electric": "accordion", "thermal": "roll"}

@@ -17,7 +17,7 @@ from origami_sim.observation.observe import observe, panel_angle
 from origami_sim.pattern import strip
 from origami_sim.recording import Recording, initial_angles
 from origami_sim.recording.possible import Possible
-from origami_sim.solve.dynamics import Trajectory, simulate
+from origami_sim.solve.motion.dynamics import Trajectory, simulate
 
 CALIBRATION = "pendulum_chain"
 POSSIBLE = Possible(tilt=0.0)

@@ -30,7 +30,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.physics.materials import EPS0, MU0
 from origami_sim.results.run_folder import format_table
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 from .crawler_maps import stack
 

@@ -30,7 +30,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.gait import strides
 from origami_sim.solve.batch import default_threads
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
 
 TARGET = 25.0

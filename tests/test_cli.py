@@ -21,7 +21,7 @@ from origami_sim.errors import InputError
 from origami_sim.recording import stand_in_double_pendulum
 from origami_sim.results.run_folder import load_run
 from origami_sim.scenes import mae_crease
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 COMMANDS = (
     *("run", "show", "sweep", "replay", "export", "compare", "diagnose"),

@@ -20,7 +20,7 @@ from origami_sim.pattern import kresling, miura, strip, uncreased
 from origami_sim.quantities import parsed, si
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.results.run_folder import load_run
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FLAP = '''
 """A flap of mine."""

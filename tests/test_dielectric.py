@@ -9,7 +9,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import EPS0, layered_rigidity
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 SIZE = {"layers": 6, "notch": "5 mm"}
 

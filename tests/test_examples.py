@@ -9,7 +9,7 @@ import pytest
 from origami_sim.device.device import device_module, lasting
 from origami_sim.device.scene import scene_settings
 from origami_sim.explore import angle, find, gradient, solve_for
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FOLDER = Path(__file__).parents[1] / "examples"
 

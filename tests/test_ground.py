@@ -11,7 +11,7 @@ from origami_sim.model import State
 from origami_sim.model.clearance import gaps, heights
 from origami_sim.pattern import grid, strip
 from origami_sim.physics.materials import G
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 MASS = 1010 * 1e-3 * 0.06 * 0.04
 

@@ -14,7 +14,7 @@ from origami_sim.observation.observe import body_point, channel_frames, check_sc
 from origami_sim.physics.materials import G
 from origami_sim.recording import Camera, Channel, Recording, read_recording
 from origami_sim.scenes import pendulum_chain
-from origami_sim.solve.rigid_reactions import held_nodes
+from origami_sim.solve.rigid.reactions import held_nodes
 
 
 @pytest.fixture(scope="module")

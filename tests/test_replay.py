@@ -14,7 +14,7 @@ from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.recording import Channel, Recording
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.timestep import TimeStep
 from origami_sim.view.film import Film
 from origami_sim.view.palette import COLOURS

@@ -14,7 +14,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.results import run_folder as results
 from origami_sim.results.run_folder import format_table, is_run, load_run, save_run
-from origami_sim.solve.dynamics import Failure, Trajectory, simulate
+from origami_sim.solve.motion.dynamics import Failure, Trajectory, simulate
 
 X = 0.02 * np.array([[-1, 0, 0], [0, 0, 0], [0, 1, 0], [1, 0.5, 0]], float)
 

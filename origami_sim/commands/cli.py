@@ -21,7 +21,7 @@ from origami_sim.results.printing import print_json as _print_json
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.device.scene import Outcome
     from origami_sim.recording import Recording
-    from origami_sim.solve.dynamics import Trajectory
+    from origami_sim.solve.motion.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
@@ -482,7 +482,7 @@ def _units(tables: dict) -> dict[str, str]:
 
 def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
     from origami_sim.results.run_folder import format_table
-    from origami_sim.solve import accuracy
+    from origami_sim.solve.motion import accuracy
 
     motion = outcome.trajectory
     if args.json:

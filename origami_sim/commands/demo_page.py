@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from origami_sim.device.scene import Outcome
 from origami_sim.observation.compare import Comparison, plot_overlay
 from origami_sim.results.run_folder import format_table
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.view.export import between
 from origami_sim.view.film import Film
 from origami_sim.view.interactive import figure, scripts

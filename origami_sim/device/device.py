@@ -43,7 +43,7 @@ from origami_sim.model import Model, Parameters
 from origami_sim.quantities import ANY, Quantity, converted, parsed
 from origami_sim.recording import Recording, applied_drive
 from origami_sim.recording.placed import surrounded
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 
 SETTLE = 1.0
 """Seconds that a device is simulated for after its ramps have ended, unless it says how long.

@@ -19,10 +19,10 @@ from origami_sim.files import read_toml
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import rigid
 from origami_sim.quantities import parsed
-from origami_sim.solve.accuracy import check_accuracy
-from origami_sim.solve.dynamics import Trajectory, simulate
-from origami_sim.solve.quasistatic import quasistatic
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.motion.accuracy import check_accuracy
+from origami_sim.solve.motion.dynamics import Trajectory, simulate
+from origami_sim.solve.motion.quasistatic import quasistatic
+from origami_sim.solve.statics.equilibria import equilibrium
 
 if TYPE_CHECKING:
     from origami_sim.recording import Recording

@@ -17,7 +17,7 @@ from origami_sim.predict.drives import drive_of
 from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 INSTANTS = 5
 """Instants of a recording at which the model's lowest frequency is asked: its start, its end, and a few between."""

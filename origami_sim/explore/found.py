@@ -15,8 +15,8 @@ from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
 from origami_sim.quantities import ANY, Quantity, converted
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import Trajectory, simulate
-from origami_sim.solve.statics import Equilibrium, equilibrium
+from origami_sim.solve.motion.dynamics import Trajectory, simulate
+from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
 from origami_sim.solve.timestep import stable_step
 
 Build = Callable[..., Any]

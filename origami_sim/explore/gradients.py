@@ -19,9 +19,9 @@ from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, fo
 from origami_sim.model import State
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid_sensitivity import followed
-from origami_sim.solve.statics import tangent
-from origami_sim.solve.system import NULL_SHIFT, STENCIL, WEIGHTS
+from origami_sim.solve.rigid.sensitivity import followed
+from origami_sim.solve.statics.equilibria import tangent
+from origami_sim.solve.statics.system import NULL_SHIFT, STENCIL, WEIGHTS
 from origami_sim.solve.timestep import stable_step
 
 STEP = 1e-3

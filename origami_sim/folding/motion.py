@@ -5,7 +5,7 @@ import numpy as np
 from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.timestep import AT_REST, TimeStep
 
 from .fold import Folding

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 
 SKIP = 2
 """Cycles before the gait counts as steady."""

@@ -13,9 +13,9 @@ from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import Trajectory
-from origami_sim.solve.rigid_reactions import held_nodes, support_of_all
-from origami_sim.solve.statics import Equilibrium, equilibrium
+from origami_sim.solve.motion.dynamics import Trajectory
+from origami_sim.solve.rigid.reactions import held_nodes, support_of_all
+from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
 
 FAR = 5.0
 """Sizes of a panel from its middle beyond which a point is none of its body."""
@@ -106,7 +106,7 @@ def follow(
         model, parameters: one world of each.
         recording: drive levels by load step.
         state: where the first step starts (default: the reference state).
-        options: of `origami_sim.solve.statics.equilibrium`, e.g. tolerance.
+        options: of `origami_sim.solve.statics.equilibria.equilibrium`, e.g. tolerance.
     """
     found: list[Equilibrium] = []
     drives = _reaching(model, parameters, recording)

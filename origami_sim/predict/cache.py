@@ -26,19 +26,8 @@ from origami_sim.threads import leads, told
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
 
-_SOURCES = (
-    "*.py",
-    "physics/*.py",
-    "drive/*.py",
-    "effects/*.py",
-    "model/*.py",
-    "solve/*.py",
-    "observation/*.py",
-    "device/*.py",
-    "recording/*.py",
-    "fit/*.py",
-    "predict/*.py",
-)
+_FOLDERS = ("physics", "drive", "effects", "model", "solve", "recording", "device", "observation", "fit", "predict")
+_SOURCES = ("*.py", *(f"{folder}/**/*.py" for folder in _FOLDERS))
 
 
 class Cache:

@@ -31,8 +31,8 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.settling import coupled, levels, per_world, settling
-from origami_sim.solve.system import System
+from origami_sim.solve.statics.settling import coupled, levels, per_world, settling
+from origami_sim.solve.statics.system import System
 from origami_sim.threads import told
 
 PASSIVE = ("bars", "bar_viscosity", "panel_bending", "ogden_bars")

@@ -14,7 +14,7 @@ from origami_sim.observation.observe import _index
 from origami_sim.predict.curves import HOLD, PIECES, Balance, Curves, Static
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.settling import levels, per_world
+from origami_sim.solve.statics.settling import levels, per_world
 
 PATH = "crease_angle"
 """Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""

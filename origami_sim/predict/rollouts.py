@@ -32,7 +32,7 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid import batch_of
+from origami_sim.solve.rigid.batch import batch_of
 from origami_sim.threads import default_threads, shared, side_by_side
 
 LEAD = 1500

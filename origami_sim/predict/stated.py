@@ -12,7 +12,7 @@ from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.weight import weighed
 from origami_sim.predict.worlds import World, Worlds
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 AT_REST = 1e-3
 """Standard deviation of rates that are stated to be zero, as a part of usual rates, where no other is stated.

@@ -7,7 +7,7 @@ from typing import Any
 
 from origami_sim.errors import DiskFull
 from origami_sim.results.run_folder import save_run
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 
 
 def save_somewhere(

@@ -31,7 +31,7 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import InputError, unwritable
 from origami_sim.model import PADS, Model, Parameters, State
-from origami_sim.solve.dynamics import Failure, Trajectory
+from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
 from origami_sim.view.replay import write_replay
 

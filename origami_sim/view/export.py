@@ -9,7 +9,7 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern, write_fold, write_mesh
 from origami_sim.pattern.files import write_atomic
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.view.film import Film, HasTrajectory
 from origami_sim.view.gltf import glb
 from origami_sim.view.moving import RATE, write_moving

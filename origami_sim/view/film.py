@@ -11,7 +11,7 @@ from scipy.sparse.linalg import lsqr
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.view.palette import COLOURS, LIGHT, nice
 
 WALK = 3.0

@@ -13,7 +13,7 @@ from origami_sim.view.film import Film, outlines
 from origami_sim.view.palette import COLOURS, PLOTTED, SERIES, scaled
 
 if TYPE_CHECKING:
-    from origami_sim.solve.dynamics import Trajectory
+    from origami_sim.solve.motion.dynamics import Trajectory
 
 INK = "#3c424a"
 STEPS = [1, 2, 2.5, 5, 10]  # of ticks

@@ -28,7 +28,7 @@ import rerun.blueprint as rrb
 from origami_sim.effects import get
 from origami_sim.errors import InputError, unwritable
 from origami_sim.recording import Recording
-from origami_sim.solve.dynamics import Trajectory
+from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.view.film import WALK, Film, HasTrajectory
 from origami_sim.view.palette import COLOURS, PLOTTED, SERIES, length_text, nice, scaled
 from origami_sim.view.viewer import TIMELINE

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from origami_sim.model import Model
-    from origami_sim.solve.dynamics import Trajectory
+    from origami_sim.solve.motion.dynamics import Trajectory
 
 WIDTH, HEIGHT = 420, 260  # of pictures in notebooks [px]
 

@@ -131,7 +131,7 @@ def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
     from origami_sim.drive import Drive, sine
     from origami_sim.model import State
     from origami_sim.model.articulation import Articulation
-    from origami_sim.solve.dynamics import simulate
+    from origami_sim.solve.motion.dynamics import simulate
 
     o = truth["objects"].draw(structure, np.random.default_rng(3))
     (tmp_path / "object.json").write_text(json.dumps(o))
@@ -158,7 +158,7 @@ def test_both_simulators_agree_without_an_effect(truth, tmp_path, structure):
 def test_a_crawler_walks_alike_in_both(truth, tmp_path):
     """Hunt-Crossley and Dahl against spring, dashpot and bristle: 1 % of the walk, a fifth of the camera's noise."""
     from origami_sim.drive import Drive, sine
-    from origami_sim.solve.dynamics import simulate
+    from origami_sim.solve.motion.dynamics import simulate
 
     o = truth["objects"].draw("crawler", np.random.default_rng(3))
     (tmp_path / "object.json").write_text(json.dumps(o))

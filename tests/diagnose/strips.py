@@ -10,7 +10,7 @@ from origami_sim.model.articulation import Articulation
 from origami_sim.pattern import strip
 from origami_sim.recording import Recording
 from origami_sim.recording.recording import Channel
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 
 def hanging(panels: int = 4) -> tuple[Model, Parameters]:

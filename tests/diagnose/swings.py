@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim.commands import cli
 from origami_sim.device.scene import scene_module, scene_settings
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FRICTION, NOISE = 1.0e-3, 5e-4
 QUICK = ("--suspects", "crease_friction,crease_quadratic_damping,air_drag")

@@ -24,7 +24,7 @@ from origami_sim.recording import read_recording
 from origami_sim.report.page import read_report
 from origami_sim.report.patch import Addition, additions, switched_on, write_patch
 from origami_sim.results.run_folder import load_run
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.view.viewer import read_series
 
 

@@ -27,7 +27,7 @@ from origami_sim.predict.track import placed, track
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.recording.recording import DriveChannel, estimate_noise
 from origami_sim.scenes import crawler, cube_toss
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 NOISE, RATE = 2e-4, 300.0
 

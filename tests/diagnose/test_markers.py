@@ -15,7 +15,7 @@ from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
 from origami_sim.observation.observe import observe
 from origami_sim.recording import Camera, Channel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 
 NOISE = 1e-4

@@ -12,7 +12,7 @@ from origami_sim.locate.onset import onset
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.recording import Channel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, record, subject
 
 SMALL = {"duration": 4.0, "panels": 3, "rate": 100}

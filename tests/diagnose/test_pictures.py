@@ -14,7 +14,7 @@ from origami_sim.model.articulation import Articulation
 from origami_sim.observation.observe import body_point, observe
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Camera, Channel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 
 NEAR, NOISE = 0.3, 5e-5

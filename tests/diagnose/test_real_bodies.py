@@ -16,7 +16,7 @@ from origami_sim.model import State
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.scenes import cube_toss, falling_ball
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FLIGHT = 10.0
 """Longer than any recording here [s]: each is one segment."""

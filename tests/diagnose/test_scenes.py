@@ -6,7 +6,7 @@ import pytest
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import diagnose
 from origami_sim.recording import Channel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 SUSPECTS = ("mass_damping", "length_scale", "angle_scale", "crease_friction", "gravity_tilt", "gravity")
 

@@ -23,7 +23,7 @@ from origami_sim.infer.scan import over_shapes
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import forget, search
 from origami_sim.recording import Channel, DriveChannel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import record, subject
 from tests.diagnose.swings import single
 

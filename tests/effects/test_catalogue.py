@@ -15,7 +15,7 @@ from origami_sim.effects import CATALOGUE, CONTACTS, FAMILIES, PAIRS, SHELLS
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, node_mass
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import tangent
+from origami_sim.solve.statics.equilibria import tangent
 from origami_sim.solve.timestep import stable_step
 
 ACT_BY_DEFAULT = {"gravity", "ground"}

@@ -10,7 +10,7 @@ from effects.test_laws import hinge_moment, under
 from origami_sim.drive import Drive, ramp
 from origami_sim.effects.crease_thermal import bilayer_turn
 from origami_sim.errors import InputError
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 
 def free_curvature(thickness, modulus, expansion, slices=21000):

@@ -16,8 +16,8 @@ from origami_sim.errors import InputError
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import yielding_crease
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.quasistatic import quasistatic
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.motion.quasistatic import quasistatic
 
 K, MY, REST = 0.8, 0.2, 0.1
 LAWS = ["crease", "crease_yield"]

@@ -16,8 +16,8 @@ from origami_sim.physics.materials import MU0
 from origami_sim.recording import Channel, Recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.solve.batch import forces
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import tangent
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import tangent
 
 NAME = "dipole_interaction"
 BR, VOLUME = 0.13, 7e-7

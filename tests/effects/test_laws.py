@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from origami_sim.drive import Drive
 from origami_sim.model import dihedral_angles
 from origami_sim.solve.batch import Batch, forces
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 EPS0, MU0 = 8.8541878128e-12, 1.25663706212e-6
 LEVER = 0.9

@@ -11,8 +11,8 @@ from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, SHELLS
 from origami_sim.model import node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.rigid import RigidBatch
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.rigid.batch import RigidBatch
 
 ALL = tuple(n for n, e in CATALOGUE.items() if e.family not in (*DISTORTIONS, *SHELLS, "bar", "bend"))
 FOLDS = (np.array([0.7, -0.5]), np.array([2.9, -2.8]))

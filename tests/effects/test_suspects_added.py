@@ -14,7 +14,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Parameters, node_mass
 from origami_sim.physics.materials import MU0
 from origami_sim.solve.batch import Batch, forces
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
 
 LEVER = 0.9

@@ -10,7 +10,7 @@ from origami_sim.drive import Drive, series
 from origami_sim.effects import CATALOGUE
 from origami_sim.physics.materials import EPS0, MU0
 from origami_sim.solve.batch import forces
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 MAGNETIC = (
     "magnetic_torque", "remanence_error", "magnetic_compliance", "demagnetisation", "magnetic_viscosity",

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from origami_sim.drive import Drive, series
 from origami_sim.effects import CATALOGUE, crease_polynomial
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
 
 LEVER = 0.9

@@ -17,7 +17,7 @@ from origami_sim.pattern import strip
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.stated import Start
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 STIFFNESS, TIME, NOISE, RATE = 3e-5, 0.475, 3e-3, 100.0
 FIELD, FREQUENCY = 0.02, 2.5

@@ -23,7 +23,7 @@ from origami_sim.predict import cache, rollouts
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
 
 NOISE, RATE = 1e-3, 100.0

@@ -10,7 +10,7 @@ from origami_sim.errors import InputError
 from origami_sim.predict.drives import drive_of
 from origami_sim.recording import applied_drive, read_recording
 from origami_sim.recording.dataset import _equal_drives
-from origami_sim.solve.sources import field_at
+from origami_sim.solve.kernels.sources import field_at
 
 SIDECAR = """
 [time]

@@ -8,8 +8,8 @@ from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.physics.materials import EPS0
 from origami_sim.scenes import bifold
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import equilibrium
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from origami_sim.device.scene import follow, read_calibration
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.scenes import box
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FIELDS = np.array([0.010, 0.020, 0.050, 0.100, 0.150, 0.200])
 LUMPED = np.array([20.4, 38.6, 62.0, 74.0, 78.8, 81.4])

@@ -12,8 +12,8 @@ from origami_sim.model.clearance import gaps
 from origami_sim.observation.gait import strides
 from origami_sim.physics.materials import layered_rigidity, material
 from origami_sim.scenes import crawler
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium, tangent
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import equilibrium, tangent
 from origami_sim.solve.timestep import stable_step
 from origami_sim.studies.crawler_maps import Store, Trial, checks, judge, run_trials
 from origami_sim.studies.strides import check

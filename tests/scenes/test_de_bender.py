@@ -8,7 +8,7 @@ from scipy.optimize import fsolve
 from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.scenes import de_bender as bender
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 VOLTAGES = np.array([500.0, 1000.0, 2000.0, 3000.0, 4000.0])
 CURVATURE = {

@@ -6,7 +6,7 @@ import pytest
 from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.scenes import de_fold as fold
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 VOLTAGES = np.array([1000.0, 2000.0, 3000.0, 4000.0])
 NOTCH = np.array([0.72, 2.91, 6.70, 12.30])

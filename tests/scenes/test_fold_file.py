@@ -12,7 +12,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import miura, write_mesh
 from origami_sim.scenes import fold_file
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 
 SECTOR = np.radians(60)
 

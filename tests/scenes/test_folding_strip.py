@@ -7,7 +7,7 @@ from scipy.optimize import root
 from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.scenes import folding_strip as strip
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 FIELDS = np.array([0.02, 0.05, 0.1, 0.2])
 END = np.array([37.4, 54.7, 66.0, 75.3])

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.scenes import mae_cantilever as cantilever
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 LOADS = 37.769 * np.array([0.1, 0.2, 0.3, 0.5, 0.75, 1.0])
 TABLE = np.array([0.7286, 0.9198, 1.0077, 1.0969, 1.1537, 1.1879])

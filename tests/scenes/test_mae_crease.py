@@ -8,8 +8,8 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.model import State
 from origami_sim.scenes import mae_crease
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import equilibrium
 
 ANGLE = 47.788428
 """Root of the closed form for 20 x 20 x 3 mm, 130 mT, 0.2 T, 0.02 N m/rad [deg]."""

@@ -11,8 +11,8 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.results.run_folder import load_run
 from origami_sim.scenes import magnetic_arch as arch
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import equilibrium
 
 SNAP, STROKE = 6.27e-3, (8.2e-3, 8.6e-3)
 """Measured on the ramp: field of the snap [T] and stroke [m]."""

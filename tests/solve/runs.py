@@ -2,7 +2,7 @@
 
 from effects.kit import quiet
 
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 G = 9.80665
 

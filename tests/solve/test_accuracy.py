@@ -11,7 +11,7 @@ from origami_sim import Drive, Sheet, rigid, simulate, strip
 from origami_sim.device.device import device_module
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters, State
-from origami_sim.solve.accuracy import HALVINGS, SLIGHT, SOUND, exchanges, extent, refined, sentence
+from origami_sim.solve.motion.accuracy import HALVINGS, SLIGHT, SOUND, exchanges, extent, refined, sentence
 
 
 def flap(loss_time=0.0):

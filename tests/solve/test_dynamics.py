@@ -14,7 +14,7 @@ from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.model import State
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.timestep import stable_step
 
 # --- energy -----------------------------------------------------------------------------------------------------------

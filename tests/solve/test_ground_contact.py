@@ -8,7 +8,7 @@ from effects.kit import lengths, make_model, quiet, start
 from solve.runs import G
 
 from origami_sim.drive import Drive, ramp
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 
 
 def plate(**options):

@@ -12,9 +12,9 @@ from structures import PLAIN, flap, kresling, lengths, model_of, strip, truss
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve import implicit
-from origami_sim.solve.dynamics import Trajectory, simulate
-from origami_sim.solve.statics import equilibrium, tangent
+from origami_sim.solve.motion import implicit
+from origami_sim.solve.motion.dynamics import Trajectory, simulate
+from origami_sim.solve.statics.equilibria import equilibrium, tangent
 from origami_sim.solve.timestep import stable_step
 
 EFFECTS = (

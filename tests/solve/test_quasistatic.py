@@ -9,7 +9,7 @@ from structures import truss
 
 from origami_sim import Drive, Sheet, equilibrium, miura, quasistatic, ramp, series, simulate, strip
 from origami_sim.errors import InputError
-from origami_sim.solve.quasistatic import knots
+from origami_sim.solve.motion.quasistatic import knots
 
 K, BRANCH, TIME, MOMENT = 2e-3, 3e-3, 7.0, 1e-3
 """A standard linear solid: spring, spring of the Maxwell branch [N m/rad], its time [s]; and a moment upon it [N m]."""

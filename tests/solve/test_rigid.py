@@ -15,7 +15,7 @@ from origami_sim.model import State, dihedral_angles
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import body_of, mass_points, rigid
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid import RigidBatch, batch_of
+from origami_sim.solve.rigid.batch import RigidBatch, batch_of
 
 G = 9.80665
 

@@ -27,7 +27,7 @@ from origami_sim.model import dihedral_angles
 from origami_sim.model.curvature import curvature
 from origami_sim.physics.materials import material
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.statics import tangent
+from origami_sim.solve.statics.equilibria import tangent
 
 SUPPORTED = 0.0040623527
 """Deflection of the middle of a simply supported square plate, in q a^4 / D (Navier's series)."""

@@ -11,10 +11,10 @@ from structures import flap, kresling, strip, tent, truss
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import State
-from origami_sim.solve import system
 from origami_sim.solve.batch import forces
-from origami_sim.solve.dynamics import simulate
-from origami_sim.solve.statics import continuation, equilibrium, tangent
+from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics import system
+from origami_sim.solve.statics.equilibria import continuation, equilibrium, tangent
 
 # --- tangent
 

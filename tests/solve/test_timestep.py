@@ -8,7 +8,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Parameters
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.dynamics import simulate
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.timestep import SAFETY, TimeStep, stable_step
 
 LOADED = Drive(load=1.0)

@@ -10,7 +10,7 @@ from origami_sim.commands import cli
 from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive
 from origami_sim.scenes import bifold
-from origami_sim.solve.statics import equilibrium
+from origami_sim.solve.statics.equilibria import equilibrium
 from origami_sim.studies import bifold_tables as ps
 
 

@@ -17,7 +17,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 
 if TYPE_CHECKING:
-    from origami_sim.solve.dynamics import Trajectory
+    from origami_sim.solve.motion.dynamics import Trajectory
 
 SOUND = 0.005
 """Error of the energy balance, over the energy exchanged, above which a run says so."""

@@ -13,9 +13,9 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
 from origami_sim.quantities import converted
-from origami_sim.solve.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.batch import Evaluation
-from origami_sim.solve.implicit import TOLERANCE, Implicit
+from origami_sim.solve.motion.accuracy import check_accuracy, energy_error, refined, warning
+from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
 from origami_sim.solve.oversights import (
     below_the_ground,
     idle_drives,
@@ -23,8 +23,8 @@ from origami_sim.solve.oversights import (
     refuse_start_inside_the_ground,
     refuse_start_outside_tables,
 )
-from origami_sim.solve.rigid import TOLERANCE as RIGID
-from origami_sim.solve.rigid import batch_of
+from origami_sim.solve.rigid.batch import TOLERANCE as RIGID
+from origami_sim.solve.rigid.batch import batch_of
 from origami_sim.solve.skin import too_deep
 from origami_sim.solve.timestep import TimeStep, stable_step
 

@@ -20,8 +20,8 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.solve.oversights import refuse_start_outside_tables
-from origami_sim.solve.rigid_statics import RigidSystem
-from origami_sim.solve.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
+from origami_sim.solve.rigid.statics import RigidSystem
+from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""

@@ -10,9 +10,9 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
-from origami_sim.solve import articulated
 from origami_sim.solve.batch import _FIRST, Batch
-from origami_sim.solve.runge_kutta import TABLEAU
+from origami_sim.solve.kernels import articulated
+from origami_sim.solve.kernels.runge_kutta import TABLEAU
 
 TOLERANCE = 1e-10
 """Largest error of one step [rad], or part of the device's size; ten times less costs 1.6 times the steps."""

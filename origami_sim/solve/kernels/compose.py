@@ -16,11 +16,11 @@ import warp as wp
 
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
 from origami_sim.physics import kinematics, magnetostatics
-from origami_sim.solve import articulated, plates, runge_kutta, sources, templates, touching
-from origami_sim.solve.compose_rigid import Rigid, is_steady
-from origami_sim.solve.compose_sheets import Sheets, Text
-from origami_sim.solve.compose_touch import Touching, pair_value
-from origami_sim.solve.wave import wave
+from origami_sim.solve.kernels import articulated, plates, runge_kutta, sources, templates, touching
+from origami_sim.solve.kernels.compose_rigid import Rigid, is_steady
+from origami_sim.solve.kernels.compose_sheets import Sheets, Text
+from origami_sim.solve.kernels.compose_touch import Touching, pair_value
+from origami_sim.solve.kernels.wave import wave
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, ORIGIN, VOLTAGE = 0, 3, 12, 13, 14, 15
 """First drive channel of each quantity; voltages of further electrode groups follow."""

@@ -18,12 +18,12 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch, Evaluation
-from origami_sim.solve.rigid import Topology
-from origami_sim.solve.rigid_statics import NEUTRAL, closed, loops_kept
-from origami_sim.solve.rigid_statics import STEP as TURN
+from origami_sim.solve.rigid.batch import Topology
+from origami_sim.solve.rigid.statics import NEUTRAL, closed, loops_kept
+from origami_sim.solve.rigid.statics import STEP as TURN
 from origami_sim.solve.skin import clear_share
-from origami_sim.solve.statics import equilibrium
-from origami_sim.solve.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
+from origami_sim.solve.statics.equilibria import equilibrium
+from origami_sim.solve.statics.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
 
 CLOSE = 1e-10
 """Error over the size of the device up to which a place is an equilibrium."""

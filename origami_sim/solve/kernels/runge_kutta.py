@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.solve.articulated import NATURAL, POSE, STAGES, Tree, at, copy, scalar, vec3
+from origami_sim.solve.kernels.articulated import NATURAL, POSE, STAGES, Tree, at, copy, scalar, vec3
 
 TABLEAU = np.array(
     [

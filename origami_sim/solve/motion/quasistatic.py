@@ -22,9 +22,9 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Evaluation
-from origami_sim.solve.dynamics import Failure, Trajectory
+from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
-from origami_sim.solve.settling import Settling, levels, settling
+from origami_sim.solve.statics.settling import Settling, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
 
 TOLERANCE = 1e-5

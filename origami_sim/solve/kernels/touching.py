@@ -12,8 +12,8 @@ import warp as wp
 
 from origami_sim import _warp  # noqa: F401  settings
 from origami_sim.physics import kinematics
-from origami_sim.solve import nearness
-from origami_sim.solve.nearness import between, crossing, edge_near, from_triangle, off_edge, off_triangle
+from origami_sim.solve.kernels import nearness
+from origami_sim.solve.kernels.nearness import between, crossing, edge_near, from_triangle, off_edge, off_triangle
 
 scalar = wp.float64
 

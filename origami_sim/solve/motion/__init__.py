@@ -1,0 +1,1 @@
+"""Motion along time: explicit, implicit and quasi-static, and runs refined until they are accurate."""
