@@ -16,7 +16,7 @@ from origami_sim.view.film import Film
 from origami_sim.view.interactive import figure, scripts
 from origami_sim.view.palette import COLOURS
 from origami_sim.view.picture import Artist, nearest_frame
-from tests.test_replay import AMPLITUDES, FRAMES, TRIANGLES, swing
+from tests.view.test_replay import AMPLITUDES, FRAMES, TRIANGLES, swing
 
 
 @pytest.fixture(scope="module")

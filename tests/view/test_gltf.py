@@ -8,7 +8,7 @@ import trimesh
 
 from origami_sim.view.film import Film
 from origami_sim.view.gltf import glb
-from tests.test_replay import swing
+from tests.view.test_replay import swing
 
 SIZES, WIDE = {5121: 1, 5126: 4}, {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 KINDS = {5121: np.uint8, 5126: np.float32}

@@ -125,7 +125,7 @@ def test_settings_are_listed_with_their_sources(call, tmp_path):
 
 
 def test_a_calibration_file_replaces_the_scenes_own(call, tmp_path):
-    shipped = Path(scene.__file__).parents[1] / "calibrations" / "fold_file.toml"
+    shipped = Path(scene.__file__).parents[2] / "calibrations" / "fold_file.toml"
     own = tmp_path / "own.toml"
     own.write_text(shipped.read_text().replace('value = "miura.fold"', 'value = "waterbomb.fold"'))
     code, out, _ = call("run", "fold_file", "--calibration", own, *QUICK)

@@ -21,7 +21,7 @@ from origami_sim.recording.dataset import read_dataset
 from origami_sim.recording.stand_in import stand_in_double_pendulum, write_stand_in_sidecar
 from origami_sim.results import rescue
 from origami_sim.results.run_folder import load_run
-from tests.test_replay import swing
+from tests.view.test_replay import swing
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm"><rect width="9" height="9" stroke="#000"/>'
