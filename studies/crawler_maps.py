@@ -170,8 +170,9 @@ def _version() -> str:
     package = Path(str(resources.files("origami_sim")))
     scenes = Path(str(resources.files("origami_sim.scenes")))
     digest = hashlib.sha256()
-    files = [*package.glob("effects/*.py"), *package.glob("solve/*.py"), package / "build.py", *scenes.glob("*.py")]
-    for file in sorted(files):
+    laws = ("physics", "drive", "effects", "model", "solve", "design")
+    files = [f for folder in laws for f in package.glob(f"{folder}/**/*.py")]
+    for file in sorted([*files, *scenes.glob("*.py")]):
         digest.update(file.read_bytes())
     try:
         version = metadata.version("origami-sim")

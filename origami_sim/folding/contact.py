@@ -1,6 +1,6 @@
 """Panels that keep each other off while a pattern folds, so that a sheet that begins clear of itself stays so.
 
-A pair that comes nearer than its panels are thick, h (see `solve.touching` for what counts), adds
+A pair that comes nearer than its panels are thick, h (see `solve.kernels.touching` for what counts), adds
 
     K h^2 (1 - u)^2 (1/2 - ln u)        with u = distance / h < 1
 

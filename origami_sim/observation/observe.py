@@ -289,7 +289,7 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     a load cell that is not set to zero). Axes that are free count nothing. The ground's force is the sum of all contact
     effects. The drive is taken at each frame; memory at its value of the state.
 
-    Of rigid panels only the force of all supports together is determined (`solve.rigid_reactions`): how held nodes
+    Of rigid panels only the force of all supports together is determined (`solve.rigid.reactions`): how held nodes
     share it is not.
 
     Raises:

@@ -26,7 +26,7 @@ from origami_sim.threads import leads, told
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
 
-_FOLDERS = ("physics", "drive", "effects", "model", "solve", "recording", "device", "observation", "fit", "predict")
+_FOLDERS = "physics drive effects model pattern solve recording device observation fit predict".split()
 _SOURCES = ("*.py", *(f"{folder}/**/*.py" for folder in _FOLDERS))
 
 

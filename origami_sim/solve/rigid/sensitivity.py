@@ -1,6 +1,6 @@
 """How an equilibrium of rigid panels moves as its design does, by the implicit function theorem.
 
-Coordinates q are the pose of the root and the changes of fold angles, as in `rigid_statics`. With moments f, gaps g of
+Coordinates q are the pose of the root and the changes of fold angles, as in `statics`. With moments f, gaps g of
 closed loops, their Jacobian G = dg/dq and the forces c that keep loops closed, an equilibrium is f + G^T c = 0, g = 0.
 With r = f + G^T c at held c and K = -dr/dq, a number p of the design moves it by dq/dp with
 

@@ -74,7 +74,7 @@ class RigidSystem:
         return out
 
     def settle(self, time: float, tolerance: float, max_iterations: int, unstable: bool) -> dict:
-        """The equilibrium near the start, as the fields of `statics.Equilibrium`."""
+        """The equilibrium near the start, as the fields of an `Equilibrium`."""
         q, shift, pushes, history, message = np.zeros(self.count), 0.0, 0, [], ""
         converged, values, mode = False, np.full(1, np.nan), np.zeros(self.count)
         scale = target = 0.0
