@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.distort import distorted
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Suspect
@@ -19,9 +18,10 @@ from origami_sim.infer.diagnosis import Curve, Partial, Place
 from origami_sim.locate.locate import Motion, dynamics, frozen, locate, loose, motion
 from origami_sim.locate.locate_curves import places
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.distort import distorted
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.settling import levels, per_world
+from origami_sim.solve.statics.settling import levels, per_world
 
 FRAMES = 4000
 """Frames of a recording along which laws with a memory are followed, at most, evenly spread: a second of time."""
