@@ -1,4 +1,4 @@
-"""A small mass that nobody wrote down, at a point: a marker, a screw, a drop of glue, the end of a wire."""
+"""Added mass: at a point, a marker, a screw, a drop of glue or the end of a wire that nobody wrote down."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Pull-off force of a soft foot that sticks to the ground."""
+"""Foot adhesion: pull-off force of a soft foot that sticks to the ground."""
 
 import warp as wp
 

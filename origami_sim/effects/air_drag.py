@@ -1,4 +1,4 @@
-"""Quadratic drag of the air on a panel moving along its normal."""
+"""Air drag: quadratic, of a panel that moves along its normal."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""An encoder whose disc does not turn about its own middle: an error that comes back once a turn."""
+"""Encoder eccentricity: the disc does not turn about its own middle, an error that comes back once a turn."""
 
 import numpy as np
 

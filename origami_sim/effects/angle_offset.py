@@ -1,4 +1,4 @@
-"""Zero of the angle measurement."""
+"""Zero error of the angle: what an encoder or camera reads where the angle is none."""
 
 import numpy as np
 

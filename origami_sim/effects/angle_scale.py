@@ -1,4 +1,4 @@
-"""Error of the angle scale."""
+"""Scale error of the angle: all angles are read too large or too small alike."""
 
 import numpy as np
 

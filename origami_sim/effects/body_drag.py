@@ -1,4 +1,4 @@
-"""Quadratic drag of the air on a compact body: a ball, or a node that stands for one."""
+"""Air drag of a body: quadratic, of a ball, or of a node that stands for one."""
 
 import warp as wp
 

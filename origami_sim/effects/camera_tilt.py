@@ -1,4 +1,4 @@
-"""Camera axes turned against those of the device."""
+"""Camera tilt: its axes are turned against those of the device."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

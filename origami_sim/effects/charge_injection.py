@@ -1,4 +1,4 @@
-"""Charge trapped in the dielectric: a built-in voltage that does not reverse with the drive."""
+"""Trapped charge: in the dielectric, a built-in voltage that does not reverse with the drive."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""The recorder's clock is set off from that of the drive."""
+"""Clock offset: the recorder's clock is set off from that of the drive."""
 
 import numpy as np
 

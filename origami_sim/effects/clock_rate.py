@@ -1,4 +1,4 @@
-"""The recorder's clock runs fast or slow."""
+"""Clock rate error: the recorder's clock runs fast or slow."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Friction coefficient, the same in all directions."""
+"""Coulomb friction: of the ground, the same in all directions."""
 
 import warp as wp
 

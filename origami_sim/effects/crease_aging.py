@@ -1,4 +1,4 @@
-"""A crease whose rest angle goes on moving, ever more slowly: as the logarithm of time since it was folded."""
+"""Creep of the rest angle: ever more slowly, as the logarithm of time since a crease was folded."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A crease that is stiffer as a valley than as a mountain, or softer."""
+"""Asymmetric stiffness: a crease that is stiffer as a valley than as a mountain, or softer."""
 
 import math
 

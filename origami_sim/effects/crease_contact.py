@@ -1,4 +1,4 @@
-"""Patches on one side of a crease that touch when it has folded far enough."""
+"""Contact of patches: on one side of a crease, when it has folded far enough."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Dry friction in a crease: an elastic bristle that yields at a moment and then slides, at any rate alike."""
+"""Dry friction: of a crease, an elastic bristle that yields at a moment and then slides, at any rate alike."""
 
 import math
 

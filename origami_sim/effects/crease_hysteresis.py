@@ -1,4 +1,4 @@
-"""Rate-independent hysteresis of a crease with a rounded loop (Bouc-Wen)."""
+"""Bouc-Wen hysteresis: of a crease, independent of the rate, with a rounded loop."""
 
 import math
 

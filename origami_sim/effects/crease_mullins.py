@@ -1,4 +1,4 @@
-"""Softening of a crease by the largest fold that it has seen (Mullins effect)."""
+"""Mullins softening: of a crease, by the largest fold that it has seen."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A constant moment on a crease: its rest angle was read wrongly, or one side has swollen before."""
+"""Constant moment: on a crease whose rest angle was read wrongly, or of which one side has swollen before."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Loss of a crease that grows with the square of its rate: air pushed aside, grease squeezed through gaps."""
+"""Quadratic damping: loss of a crease by the square of its rate, as of air pushed aside or grease in gaps."""
 
 import math
 

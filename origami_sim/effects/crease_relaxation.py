@@ -1,4 +1,4 @@
-"""Viscoelastic relaxation of a crease: three Maxwell branches (Prony series) beside the elastic crease."""
+"""Viscoelastic relaxation: of a crease, three Maxwell branches (Prony series) beside its elasticity."""
 
 import math
 

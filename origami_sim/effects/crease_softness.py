@@ -1,4 +1,4 @@
-"""A crease that is softer or stiffer than thought: debonding, tolerance of thickness, stiffening electrodes."""
+"""Stiffness error: a crease that is softer or stiffer than thought, by debonding, thickness or electrodes."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A crease whose stiffness changes with the square of the fold: hyperelastic or geometric."""
+"""Cubic stiffening: stiffness of a crease that changes with the square of the fold."""
 
 import math
 

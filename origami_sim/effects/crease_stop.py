@@ -1,4 +1,4 @@
-"""Barrier that keeps a crease from passing through flat-folded, or from where the edges of thick panels meet."""
+"""Angle stop: keeps a crease from passing through flat-folded, or from where the edges of thick panels meet."""
 
 import math
 

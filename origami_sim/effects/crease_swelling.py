@@ -1,4 +1,4 @@
-"""A moment that grows with time on a crease: one side swells, or takes up water or oil."""
+"""Growing moment: on a crease, with time, as where one side swells or takes up water or oil."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Stiffness of a crease that falls, or rises, with temperature."""
+"""Temperature-dependent stiffness: of a crease, which falls, or rises, with temperature."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Kelvin-Voigt loss of a crease."""
+"""Viscous damping: Kelvin-Voigt loss of a crease."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A crease that yields: beyond a moment it keeps part of its fold, at once or at a rate."""
+"""Yield: beyond a moment a crease keeps part of its fold, at once or at a rate."""
 
 import math
 

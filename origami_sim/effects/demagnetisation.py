@@ -1,4 +1,4 @@
-"""Lasting loss of remanence where an opposing field has exceeded a threshold."""
+"""Demagnetisation: lasting loss of remanence where an opposing field has exceeded a threshold."""
 
 import warp as wp
 

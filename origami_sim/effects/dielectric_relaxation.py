@@ -1,4 +1,4 @@
-"""Polarisation that follows the voltage only slowly."""
+"""Dielectric relaxation: polarisation that follows the voltage only slowly."""
 
 import warp as wp
 

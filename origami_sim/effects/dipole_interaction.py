@@ -1,4 +1,4 @@
-"""Remanent panels in each other's field."""
+"""Dipole interaction: remanent panels in each other's field."""
 
 import warp as wp
 

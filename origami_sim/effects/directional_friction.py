@@ -1,4 +1,4 @@
-"""Friction that is larger backward than forward along an axis of the body (cut or inclined foot)."""
+"""Directional friction: larger backward than forward along an axis of the body (cut or inclined foot)."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""All drives reach the device late by the same time."""
+"""Drive delay: all drives reach the device late by the same time."""
 
 import numpy as np
 

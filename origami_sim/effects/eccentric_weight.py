@@ -1,4 +1,4 @@
-"""Weight of a patch that sits on one side of the sheet, off the mid-plane."""
+"""Eccentric weight: of a patch that sits on one side of the sheet, off the mid-plane."""
 
 import warp as wp
 

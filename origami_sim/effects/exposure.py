@@ -1,4 +1,4 @@
-"""Motion blur or a moving average: each value is a mean over the time before it."""
+"""Motion blur: of an exposure or a moving average, each value a mean over the time before it."""
 
 import numpy as np
 

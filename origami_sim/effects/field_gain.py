@@ -1,4 +1,4 @@
-"""Error of the field's calibration: the device gets more or less than was commanded."""
+"""Gain error of the field: the device gets more or less than was commanded."""
 
 import numpy as np
 

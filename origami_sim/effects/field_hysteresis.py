@@ -1,4 +1,4 @@
-"""Hysteresis of an iron core: the field depends on where the current came from."""
+"""Field hysteresis: of an iron core, so that the field depends on where the current came from."""
 
 import numpy as np
 

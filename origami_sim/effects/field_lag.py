@@ -1,4 +1,4 @@
-"""Lag of the field behind the command: inductance of the coils, eddy currents, a slow amplifier."""
+"""Field lag: behind the command, by inductance of the coils, eddy currents or a slow amplifier."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Magnet and device are turned against each other by small angles."""
+"""Field misalignment: magnet and device are turned against each other by small angles."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,4 +1,4 @@
-"""A field that is stronger at one place than at another: pull on magnets, and another torque away from the origin."""
+"""Non-uniform field: stronger at one place than at another; pull on magnets, another torque off the origin."""
 
 import warp as wp
 

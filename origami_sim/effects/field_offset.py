@@ -1,4 +1,4 @@
-"""A field that is there without command: earth, remanence of the core, a magnet nearby."""
+"""Stray field: there without command, of the earth, the core's remanence or a magnet nearby."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A field that grows in some direction, along itself or across: torque away from the origin, and pull on magnets."""
+"""Field gradient: along the field or across; torque away from the origin, and pull on magnets."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Crease of a magnetic elastomer that is stiffer, or softer, in a field."""
+"""Magnetic stiffening: a crease of a magnetic elastomer is stiffer, or softer, in a field."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Weight of the nodes."""
+"""Gravity: weight of the nodes."""
 
 import warp as wp
 

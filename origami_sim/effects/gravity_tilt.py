@@ -1,4 +1,4 @@
-"""Gravity that does not point where it was said: a tilted table, or a body that floats in part."""
+"""Gravity tilt: it does not point where it was said, as on a tilted table or where a body floats in part."""
 
 import warp as wp
 

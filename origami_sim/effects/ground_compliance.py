@@ -1,4 +1,4 @@
-"""Soft layer on the ground, or soft pads under the feet: it bears the weight before the hard ground does."""
+"""Ground compliance: a soft layer, or pads under the feet, that bears the weight before the hard ground does."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Friction that changes from place to place on the ground."""
+"""Uneven ground friction: it changes from place to place."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Extra Maxwell moment as the layers get thinner, to first order in the bend."""
+"""Layer thinning: extra Maxwell moment as the layers get thinner, to first order in the bend."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Zero of the position measurement."""
+"""Zero error of the position: what is read where the position is none."""
 
 import numpy as np
 

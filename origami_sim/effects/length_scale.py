@@ -1,4 +1,4 @@
-"""Error of the length scale."""
+"""Scale error of the length: all lengths are read too large or too small alike."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Dipoles that turn a little towards the field: particles in a soft matrix, moments off their easy axes."""
+"""Magnetic compliance: dipoles turn a little towards the field, as in a soft matrix or off their easy axes."""
 
 import warp as wp
 

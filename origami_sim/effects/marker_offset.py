@@ -1,4 +1,4 @@
-"""Marker beside the point of its panel that it stands for: the offset turns with the panel."""
+"""Marker offset: beside the point of its panel that a marker stands for; it turns with the panel."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Drag proportional to mass and velocity, the usual stand-in for air."""
+"""Mass-proportional damping: drag by mass and velocity, the usual stand-in for air."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""A panel that is heavier or lighter than its model says, in weight and in inertia."""
+"""Mass error: a panel that is heavier or lighter than its model says, in weight and in inertia."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""A dielectric stack that is stronger or weaker than its model says."""
+"""Strength error of a dielectric stack: it is stronger or weaker than its model says."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Panels that bend more, or less, than thought."""
+"""Panel flexibility error: panels that bend more, or less, than thought."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Perspective of a near camera: what comes towards it looks larger."""
+"""Camera perspective: of a near camera, so that what comes towards it looks larger."""
 
 import numpy as np
 

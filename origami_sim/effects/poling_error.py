@@ -1,4 +1,4 @@
-"""A magnet that is poled in another direction than its model says."""
+"""Poling error: a magnet that is poled in another direction than its model says."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A magnet that is stronger or weaker than its model says."""
+"""Remanence error: a magnet that is stronger or weaker than its model says."""
 
 import warp as wp
 

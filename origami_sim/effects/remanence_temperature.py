@@ -1,4 +1,4 @@
-"""Remanence that falls as the magnet warms."""
+"""Temperature-dependent remanence: it falls as the magnet warms."""
 
 import warp as wp
 

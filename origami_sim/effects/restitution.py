@@ -1,4 +1,4 @@
-"""Loss of a foot that lands: a dashpot that acts on the way in, so that the rebound is weaker than the impact."""
+"""Impact damping: of a foot that lands, a dashpot on the way in, so that it rebounds more slowly than it came."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A patch that a field magnetises: iron or a soft filler, with the field of its own poles against it."""
+"""Soft magnet: iron or a soft filler that a field magnetises, with the field of its own poles against it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Film of air or oil between a panel and the ground, which resists being squeezed and being filled."""
+"""Squeeze film: air or oil between a panel and the ground, which resists being squeezed and being filled."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Moment lost where the electroded area lifts off its substrate above a threshold voltage."""
+"""Stack buckling: moment lost where the electroded area lifts off its substrate above a threshold voltage."""
 
 import warp as wp
 

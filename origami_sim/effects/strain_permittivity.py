@@ -1,4 +1,4 @@
-"""Permittivity that falls as the layers are stretched."""
+"""Strain-dependent permittivity: it falls as the layers are stretched."""
 
 import warp as wp
 

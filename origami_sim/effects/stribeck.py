@@ -1,4 +1,4 @@
-"""Static friction that exceeds kinetic friction, and fades with the speed of sliding (Stribeck)."""
+"""Stribeck friction: static friction exceeds kinetic friction, and fades with the speed of sliding."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""The device warms and cools later than its surroundings."""
+"""Thermal lag: the device warms and cools later than its surroundings."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Leads or threads that hold a node of the device to a place in the room."""
+"""Tether: leads or threads that hold a node of the device to a place in the room."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Panels that touch each other: a spring and dashpot between what comes nearer than both thicknesses allow."""
+"""Panel contact: a spring and dashpot between what comes nearer than both thicknesses allow."""
 
 import math
 

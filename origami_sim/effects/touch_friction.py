@@ -1,4 +1,4 @@
-"""Dry friction between panels that touch: an elastic bristle that goes with both and breaks at the friction limit."""
+"""Dry friction between panels: an elastic bristle that goes with both and breaks at the friction limit."""
 
 import math
 

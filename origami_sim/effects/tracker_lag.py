@@ -1,4 +1,4 @@
-"""First-order lag of the tracker or of a smoothing filter."""
+"""Tracker lag: of first order, by the tracker or a smoothing filter."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Error of the amplifier's gain: the stack gets more or less voltage than was commanded."""
+"""Gain error of the amplifier: the stack gets more or less voltage than was commanded."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Lag of the voltage on the stack: resistance of electrodes and leads, capacitance of the layers."""
+"""Voltage lag: on the stack, by resistance of electrodes and leads and capacitance of the layers."""
 
 import numpy as np
 

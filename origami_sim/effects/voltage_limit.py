@@ -1,4 +1,4 @@
-"""A supply that charges the stack at a limited current."""
+"""Current limit of the supply: the stack is charged at a limited current."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A voltage that is there without command: offset of the amplifier."""
+"""Voltage offset: a voltage that is there without command, such as the amplifier's."""
 
 from dataclasses import replace
 

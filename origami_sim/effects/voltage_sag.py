@@ -1,4 +1,4 @@
-"""Leakage through the dielectric that pulls the voltage down the more, the higher it is."""
+"""Dielectric leakage: pulls the voltage down the more, the higher it is."""
 
 import numpy as np
 

@@ -11,7 +11,7 @@ from origami_sim.recording.units import quantity
 WHOLE = ("the measurement", "the drive", "the ground")
 """Sites that an effect's title says already."""
 
-PEOPLE = ("Coulomb", "Kelvin", "Maxwell")
+PEOPLE = ("Bouc", "Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
 """Names with which titles of effects begin; they keep their capital."""
 
 

@@ -100,7 +100,7 @@ def test_a_headline_of_many_effects_has_the_devices_first_and_leaves_intervals_t
         f = SimpleNamespace(hypothesis=Hypothesis(mine[:count]), free=free, theta=theta, **known)
         return say(f)  # type: ignore[arg-type]
 
-    places = [said(3).index(words) for words in ("dry friction", "drag of the air", "zero of the angle")]
+    places = [said(3).index(words) for words in ("dry friction", "air drag", "zero error of the angle")]
     assert places == sorted(places) and "95 %" not in said(3)
     assert said(2).startswith("dry friction") and said(2).count("95 %: ") == 2
 

@@ -168,5 +168,5 @@ def test_an_effect_at_two_sites_is_named_once():
     ends = values - 2.0 * sd, values + 2.0 * sd
     made = {"free": numbers, "theta": values, "deviations": lambda: sd, "intervals": lambda: ends}
     text = say(cast(Fit, SimpleNamespace(hypothesis=Hypothesis(tuple(suspects)), **made)))
-    assert text.count("dry friction in a crease") == 1
+    assert text.count("dry friction") == 1
     assert "at fold0 (friction moment 1.00 mN m" in text and " and at fold1 (friction moment 2.000" in text

@@ -15,12 +15,12 @@ _PLAIN_OWNERS = ("inertia", "setting")
 
 
 def words_of(label: str) -> str:
-    """An explanation in words, as "dry friction in a crease at hinge2"; of several, joined by "with"."""
+    """An explanation in words, as "dry friction at hinge2"; of several, joined by "with"."""
     return " with ".join(_effect(part) for part in label.split(SEPARATOR))
 
 
 def number_of(label: str, *, owner: bool = True) -> str:
-    """A fitted number in words: "viscosity of Kelvin-Voigt loss of a crease"; without its owner, "viscosity"."""
+    """A fitted number in words: "viscosity of viscous damping"; without its owner, "viscosity"."""
     found = _NUMBER.fullmatch(label)
     if found is None:
         return label.replace("_", " ")
