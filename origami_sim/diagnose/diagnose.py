@@ -22,10 +22,11 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect, suspects
+from origami_sim.fit.hypothesis import Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
+from origami_sim.fit.suspects import suspects
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.held_out import held_out

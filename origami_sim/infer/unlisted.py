@@ -14,9 +14,10 @@ from scipy.signal import savgol_filter
 from origami_sim.effects.crease_polynomial import EFFECT, ORDER, TERMS
 from origami_sim.fit.evidence import Group
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.hypothesis import Free, Suspect, scaled, suspects, told_apart
+from origami_sim.fit.hypothesis import Free, Suspect, scaled
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.suspects import suspects, told_apart
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns

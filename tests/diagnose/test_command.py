@@ -192,7 +192,8 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
 
 def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeypatch):
     """Another start, number, site or recording never finds a stored prediction; a damaged file is computed again."""
-    from origami_sim.fit.hypothesis import Hypothesis, suspects
+    from origami_sim.fit.hypothesis import Hypothesis
+    from origami_sim.fit.suspects import suspects
     from origami_sim.predict.bars import BarRollouts
 
     monkeypatch.setattr(cache, "WORTH", 0.0)  # however quick they are
@@ -232,8 +233,9 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeyp
 def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypatch):
     import warp as wp
 
-    from origami_sim.fit.hypothesis import Hypothesis, suspects
+    from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
+    from origami_sim.fit.suspects import suspects
     from origami_sim.fit.weights import Weights
     from origami_sim.predict.bars import BarRollouts
 

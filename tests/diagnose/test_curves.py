@@ -132,7 +132,7 @@ def test_prescribed_relaxation_is_exact():
 
 
 def suspected(forward):
-    from origami_sim.fit.hypothesis import suspects
+    from origami_sim.fit.suspects import suspects
 
     return suspects(forward.model, forward.recordings, forward.drives[0])
 

@@ -9,8 +9,9 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.fit.hypothesis import Hypothesis, suspects
+from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
+from origami_sim.fit.suspects import suspects
 from origami_sim.infer.diagnosis import REVERSAL
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.acting import _actions, acting

@@ -14,8 +14,9 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, suspects
+from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
+from origami_sim.fit.suspects import suspects
 from origami_sim.infer.held_out import folds, held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals

@@ -11,8 +11,8 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import problem, summed
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.hypothesis import suspects
 from origami_sim.fit.linear import Linearisation, Rows
+from origami_sim.fit.suspects import suspects
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import screen
