@@ -262,6 +262,11 @@ class Drive:
         )
 
     @property
+    def constant(self) -> bool:
+        """Whether no signal changes in time."""
+        return all(s.constant for s in self.signals.values())
+
+    @property
     def groups(self) -> int:
         """Number of electrode groups."""
         return sum(n.startswith("voltage_") for n in self.signals)

@@ -115,7 +115,7 @@ def _remembered(
     still = replace(model, free=np.zeros_like(model.free))
     make = lambda: Batch(still, parameters, held, State.at_rest(model, 1, position=x[:, 0]), threads=1, supports=model)  # noqa: E731
     along, fresh = make(), make()
-    out = np.zeros((arm.size, len(times)))
+    out, steady = np.zeros((arm.size, len(times))), drive.constant
     for k, t in enumerate(times.tolist()):
         where = np.ascontiguousarray(x[:, k : k + 1])
         if k:
@@ -123,7 +123,8 @@ def _remembered(
             fresh._overwrite(fresh._x, where)
         both = []
         for batch in (along, fresh):
-            batch.hold(levels(drive, t, 1))
+            if not steady:
+                batch.hold(levels(drive, t, 1))
             batch._overwrite(batch._v, np.ascontiguousarray(velocity[:, k : k + 1]))
             both.append(batch.total_force(t))
         out[:, k] = np.einsum("mna,na->m", jacobian[:, :, k], (both[0] - both[1])[:, 0])

@@ -86,8 +86,10 @@ class Prescribed(Curves):
         every = per_world(drive, levels(drive, 0.0, count))
         batch = Batch(still, parameters, every, state, threads=self.threads, among=self.shared, supports=model)
         moments = np.empty((len(q), frames, count))
+        steady = drive.constant
         for k in range(frames):
-            batch.hold(levels(drive, float(times[k]), count))
+            if not steady:
+                batch.hold(levels(drive, float(times[k]), count))
             if k:
                 batch.lead(x[:, k], HOLD if recording.by_step else float(times[k] - times[k - 1]))
             velocity = np.einsum("mnwa,m->nwa", jacobian[:, :, k], rate[:, k])
