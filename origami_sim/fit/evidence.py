@@ -30,6 +30,12 @@ ROUNDS = 4
 Without the curvature two effects that look the same would have a volume far beyond what the prior gives them.
 """
 
+STILL = 1e-9
+"""Deviations of a strength up to which a turn of the search for the mode within bounds no longer moves it.
+
+The log evidence is then off by the square of that. Half and double change it by less than rounding does.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -306,9 +312,12 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
     if not len(met[0]):
         return x, slope
     a, b, low, high = a[met], b[met], low[met], high[met]
-    y, k = np.clip(x[met], low, high), x.shape[-1]
+    found, k = np.clip(x[met], low, high), x.shape[-1]
+    known, unit, going = (a, b, low, high), STILL / np.sqrt(np.diagonal(a, axis1=1, axis2=2)), np.arange(len(a))
     for _ in range(2 * k):
-        before = y.copy()
+        a, b, low, high = (v[going] for v in known)
+        before = found[going]
+        y = before.copy()
         for i in range(k):
             force = b[:, i] - np.sum(a[:, i] * y, axis=-1)
             y[:, i] = np.clip(y[:, i] + force / a[:, i, i], low[:, i], high[:, i])
@@ -318,10 +327,13 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
         step = np.linalg.solve(free, force[..., None])[..., 0]
         room = np.where(step > 0, high - y, y - low) / np.maximum(np.abs(step), 1e-300)
         y = np.clip(y + step * np.minimum(1.0, room.min(axis=-1, initial=1.0, where=~held))[:, None], low, high)
-        if np.array_equal(y, before):
+        found[going] = y
+        going = going[np.any(np.abs(y - before) > unit[going], axis=-1)]
+        if not len(going):
             break
-    x[met] = y
-    slope[met] = np.where((y <= low) | (y >= high), b - (a @ y[..., None])[..., 0], 0.0)
+    a, b, low, high = known
+    x[met] = found
+    slope[met] = np.where((found <= low) | (found >= high), b - (a @ found[..., None])[..., 0], 0.0)
     return x, slope
 
 
