@@ -12,7 +12,17 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Pose
-from origami_sim.predict.rollouts import Motion, Rollouts, Shots, Simulated, film, joined_poses
+from origami_sim.predict.rollouts import (
+    Motion,
+    Rollouts,
+    Shots,
+    Simulated,
+    even,
+    film,
+    film_step,
+    joined_poses,
+    pictured,
+)
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
@@ -222,31 +232,63 @@ class RigidRollouts(Rollouts):
         if key not in self._moved:
             if len(self._moved) >= POINTS:
                 del self._moved[next(iter(self._moved))]
-            found = self._followed(r, world, blocks, angles, rates)
+            found = self._followed(r, world, blocks, angles, rates, None if local is None else shifts[None])
             self._moved[key] = drive, super()._motion(r, world, local) if found is None else found
-        return self._moved[key][1]
+        motion = self._moved[key][1]
+        self._films.update(motion.films if motion is not None else {})
+        return motion
 
     def _followed(
-        self, r: int, world: World, blocks: list[Block], angles: np.ndarray, rates: np.ndarray
+        self, r: int, world: World, blocks: list[Block], angles: np.ndarray, rates: np.ndarray, local: np.ndarray | None
     ) -> Motion | None:
-        """The motion of a world from segment to segment, that start at angles and rates [B, m]; None: unstable."""
+        """The motion of a world from segment to segment, that start at angles and rates [B, m]; None: unstable.
+
+        With films of the segments, which are those of segments alone but for rounding.
+
+        Args:
+            local: [1, B, L] shifts of the starts that lead there, or None.
+        """
         model, parameters = world
-        step = float(np.median(np.diff(self.recordings[r].times)))
-        x = np.moveaxis(self._placed(angles[:1].T), 0, 1)
-        begin = State.at_rest(model, position=x)
-        begin.memory[:] = self._rested(r, [world], 0, x).remembered()
-        shots = Shots(r, blocks[:1], [world], np.zeros((1, 1)), None, None, step, len(self.recordings[r].times), 0)
-        drive = self._driven(shots, model, parameters)
+        recording, step = self.recordings[r], film_step(self.recordings[r].times)
+        lasting = [b.lasting if b.reach is not None else float(b.times[-1]) for b in blocks]
+        begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
+        count = len(blocks)
+        shots = Shots(r, blocks, [world], np.zeros((1, count)), local, None, step, len(recording.times), 0)
+        starts = self._state(shots)
+        begin = State.at_rest(model, position=starts.x[:, :1], placed=True)
+        begin.memory[:] = self._rested(r, [world], 0, begin.x).remembered()
+        first = replace(shots, blocks=blocks[:1], late=np.zeros((1, 1)))
+        drive = self._driven(first, model, parameters)
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        lasting = [b.lasting if b.reach is not None else b.times[-1] for b in blocks]
-        begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
         dt = sum(lasting) / begins[-1]
-        filmed, kept = batch.film_anew(begins[-1], dt, begins[:-1], angles[:, :, None], rates[:, :, None])
+        x, turned, kept, ended = batch.film_anew(begins[-1], dt, begins[:-1], angles[:, :, None], rates[:, :, None])
+        if not np.all(np.isfinite(x)):
+            return None
         memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
-        q = np.concatenate([angles[:1].T, filmed[:, self.articulation.creases, 0].T], axis=1)
-        return Motion(self._placed(q), memory) if np.all(np.isfinite(q)) else None
+        at_first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
+        later = pictured(model, recording, x, turned)[:, :, 0]
+        films = {}
+        for n, (block, begun, end) in enumerate(zip(blocks, begins[:-1], begins[1:], strict=True)):
+            tied = block.reach is not None
+            arrived = None
+            if tied:
+                after, q = blocks[n + 1], turned[end - 1, self.articulation.creases, 0]
+                arrived = np.append(turned_by(q - after.pose.angles[:, 0]), ended[n + 1, :, 0] - after.rates)[None]
+            own = replace(
+                shots,
+                blocks=[block],
+                late=np.zeros((1, 1)),
+                local=None if local is None else local[:, n : n + 1],
+                memory=kept[n],
+                step=even(step, block.lasting, end - begun) if tied else step,
+                frames=end - begun + 1,
+                ends=end - begun if tied else 0,
+            )
+            (key,) = self._film_keys(own)
+            films[key] = block, self.drives[r], np.concatenate([at_first[None, :, n], later[begun:end]]), arrived
+        return Motion(np.concatenate([begin.x[None, :, 0], x[:, :, 0]]), memory, films)
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""
@@ -273,12 +315,16 @@ def shift_between(base: Pose, pose: Pose, floating: bool) -> np.ndarray:
     """Small displacement [m, W] of the coordinates that leads from one pose to another; angles by less than a turn."""
     from scipy.spatial.transform import Rotation
 
-    angles = pose.angles - base.angles
-    angles = angles - 2 * np.pi * np.round(angles / (2 * np.pi))
+    angles = turned_by(pose.angles - base.angles)
     if not floating:
         return angles
     turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
     return np.concatenate([(pose.centre - base.centre).T, turn.T, angles])
+
+
+def turned_by(angles: np.ndarray) -> np.ndarray:
+    """Differences of angles by less than a turn."""
+    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
 
 
 def check_tree(tree: Topology, floating: bool) -> None:

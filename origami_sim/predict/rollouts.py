@@ -103,10 +103,12 @@ class Motion:
 
     Attributes:
         positions: [F, N, 3] of all frames [m]. memory: (M,) of the world that moved so, by first frame, where known.
+        films: of its segments, where known, see `RigidRollouts`.
     """
 
     positions: np.ndarray
     memory: dict[int, np.ndarray] = field(default_factory=dict)
+    films: dict[tuple, tuple] = field(default_factory=dict)
 
 
 class Rollouts(Worlds, ABC):
@@ -264,8 +266,8 @@ class Rollouts(Worlds, ABC):
         model, times = worlds[0][0], blocks[0].times
         step = film_step(recording.times)
         ends = round(blocks[0].lasting / step)
-        if ends:  # the next block begins at a frame of the film
-            step = blocks[0].lasting / ends
+        if ends:
+            step = even(step, blocks[0].lasting, ends)
         begins = recording.times[[b.first for b in blocks]] - recording.times[0]
         once = Parameters.join([p for _, p in worlds])
         late, shown = lateness(model, once, k, begins, self.start == "fit")
@@ -526,6 +528,11 @@ def film_step(times: np.ndarray) -> float:
     if np.all(np.abs(steps / usual - np.round(steps / usual)) < 0.1):
         return usual
     return max(float(steps.min()), float(times[-1] - times[0]) / (FINER * len(times)))
+
+
+def even(step: float, lasting: float, frames: int) -> float:
+    """A step [s] by which the next block begins at a frame of the film: the usual one, but for more than rounding."""
+    return step if abs(frames * step - lasting) < 1e-9 * lasting else lasting / frames
 
 
 def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):

@@ -493,10 +493,11 @@ def test_a_held_sheet_starts_anew_with_what_its_laws_remember():
     arm, state = Articulation(model), cut.state()
     pose = arm.poses_of(state.x, state.angles)
     rates = arm.rates_of(pose, state.x, state.v)
-    other, kept = cut.film_anew(30, 0.01, [0], pose.angles[None], rates[None])
+    _, other, kept, before = cut.film_anew(30, 0.01, [0], pose.angles[None], rates[None])
     one = whole.film(30, 1, 0.01, np.inf)[1]
     assert np.ptp(one, axis=0).max() > 0.5
     assert np.abs(one - other).max() < 1e-6
+    assert np.abs(before[0] - rates).max() < 1e-9 < np.abs(rates).max()
     assert np.abs(kept[0] - state.memory).max() < 1e-12 < np.abs(kept[0]).max()
     floating = Sheet(strip([0.03, 0.03], 0.03), thickness=2e-3, panels="rigid").crease(stiffness=2e-3)
     free = RigidBatch(*(made := floating.build()), Drive(), State.at_rest(made[0]))
@@ -510,11 +511,11 @@ def again_and_again(device: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
     state, moved = State.join([state, folded(model, [0.4, 0.2])]), np.array([[0.3, -0.2], [0.1, 0.5]])
     when, angles, rates = [7, 19], np.stack([moved, -moved]), np.stack([4.0 * moved, moved])
     one, other = (RigidBatch(model, parameters, drive, state, device=device, tolerance=1e-8) for _ in range(2))
-    film, kept = one.film_anew(30, 0.01, when, angles, rates)
+    _, film, kept, _ = one.film_anew(30, 0.01, when, angles, rates)
     parts, memories = [other.film(7, 1, 0.01, np.inf)[1]], []
     for n, frames in enumerate((12, 11)):
         memories.append(other.remembered())
-        parts.append(other.film_anew(frames, 0.01, [0], angles[n : n + 1], rates[n : n + 1])[0])
+        parts.append(other.film_anew(frames, 0.01, [0], angles[n : n + 1], rates[n : n + 1])[1])
     return [film, np.concatenate(parts)], [kept, np.stack(memories)]
 
 

@@ -56,10 +56,10 @@ class Tree:
     stabilisation: scalar  # rate at which an open loop closes [1/s]
     softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
     tableau: wp.array2d(dtype=scalar)  # [STAGES + 1, STAGES + 1] time, then weights; the last row is the error's
-    # steps at whose begin a held tree moves on from elsewhere, R of them; what memory was before
+    # steps at whose begin a held tree moves on from elsewhere, R of them; what memory and rates were before
     restarts: wp.array(dtype=wp.int32)
     starts: wp.array2d(dtype=scalar)  # [R 2 J, W] coordinates, then rates
-    kept: wp.array2d(dtype=scalar)  # [R M, W]
+    kept: wp.array2d(dtype=scalar)  # [R (M + J), W]
     # bodies
     reference: int  # [N, 3] nodes
     middle: int  # [3] the root's centre

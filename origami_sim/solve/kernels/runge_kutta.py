@@ -133,11 +133,17 @@ def carry_over(tree: Tree, work: wp.array2d(dtype=scalar), step: scalar, w: int)
 
 @wp.func
 def restart(tree: Tree, angles: wp.array2d(dtype=scalar), memory: wp.array2d(dtype=scalar), n: int, w: int):
-    """Moves on from the n-th of other starts, with what laws remember, which is kept as well."""
+    """Moves on from the n-th of other starts, as a batch would that begins there, with what laws remember.
+
+    Kept are that memory, and the rates before.
+    """
     s = tree.data
     o = w * tree.width
     joints = tree.bodies - 1
+    first = n * (tree.memories + joints)
+    s[(o + tree.span) & NATURAL] = scalar(wp.inf)
     for i in range(joints):
+        tree.kept[(first + tree.memories + i) & NATURAL, w] = at(s, o + tree.u + i)
         s[(o + tree.y + POSE + i) & NATURAL] = tree.starts[(2 * n * joints + i) & NATURAL, w]
         s[(o + tree.u + i) & NATURAL] = tree.starts[((2 * n + 1) * joints + i) & NATURAL, w]
     for r in range(tree.joint_of.shape[0]):
@@ -145,7 +151,7 @@ def restart(tree: Tree, angles: wp.array2d(dtype=scalar), memory: wp.array2d(dty
         if j >= 0:
             angles[r, w] = at(s, o + tree.start + r) + at(s, o + tree.y + POSE + j)
     for i in range(tree.memories):
-        tree.kept[(n * tree.memories + i) & NATURAL, w] = memory[i, w]
+        tree.kept[(first + i) & NATURAL, w] = memory[i, w]
 
 
 @wp.func

@@ -183,13 +183,14 @@ class RigidBatch(Batch):
 
     def film_anew(
         self, frames: int, dt: float, when: Sequence[int], angles: np.ndarray, rates: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Films steps of dt [s], and moves on from elsewhere at the begin of some, with what laws remember.
 
         Args:
             when: (R,) of which, counted from 0. angles, rates: [R, J, W] of the joints then.
 
-        Returns: hinge angles [F, C + Q, W] [rad], and memory [R, M, W] there.
+        Returns: positions [F, N, W, 3] [m] and hinge angles [F, C + Q, W] [rad], memory [R, M, W] there, and rates
+            [R, J, W] before.
 
         Raises:
             InputError: panels that nothing holds.
@@ -202,11 +203,12 @@ class RigidBatch(Batch):
         starts = np.concatenate([angles - self._begun, rates], axis=1)
         tree.restarts = wp.array(np.asarray(when, np.int32), dtype=wp.int32, device=self.device)
         tree.starts = self._upload(starts.reshape(-1, self.worlds), wp.float64)
-        tree.kept = self._room(max(count * tree.memories, 1), dtype=wp.float64)
-        filmed = self.film(frames, 1, dt, np.inf)[1]
-        kept = tree.kept.numpy()[: count * tree.memories, : self.worlds].reshape(count, tree.memories, self.worlds)
+        rows = tree.memories + angles.shape[1]
+        tree.kept = self._room(max(count * rows, 1), dtype=wp.float64)
+        x, turned = self.film(frames, 1, dt, np.inf)
+        kept = tree.kept.numpy()[: count * rows, : self.worlds].reshape(count, rows, self.worlds)
         tree.restarts = wp.zeros(0, dtype=wp.int32, device=self.device)
-        return filmed, kept
+        return x, turned, kept[:, : tree.memories], kept[:, tree.memories :]
 
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried, notes=()):
         fixed = self.tolerance == 0.0
