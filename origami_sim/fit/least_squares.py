@@ -208,10 +208,17 @@ def links(forward: Predictor, blocks: Sequence[int]) -> list[tuple[bool, bool]]:
     return [(tied(b - 1), tied(b)) for b in blocks]
 
 
-def changed(forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int]) -> list[np.ndarray]:
-    """Per block, whitened changes [K - 1, r] of what is predicted, from the first world to each of the others."""
-    out, every = [], [forward.blocks[b] for b in blocks]
-    rows = [block.rows(*link) for block, link in zip(every, links(forward, blocks), strict=True)]
+def changed(
+    forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int], among: Sequence[int] | None = None
+) -> list[np.ndarray]:
+    """Per block, whitened changes [K - 1, r] of what is predicted, from the first world to each of the others.
+
+    Args:
+        among: blocks to which these are tied (default: to each other).
+    """
+    among, out, every = among or blocks, [], [forward.blocks[b] for b in blocks]
+    tied = dict(zip(among, links(forward, among), strict=True))
+    rows = [block.rows(*tied[b]) for b, block in zip(blocks, every, strict=True)]
     gaps = [np.where(b.seen(), v[1:] - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
     white = whitened(weights, gaps, rows)
     for block, own, gap, data, ends in zip(every, rows, gaps, white, shot.ends, strict=True):

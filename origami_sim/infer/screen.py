@@ -29,6 +29,13 @@ field of 0.6 ms then promises 23 less, in log evidence, than its fit has. Half a
 probability of four swings by more than 0.010.
 """
 
+SPARSE = 8
+"""One of so many segments tells how much a suspect changes at a strength, before all are simulated."""
+
+ASTRAY = 10.0
+"""What a signature may change at a strength that these segments told, over what a fit misses: few of them may tell too
+little of what acts at times."""
+
 CHUNK = 6
 """Suspects that are simulated together, so that progress shows and cores share them."""
 
@@ -179,17 +186,39 @@ def _signatures(
     """Signatures of suspects' first strengths, simulated together, such that they change about as much as `goal`."""
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
-    parts = _changes(forward, group, size, base, weights)
-    norm = np.array([np.linalg.norm(np.concatenate(p)) for p in parts])
-    loud = np.where(norm == 0.0, 0.01, np.clip(np.nan_to_num(norm / goal, nan=100.0), 1e-4, 1e4))
-    redo: list[int] = np.flatnonzero((loud < LEAST) | (loud > MOST)).tolist()
-    for k in redo:
-        size[k] = _affordable(forward, base, group[k], size[k] / loud[k], least)
-    if redo:
-        again = _changes(forward, [group[k] for k in redo], size[redo], base, weights)
+    some = _some(forward, base.blocks)
+    if some:
+        share = np.sqrt(len(some) / len(base.blocks))
+        found = _changes(forward, group, size, base, weights, some)
+        size = _suiting(forward, base, group, size, found, share * goal, least)
+    parts = _changes(forward, group, size, base, weights, base.blocks)
+    suits = _suiting(forward, base, group, size, parts, goal, least, again=bool(some))
+    if redo := np.flatnonzero(suits != size).tolist():
+        again = _changes(forward, [group[k] for k in redo], suits[redo], base, weights, base.blocks)
         for k, new in zip(redo, again, strict=True):
-            parts[k] = new
+            parts[k], size[k] = new, suits[k]
     return [Signature(s, [c[:, None] for c in p], np.array([z])) for s, z, p in zip(group, size, parts, strict=True)]
+
+
+def _some(forward: Predictor, blocks: Sequence[int]) -> Sequence[int]:
+    """Every eighth segment; none where recordings have few."""
+    recordings = {forward.blocks[b].recording for b in blocks}
+    return blocks[SPARSE // 2 :: SPARSE] if len(blocks) >= 2 * SPARSE * len(recordings) else ()
+
+
+def _suiting(
+    forward: Predictor, base: Fit, group: Sequence[Suspect], size, parts, goal: float, least: float, *, again=False
+):
+    """Strengths at which suspects change about as much as is missed, by what they change at strengths `size`.
+
+    If `again`, these are such strengths already, by what some segments told.
+    """
+    norm = np.array([np.linalg.norm(np.concatenate(p)) for p in parts])
+    silent, most = (1.0, ASTRAY) if again else (0.01, MOST)
+    loud = np.where(norm == 0.0, silent, np.clip(np.nan_to_num(norm / goal, nan=100.0), 1e-4, 1e4))
+    suits = [LEAST <= by <= most for by in loud]
+    each = zip(group, size, loud, suits, strict=True)
+    return np.array([z if well else _affordable(forward, base, s, z / by, least) for s, z, by, well in each])
 
 
 def _missed(forward: Predictor, base: Fit, weights: Weights) -> float:
@@ -225,7 +254,9 @@ def _admissible(s: Suspect, change: float) -> float:
     return float(np.clip(f.start + change, f.lower, f.upper) - f.start) or f.scale
 
 
-def _changes(forward: Predictor, group, size, base: Fit, weights: Weights) -> list[list[np.ndarray]]:
+def _changes(
+    forward: Predictor, group, size, base: Fit, weights: Weights, blocks: Sequence[int]
+) -> list[list[np.ndarray]]:
     """Per suspect and block, what it changes in the predictions [r]; nan where the simulation fails.
 
     Suspects that need the same step of the solver, within a factor of two, are simulated together.
@@ -244,9 +275,9 @@ def _changes(forward: Predictor, group, size, base: Fit, weights: Weights) -> li
             [base.hypothesis, *(hypotheses[k] for k in mine)],
             [base.theta, *(thetas[k] for k in mine)],
             np.repeat(base.local[None], 1 + len(mine), axis=0),
-            base.blocks,
+            blocks,
         )
-        for part in changed(forward, shot, weights, base.blocks):
+        for part in changed(forward, shot, weights, blocks, base.blocks):
             for k, row in zip(mine, part, strict=True):
                 out[k].append(row)
     return out

@@ -11,6 +11,7 @@ import pytest
 from diagnose.swings import FRICTION, NOISE, QUICK, SIDECAR, WAVE, T, main, recorded_drive, single, swing, table
 
 import origami_sim
+from origami_sim import threads
 from origami_sim.device.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
 from origami_sim.diagnose.observed import assumed
@@ -168,6 +169,7 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
         if stage == "verdict":
             raise KeyboardInterrupt
 
+    monkeypatch.setattr(threads, "default_threads", lambda: 1)  # each process counts what it finds itself
     arguments = ("diagnose", recorded, "--model", "pendulum_chain", "--out", tmp_path / "out", *QUICK)
     with monkeypatch.context() as m:
         m.setattr(command.Progress, "__call__", interrupted)
