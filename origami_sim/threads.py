@@ -59,6 +59,11 @@ def leads() -> bool:
     return _team is None or _busy or _team.rank == 0
 
 
+def sharing() -> int:
+    """Processes that share what comes next, this one among them."""
+    return 1 if _team is None or _busy else len(_team.boards)
+
+
 def told(make: Callable[[], T]) -> T:
     """What the process that leads makes, known to all that go in step with it; it has to be picklable."""
     return make() if _team is None or _busy else _team.share([make], 0, lambda part: None)[0]

@@ -20,9 +20,8 @@ from origami_sim.observation.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous
-from origami_sim.predict.rollouts import distinct_motions
 from origami_sim.predict.track import coordinates
-from origami_sim.predict.worlds import World, Worlds
+from origami_sim.predict.worlds import World, Worlds, distinct_motions
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.settling import coupled, levels, per_world, settling

@@ -54,9 +54,14 @@ def refined(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return fine, CubicSpline(times, values)(fine)
 
 
-def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> Drive:
-    """The drive seen from several starts [s], one world for each; the set of worlds is repeated."""
-    if not np.any(starts):
+def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int, among: np.ndarray | None = None) -> Drive:
+    """The drive seen from several starts [s], one world for each; the set of worlds is repeated.
+
+    Args:
+        among: starts of all worlds for which it is sampled alike (default: of these).
+    """
+    among = starts if among is None else among.ravel()
+    if not np.any(among):
         return drive
     changed = {}
     for name, s in drive.signals.items():
@@ -65,7 +70,7 @@ def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int) -> D
         wave = Signal(offset=s.offset, amplitude=s.amplitude, frequency=s.frequency, phase=s.phase)
         local = wave.sampled(duration) if np.any(s.amplitude) else np.array([0.0, duration])
         if s.times is not None:
-            local = np.unique(np.concatenate([local, _knots(s.times, starts, duration)]))
+            local = np.unique(np.concatenate([local, _knots(s.times, among, duration)]))
         values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
         changed[name] = series(local, np.tile(values, (1, repeat)))
     age = np.squeeze(drive.signals["origin"](0.0))

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from origami_sim.drive import Drive
+from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
@@ -128,7 +129,7 @@ class RigidRollouts(Rollouts):
         It is the point about which derivatives are taken, where a fit has just been. Worlds are the same to the last
         digit whatever others run beside them, unless some are late, which has them all driven in another way.
         """
-        keys = [] if np.any(shots.late) else self._film_keys(shots)
+        keys = [] if shots.late is not None else self._film_keys(shots)
         known = [self._films[k] for k in keys if k in self._films]
         count = len(shots.blocks)
         some = bool(keys) and len(known) == len(keys)
@@ -142,7 +143,6 @@ class RigidRollouts(Rollouts):
             others = replace(
                 shots,
                 worlds=shots.worlds[1:],
-                late=shots.late[1:],
                 local=None if shots.local is None else shots.local[1:],
                 memory=None if shots.memory is None else shots.memory[:, count:],
             )
@@ -229,6 +229,7 @@ class RigidRollouts(Rollouts):
         begins = tuple((b.first, b.lasting, b.times[-1]) for b in blocks)
         (model, parameters), drive = world, self.drives[r]
         key = (r, id(drive), begins, model.hash, parameters.hash, angles.tobytes(), rates.tobytes())
+        key += (b"" if local is None else shifts.tobytes(),)  # by which its films are known
         if key not in self._moved:
             if len(self._moved) >= POINTS:
                 del self._moved[next(iter(self._moved))]
@@ -252,12 +253,11 @@ class RigidRollouts(Rollouts):
         recording, step = self.recordings[r], film_step(self.recordings[r].times)
         lasting = [b.lasting if b.reach is not None else float(b.times[-1]) for b in blocks]
         begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
-        count = len(blocks)
-        shots = Shots(r, blocks, [world], np.zeros((1, count)), local, None, step, len(recording.times), 0)
+        shots = Shots(r, blocks, [world], None, local, None, step, len(recording.times), 0)
         starts = self._state(shots)
         begin = State.at_rest(model, position=starts.x[:, :1], placed=True)
         begin.memory[:] = self._rested(r, [world], 0, begin.x).remembered()
-        first = replace(shots, blocks=blocks[:1], late=np.zeros((1, 1)))
+        first = replace(shots, blocks=blocks[:1])
         drive = self._driven(first, model, parameters)
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
@@ -267,28 +267,29 @@ class RigidRollouts(Rollouts):
         if not np.all(np.isfinite(x)):
             return None
         memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
+        path = np.concatenate([begin.x[None, :, 0], x[:, :, 0]])
+        steady = all(s.constant for s in self.drives[r].signals.values())
+        if not steady or any(get(e).family == "drive" for e in model.effects):
+            return Motion(path, memory)  # a segment alone sees the drive at instants of its own
         at_first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
         later = pictured(model, recording, x, turned)[:, :, 0]
+        kinds: dict[tuple, list[int]] = {}
+        for n, (block, frames) in enumerate(zip(blocks, np.diff(begins).tolist(), strict=True)):
+            ends = frames if block.reach is not None else 0
+            kinds.setdefault((even(step, block.lasting, ends) if ends else step, frames + 1, ends), []).append(n)
         films = {}
-        for n, (block, begun, end) in enumerate(zip(blocks, begins[:-1], begins[1:], strict=True)):
-            tied = block.reach is not None
-            arrived = None
-            if tied:
-                after, q = blocks[n + 1], turned[end - 1, self.articulation.creases, 0]
-                arrived = np.append(turned_by(q - after.pose.angles[:, 0]), ended[n + 1, :, 0] - after.rates)[None]
-            own = replace(
-                shots,
-                blocks=[block],
-                late=np.zeros((1, 1)),
-                local=None if local is None else local[:, n : n + 1],
-                memory=kept[n],
-                step=even(step, block.lasting, end - begun) if tied else step,
-                frames=end - begun + 1,
-                ends=end - begun if tied else 0,
-            )
-            (key,) = self._film_keys(own)
-            films[key] = block, self.drives[r], np.concatenate([at_first[None, :, n], later[begun:end]]), arrived
-        return Motion(np.concatenate([begin.x[None, :, 0], x[:, :, 0]]), memory, films)
+        for (h, frames, ends), mine in kinds.items():
+            shifts, then = None if local is None else local[:, mine], kept[mine, :, 0].T
+            each = [blocks[n] for n in mine]
+            own = replace(first, blocks=each, local=shifts, memory=then, step=h, frames=frames, ends=ends)
+            for n, key in zip(mine, self._film_keys(own), strict=True):
+                arrived, end = None, begins[n + 1]
+                if ends:
+                    after, q = blocks[n + 1], turned[end - 1, self.articulation.creases, 0]
+                    arrived = np.append(turned_by(q - after.pose.angles[:, 0]), ended[n + 1, :, 0] - after.rates)[None]
+                raw = np.concatenate([at_first[None, :, n], later[begins[n] : end]])
+                films[key] = blocks[n], self.drives[r], raw, arrived
+        return Motion(path, memory, films)
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""

@@ -24,11 +24,11 @@ from origami_sim.predict.measured import continuous, lateness, measured, read_un
 from origami_sim.predict.starts import CAREFUL, NEAR, Reading, channel_tangent, read_start, seen_first, spans
 from origami_sim.predict.stated import stated
 from origami_sim.predict.track import coordinates
-from origami_sim.predict.worlds import World, Worlds
+from origami_sim.predict.worlds import World, Worlds, distinct_memories, distinct_motions
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import batch_of
-from origami_sim.threads import default_threads, shared, side_by_side
+from origami_sim.threads import default_threads, shared, sharing, side_by_side
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
@@ -46,10 +46,10 @@ FILMED = 64e6
 """Bytes of positions that are kept before they are read; more would not be faster."""
 
 TOGETHER, PARTS = 1024, 2
-"""Rollouts that are made at once, at most, and parts into which segments are cut, at least, for cores to share.
+"""Rollouts that are made at once, at most, and parts into which segments are cut where no processes go in step.
 
-With a quarter or four times as many rollouts, memory or overhead costs a twentieth more. A part costs 5 ms; in one part
-all cores but one wait for the single predictions of a fit, in four more than two gain little.
+With a quarter or four times as many rollouts, memory or overhead costs a twentieth more. A part costs 5 ms, so that
+processes in step make one each.
 """
 
 READ = 30
@@ -62,22 +62,24 @@ class Shots:
 
     Attributes:
         recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
-            [s]. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
+            [s]; None: none of all is. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
             step: between frames [s]. frames: of each rollout. ends:
             the frame at which the next blocks begin; 0: none is tied to them. clocked: whether a clock runs fast or
-            slow, so that they begin a little before or after that frame. threads: see `Batch`.
+            slow, so that they begin a little before or after that frame. begun: times at which these and all others of
+            their kind begin [s]; None: these alone. threads: see `Batch`.
     """
 
     recording: int
     blocks: list[Block]
     worlds: list[World]
-    late: np.ndarray
+    late: np.ndarray | None
     local: np.ndarray | None
     memory: np.ndarray | None
     step: float
     frames: int
     ends: int
     clocked: bool = False
+    begun: np.ndarray | None = None
     threads: int | None = None
 
 
@@ -206,7 +208,7 @@ class Rollouts(Worlds, ABC):
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))
         values: dict[int, np.ndarray] = {}
         ends: dict[int, np.ndarray | None] = {}
-        jobs, parts = [], []
+        jobs, parts, alone = [], [], (self.threads or default_threads()) == 1
         for r in range(len(self.recordings)):
             mine = [b for b in wanted if self.blocks[b].recording == r]
             if not mine:
@@ -214,11 +216,12 @@ class Rollouts(Worlds, ABC):
             worlds, impossible = self.worlds_of(each, theta, effects, r)
             first = None if local is None else local[0]
             memories = self._memories(r, worlds, [self.blocks[b] for b in mine], first)
-            for group in _by_length(self.blocks, mine):  # into parts, the same on any number of threads
-                most = max(1, min(TOGETHER // len(worlds), -(-len(group) // PARTS)))
+            for group in _by_length(self.blocks, mine):
+                count = sharing() if sharing() > 1 or alone else PARTS
+                most = max(1, min(TOGETHER // len(worlds), -(-len(group) // count)))
                 for part in (group[k : k + most] for k in range(0, len(group), most)):
                     parts.append((r, part, impossible))
-                    jobs.append(partial(self._roll, r, part, worlds, local, memories))
+                    jobs.append(partial(self._roll, r, group, part, worlds, local, memories))
         cores = -(-(self.threads or default_threads()) // max(len(jobs), 1))
         rolled = side_by_side([partial(job, cores) for job in jobs], self.threads)
         for (r, part, impossible), (made, arrived, first) in zip(parts, rolled, strict=True):
@@ -256,23 +259,26 @@ class Rollouts(Worlds, ABC):
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """See `Predictor.step`."""
 
-    def _roll(self, r: int, group: list[int], worlds: list[World], local, memories, threads: int):
+    def _roll(self, r: int, group: list[int], part: list[int], worlds: list[World], local, memories, threads: int):
         """Per block values [K, n, D] and ends [K, L] of the worlds, and what `_keep` keeps of their rollouts.
 
-        Batches run over worlds, then blocks.
+        Batches run over worlds, then blocks. What is asked of all blocks of a group does not depend on its parts, so
+        that bytes do not either.
         """
-        recording, blocks = self.recordings[r], [self.blocks[b] for b in group]
+        recording, every = self.recordings[r], [self.blocks[b] for b in group]
+        blocks, mine = [self.blocks[b] for b in part], [group.index(b) for b in part]
         k, count = len(worlds), len(blocks)
-        model, times = worlds[0][0], blocks[0].times
+        model, times, lasting = worlds[0][0], every[0].times, every[0].lasting
         step = film_step(recording.times)
-        ends = round(blocks[0].lasting / step)
+        ends = round(lasting / step)
         if ends:
-            step = even(step, blocks[0].lasting, ends)
-        begins = recording.times[[b.first for b in blocks]] - recording.times[0]
+            step = even(step, lasting, ends)
+        begins = recording.times[[b.first for b in every]] - recording.times[0]
         once = Parameters.join([p for _, p in worlds])
         late, shown = lateness(model, once, k, begins, self.start == "fit")
-        longer = lateness(model, once, k, begins + blocks[0].lasting, self.start == "fit")[0] - late
+        longer = lateness(model, once, k, begins + lasting, self.start == "fit")[0] - late
         clocked = bool(ends and np.any(longer))
+        begun = begins + late if np.any(late) else begins
         distort = [e for e in model.effects if get(e).family == "measurement"]
         frames = len(times)
         timed = any(not get(e).channels for e in distort)  # what reads angles or places has no time of its own
@@ -280,7 +286,7 @@ class Rollouts(Worlds, ABC):
         if not as_filmed:
             last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
             frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
-        starts = None if local is None else local[:, group]
+        starts = None if local is None else local[:, part]
         moves, of = distinct_motions(worlds, late, starts)
         some = None if starts is None else starts[moves]
         memory = None
@@ -289,12 +295,26 @@ class Rollouts(Worlds, ABC):
             memory = first.reshape(len(first), -1)
         chosen = [worlds[m] for m in moves]
         frames = max(frames, ends + 2 if clocked else ends + 1)
-        shots = Shots(r, blocks, chosen, late[moves], some, memory, step, frames, ends, clocked, threads)
+        here = np.ix_(moves, mine) if np.any(late) else None
+        shots = Shots(
+            r,
+            blocks,
+            chosen,
+            None if here is None else late[here],
+            some,
+            memory,
+            step,
+            frames,
+            ends,
+            clocked,
+            begun,
+            threads,
+        )
         simulated = self._filmed(shots)
         raw, arrived = simulated.raw, simulated.arrived
         turning = angle_mask(recording)
-        begun = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
-        continuous(raw[:, : len(turning)], turning, begun)
+        first_seen = np.tile(np.stack([_begin(b) for b in blocks]), (len(moves), 1)).T
+        continuous(raw[:, : len(turning)], turning, first_seen)
         columns = (of[:, None] * count + np.arange(count)).ravel()
         channels = raw[:, :, columns]
         plain = channels[:, : len(turning)]  # without the depths
@@ -311,7 +331,7 @@ class Rollouts(Worlds, ABC):
         tied = None
         if arrived is not None:
             near = arrived[..., columns]
-            tied = (carried(near, longer.ravel(), step) if clocked else near[0]).reshape(-1, k, count)
+            tied = (carried(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
         return (
             [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
             None if tied is None else [tied[:, :, b].T for b in range(count)],
@@ -330,10 +350,10 @@ class Rollouts(Worlds, ABC):
         recording, span = self.recordings[shots.recording], shots.frames * shots.step
         begins = recording.times[[b.first for b in shots.blocks]] - recording.times[0]
         given = self.drives[shots.recording]
-        if np.any(shots.late):
-            drive = shifted(given, (begins + shots.late).ravel(), span, 1)
+        if shots.late is not None:
+            drive = shifted(given, (begins + shots.late).ravel(), span, 1, shots.begun)
         else:
-            drive = shifted(given, begins, span, len(shots.worlds))
+            drive = shifted(given, begins, span, len(shots.worlds), shots.begun)
         return distorted(model, parameters, drive, span)
 
     def _state(self, shots: Shots) -> State:
@@ -473,36 +493,6 @@ def joined_poses(poses: Sequence[Pose]) -> Pose:
         np.concatenate([p.centre for p in poses]),
         np.concatenate([p.angles for p in poses], axis=1),
     )
-
-
-def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
-    """Worlds of which no two remember the same motion differently, and (K,) which of them each world is like."""
-    telling = {e for e in worlds[0][0].effects if get(e).memory or get(e).family == "drive"}
-    found: dict[bytes, int] = {}
-    of = [
-        found.setdefault(b"".join(parameters[p].tobytes() for p in parameters if p[0] in telling), len(found))
-        for _, parameters in worlds
-    ]
-    return [of.index(n) for n in range(len(found))], np.array(of)
-
-
-def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:
-    """Worlds of which no two move alike, and (K,) which of them each world moves like: a measurement moves nothing.
-
-    Args:
-        more: what else makes worlds differ, [K, ...] each.
-    """
-    shown = {e for e in worlds[0][0].effects if get(e).family == "measurement"}
-    found: dict[tuple, int] = {}
-    first, of = [], []
-    for k, (model, parameters) in enumerate(worlds):
-        felt = b"".join(parameters[p].tobytes() for p in parameters if p[0] not in shown)
-        key = (model.position.tobytes(), felt, *(m[k].tobytes() for m in more if m is not None))
-        if key not in found:
-            found[key] = len(first)
-            first.append(k)
-        of.append(found[key])
-    return first, np.array(of)
 
 
 def carried(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:

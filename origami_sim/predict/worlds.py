@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from origami_sim.drive import Drive
+from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.begun import within
 from origami_sim.fit.hypothesis import Hypothesis, Subject, apply
@@ -128,3 +129,33 @@ class Worlds(ABC):
             return model, parameters
         richer = model.with_effects(*effects)
         return richer, apply(parameters, hypothesis, values[count:], richer)
+
+
+def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two remember the same motion differently, and (K,) which of them each world is like."""
+    telling = {e for e in worlds[0][0].effects if get(e).memory or get(e).family == "drive"}
+    found: dict[bytes, int] = {}
+    of = [
+        found.setdefault(b"".join(parameters[p].tobytes() for p in parameters if p[0] in telling), len(found))
+        for _, parameters in worlds
+    ]
+    return [of.index(n) for n in range(len(found))], np.array(of)
+
+
+def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:
+    """Worlds of which no two move alike, and (K,) which of them each world moves like: a measurement moves nothing.
+
+    Args:
+        more: what else makes worlds differ, [K, ...] each.
+    """
+    shown = {e for e in worlds[0][0].effects if get(e).family == "measurement"}
+    found: dict[tuple, int] = {}
+    first, of = [], []
+    for k, (model, parameters) in enumerate(worlds):
+        felt = b"".join(parameters[p].tobytes() for p in parameters if p[0] not in shown)
+        key = (model.position.tobytes(), felt, *(m[k].tobytes() for m in more if m is not None))
+        if key not in found:
+            found[key] = len(first)
+            first.append(k)
+        of.append(found[key])
+    return first, np.array(of)

@@ -78,14 +78,15 @@ def test_all_frames_are_compared_and_each_segment_begins_where_the_one_before_en
 @pytest.mark.parametrize("effect", ["", "crease_friction"])
 def test_predictions_are_the_same_bytes_on_any_number_of_threads(tied, monkeypatch, effect):
     """Also where the segments are rolled out in several parts, and laws remember what was before them."""
-    monkeypatch.setattr(rollouts, "TOGETHER", 7)  # two segments of three worlds
+    monkeypatch.setattr(rollouts, "TOGETHER", 10)  # three segments of three worlds
     every = tied.admitted(suspects(tied.model, tied.recordings, tied.drive, tied.parameters))
     h = Hypothesis(tuple(s for s in every if s.effect == effect and s.entities is None))
     free = [*tied.subject.nominals, *h.free]
     thetas = np.array([[f.start + k * f.scale for f in free] for k in range(3)])
     made = []
-    for threads in (1, 2, 5):
+    for threads, processes in ((1, 1), (2, 1), (5, 1), (1, 2), (1, 4)):
         monkeypatch.setattr(tied, "threads", threads)
+        monkeypatch.setattr(rollouts, "sharing", lambda processes=processes: processes)
         tied._moved.clear()
         tied._films.clear()
         made.append(tied.shoot(h, thetas, np.zeros((3, len(tied.blocks), tied.local))))
