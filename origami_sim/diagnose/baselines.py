@@ -73,21 +73,21 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
         return without("needs segments in two halves, and frames outside of each")
     learners = {"sparse regression (STLSQ)": _sparse, "Gaussian process": _process}
     parts = list(zip(halves, told, moved, strict=True))
-    tried = iter(shared([partial(_tried, forward, weights, learn, *p) for learn in learners.values() for p in parts]))
+    learnt = iter(shared([partial(_learnt, forward, learn, h, m) for learn in learners.values() for h, _, m in parts]))
     for name in learners:
-        squares, seen, terms = zip(*(next(tried) for _ in parts), strict=True)
+        missed, said = [], []
+        for held, known, _ in parts:  # one after the other: of each fit all cores make a part
+            tables, words = next(learnt)
+            missed.append(_missed(forward, known, tables, held, weights))
+            said.append(words)
+        squares, seen = zip(*missed, strict=True)
         rms = np.sqrt(sum(squares) / np.maximum(sum(seen), 1))
-        out.append(Baseline(name, np.atleast_1d(rms).tolist(), terms[0]))
+        out.append(Baseline(name, np.atleast_1d(rms).tolist(), said[0]))
     return out
 
 
-def _tried(
-    forward: Predictor, weights: Weights, learn: Callable, held: list[int], known: Fit, motions
-) -> tuple[np.ndarray, np.ndarray, str]:
-    """What a learnt correction misses on segments that are held out: squares (D,), how many, and what it is in words.
-
-    Not a number where it cannot be simulated.
-    """
+def _learnt(forward: Predictor, learn: Callable, held: list[int], motions) -> tuple[list[tuple], str]:
+    """A correction that is learnt outside of segments that are held out, a table for each crease, and in words."""
     tables, said = [], []
     for k in range(len(forward.articulation.creases)):
         a, w, y = _samples(forward, motions, k, held)
@@ -95,11 +95,19 @@ def _tried(
         values, text = learn(a, w, y, np.linspace(*grid_a, KNOTS), np.linspace(*grid_w, KNOTS))
         tables.append((grid_a, grid_w, values))
         said.append(text)
+    return tables, "; ".join(said)
+
+
+def _missed(forward: Predictor, known: Fit, tables, held: list[int], weights: Weights) -> tuple[np.ndarray, np.ndarray]:
+    """What a learnt correction misses on segments that are held out: squares (D,), and how many.
+
+    Not a number where it cannot be simulated.
+    """
     f = _predict(forward, known, tables, held, weights)
     if f is None or f.failed:
-        return np.full(len(forward.components), np.nan), np.ones(len(forward.components)), "; ".join(said)
+        return np.full(len(forward.components), np.nan), np.ones(len(forward.components))
     r = np.concatenate(f.residuals)
-    return np.nansum(r**2, axis=0), np.sum(np.isfinite(r), axis=0), "; ".join(said)
+    return np.nansum(r**2, axis=0), np.sum(np.isfinite(r), axis=0)
 
 
 def _halves(forward: Predictor) -> list[list[int]]:
