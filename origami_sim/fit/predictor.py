@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 from typing import Protocol
 
 import numpy as np
@@ -55,6 +56,13 @@ class Block:
         """(n,) numbers of the frames: neighbours differ by one, or more where some are missing."""
         steps = np.diff(self.times)
         return numbered(self.times, float(np.median(steps))) if len(steps) else np.zeros(1, np.int64)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Of all that predictions of it depend on."""
+        parts = (self.times, self.values[:1], self.rates, self.pose.rotation, self.pose.centre, self.pose.angles)
+        told = repr((self.recording, self.first, self.lasting)).encode()
+        return sha256(told + b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).digest()
 
     def seen(self) -> np.ndarray:
         """[n, D] which values were measured."""

@@ -89,17 +89,7 @@ def digest(forward: Worlds, each: Sequence[Hypothesis], theta, local, wanted: Se
     if local is not None:  # what is remembered at a start depends on the first world's starts before it
         h.update(np.ascontiguousarray(np.asarray(local)[:, wanted]).tobytes() + np.asarray(local)[0].tobytes())
     for b in wanted:
-        block = forward.blocks[b]
-        h.update(repr((block.recording, block.first, block.lasting)).encode())
-        for part in (
-            block.times,
-            block.values[:1],
-            block.rates,
-            block.pose.rotation,
-            block.pose.centre,
-            block.pose.angles,
-        ):
-            h.update(np.ascontiguousarray(part).tobytes())
+        h.update(forward.blocks[b].digest)
     for part in forward.inputs():
         h.update(b"-" if part is None else part if isinstance(part, bytes) else np.asarray(part, float).tobytes())
     return h.hexdigest()[:32]
