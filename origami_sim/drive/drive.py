@@ -332,9 +332,10 @@ class Drive:
             ("phase", lambda s: s.phase),
             ("scale", lambda s: s.scale if s.times is not None else 0.0),
         ):
-            columns = [np.atleast_1d(np.asarray(value(s), float)) for s in self.signals.values()]
-            worlds = max(len(c) for c in columns)
-            out[name] = np.stack([np.broadcast_to(c, (worlds,)) for c in columns])
+            rows = [value(s) for s in self.signals.values()]
+            out[name] = np.empty((len(rows), max(map(np.size, rows))))
+            for row, own in zip(out[name], rows, strict=True):
+                row[:] = own
         return out
 
     def samples(self) -> tuple[np.ndarray, np.ndarray]:

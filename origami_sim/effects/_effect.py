@@ -8,6 +8,7 @@ law reads like its formula, and writing one file is all it takes to add an effec
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -207,7 +208,7 @@ class Effect:
         law = getattr(self, which)
         return tuple(inspect.signature(law.func).parameters) if law is not None else ()
 
-    @property
+    @cached_property
     def strengths(self) -> tuple[Parameter, ...]:
         """The parameters without which the law gives nothing; none for what acts at its default, as gravity does."""
         fitted = [self.parameter(n) for n in self.fitted]
