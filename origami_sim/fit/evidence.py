@@ -31,9 +31,9 @@ Without the curvature two effects that look the same would have a volume far bey
 """
 
 STILL = 1e-9
-"""Deviations of a strength up to which a turn of the search for the mode within bounds no longer moves it.
-
-The log evidence is then off by the square of that. Half and double change it by less than rounding does.
+"""Deviations of a number, all others given, that a turn of the search for the mode within bounds moves it, or would
+still move it, where it ends. The log evidence is then off by the square of that: half and double change it by less than
+rounding does.
 """
 
 
@@ -313,7 +313,7 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
         return x, slope
     a, b, low, high = a[met], b[met], low[met], high[met]
     found, k = np.clip(x[met], low, high), x.shape[-1]
-    known, unit, going = (a, b, low, high), STILL / np.sqrt(np.diagonal(a, axis1=1, axis2=2)), np.arange(len(a))
+    known, root, going = (a, b, low, high), np.sqrt(np.diagonal(a, axis1=1, axis2=2)), np.arange(len(a))
     for _ in range(2 * k):
         a, b, low, high = (v[going] for v in known)
         before = found[going]
@@ -328,7 +328,10 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
         room = np.where(step > 0, high - y, y - low) / np.maximum(np.abs(step), 1e-300)
         y = np.clip(y + step * np.minimum(1.0, room.min(axis=-1, initial=1.0, where=~held))[:, None], low, high)
         found[going] = y
-        going = going[np.any(np.abs(y - before) > unit[going], axis=-1)]
+        pull = (b - (a @ y[..., None])[..., 0]) / root[going]
+        led = (np.abs(pull) > STILL) & np.where(pull > 0, y < high, y > low)
+        moved = np.abs(y - before) * root[going] > STILL
+        going = going[np.any(led, axis=-1) & np.any(moved, axis=-1)]
         if not len(going):
             break
     a, b, low, high = known

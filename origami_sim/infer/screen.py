@@ -30,11 +30,14 @@ probability of four swings by more than 0.010.
 """
 
 SPARSE = 8
-"""One of so many segments tells how much a suspect changes at a strength, before all are simulated."""
+"""One of so many segments tells how much a suspect changes at a strength, before all are simulated.
+
+Half and double change the verdict of no strip, and the probability of what is not named beside it by 0.09.
+"""
 
 ASTRAY = 10.0
 """What a signature may change at a strength that these segments told, over what a fit misses: few of them may tell too
-little of what acts at times."""
+little of what acts at times. Half and double change no probability of two strips by more than 2e-5."""
 
 CHUNK = 6
 """Suspects that are simulated together, so that progress shows and cores share them."""
