@@ -28,6 +28,10 @@ LEAST_ROOM = 256
 """Pairs for which it has room in any case: more than a few triangles can make."""
 
 
+PRESSED = "pressed"
+"""The word by which it is told of a world that it stopped because its panels lie too deep in each other."""
+
+
 @dataclass(frozen=True)
 class Surface:
     """What the kernels need of a model's surface, see `touching.Skin`."""
@@ -104,7 +108,7 @@ def upload(model: Model, room: Callable[..., wp.array], device, pairs: int | Non
         return wp.array(np.ascontiguousarray(a), dtype=dtype, device=device)
 
     s = touching.Skin()
-    s.nodes, s.margin = len(model.position), found.margin
+    s.nodes, s.solid, s.margin = len(model.position), len(model.position) - len(model.carriers), found.margin
     s.corners = constant(found.corners, wp.vec3i)
     for name in ("owned", "body", "home", "panel", "tree", "beyond", "leaf"):
         setattr(s, name, constant(getattr(found, name), wp.int32))
@@ -161,9 +165,14 @@ class Pairs:
         return float(share.numpy()[0])
 
 
-def near_pairs(model: Model, parameters: Parameters, x: np.ndarray, *, world: int = 0, margin: float = 0.0) -> Pairs:
-    """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] above."""
-    thick = parameters["touch", "thickness"]
+def near_pairs(
+    model: Model, parameters: Parameters, x: np.ndarray, *, world: int = 0, margin: float = 0.0, owner: str = "touch"
+) -> Pairs:
+    """Pairs of one world at positions x [N, 3] [m] that touch, or are no farther apart than a margin [m] above.
+
+    Their thickness is that of the effect, or of the "surface", by which they would touch if nothing else is stated.
+    """
+    thick = parameters[owner, "thickness"]
     thick = thick[:, world if thick.shape[1] > 1 else 0]
     room = LEAST_ROOM + ROOM * len(model.triangles)
     while True:
@@ -217,7 +226,7 @@ def too_deep(model: Model, parameters: Parameters, x: np.ndarray, world: int) ->
     one, other = (model.name("panel", p) for p in sorted(model.triangle_panel[found.sides[worst]].tolist()))
     if deep[worst] > DEEPEST * found.offset[worst]:
         return (
-            f"{one} and {other} are pressed {deep[worst] * 1e3:.3g} mm into each other, of "
+            f"{one} and {other} are {PRESSED} {deep[worst] * 1e3:.3g} mm into each other, of "
             f"{found.offset[worst] * 1e3:.3g} mm between their middle planes; touch stiffer (Sheet.touch) or load less"
         )
     room = LEAST_ROOM + ROOM * len(model.triangles)

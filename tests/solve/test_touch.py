@@ -336,6 +336,19 @@ def test_rigid_panels_that_fall_shut_rebound_at_any_length_of_frames(how):
     assert np.ptp(runs[-1].creases) > 0.05
 
 
+def test_rigid_panels_take_back_a_first_step_that_is_far_too_long():
+    """Where masses were thrown in it says nothing of how far the panels move in the next one."""
+
+    def ends(rate):
+        s = Sheet(strip([10 * MM] * 4, 20 * MM), thickness=0.5 * MM, panels="rigid").fix(panels=[0])
+        s.crease(stiffness=0.2e-3, rest_angle=math.radians(100), loss_time=20e-3).touch()
+        run = simulate(*s.build(), duration=0.3, rate=rate)
+        assert not run.failures
+        return run.creases[-1, :, 0]
+
+    assert np.abs(ends(60) - ends(1000)).max() < 1e-6
+
+
 def test_rigid_panels_that_slam_too_hard_are_said_to_be_pressed_through():
     model, parameters, state = swinging(begin=90, speed=100.0, thickness=0.2 * MM)
     for rate in (60, 1000):

@@ -227,6 +227,6 @@ def reversal_of(tree: Tree, h: scalar, tolerance: scalar, w: int):
 def larger(a: scalar, b: scalar):
     """The larger of two numbers; not a number if one is none."""
     out = a
-    if not (b <= a):
+    if a == a and not (b <= a):
         out = b
     return out

@@ -47,7 +47,8 @@ class Skin:
         fade: [L, W] lengths of both edges over the offset.
         count: [2, W] pairs in the list; 0 no list, 1 made, 2 it found no room. span: [2, W] travel before which no
             pair touches, and after which the list is made anew [m].
-        margin: [m].
+        nodes: number of the model's, after which come those that triangles carry. solid: of those before the masses of
+            rigid panels, which are no corners, and are not always where their panels are. margin: [m].
     """
 
     corners: wp.array(dtype=wp.vec3i)
@@ -75,6 +76,7 @@ class Skin:
     count: wp.array2d(dtype=wp.int32)
     span: wp.array2d(dtype=wp.float64)
     nodes: int
+    solid: int
     margin: wp.float64
 
 
@@ -165,8 +167,9 @@ def fastest(s: Skin, X: wp.array2d(dtype=wp.vec3d), V: wp.array2d(dtype=wp.vec3d
     """Speed of the fastest point [m/s]."""
     most = scalar(0.0)
     for k in range(s.rest.shape[0]):
-        v = velocity(s, X, V, k, w)
-        most = wp.max(most, wp.dot(v, v))
+        if k < s.solid or k >= s.nodes:
+            v = velocity(s, X, V, k, w)
+            most = wp.max(most, wp.dot(v, v))
     return wp.sqrt(most)
 
 
@@ -389,6 +392,19 @@ def renew(s: Skin, X: wp.array2d(dtype=wp.vec3d), P: wp.array(dtype=wp.float64),
 
 
 @wp.func
+def farthest(s: Skin, X: wp.array2d(dtype=wp.vec3d), w: int):
+    """How far a point has moved at most since the list was made [m]; not a number if it is nowhere, or was."""
+    far = scalar(0.0)
+    for k in range(s.rest.shape[0]):
+        if k < s.solid or k >= s.nodes:
+            by = place(s, X, k, w) - s.built[k, w]
+            square = wp.dot(by, by)
+            if far == far and not (square <= far):
+                far = square
+    return wp.sqrt(far)
+
+
+@wp.func
 def travelled(s: Skin, X: wp.array2d(dtype=wp.vec3d), P: wp.array(dtype=wp.float64), first: int, stride: int, w: int):
     """How far a point has moved at most since the list was made [m]; makes it anew where that is too far.
 
@@ -396,10 +412,7 @@ def travelled(s: Skin, X: wp.array2d(dtype=wp.vec3d), P: wp.array(dtype=wp.float
     """
     far = scalar(0.0)
     if s.count[1, w] > 0:
-        for k in range(s.rest.shape[0]):
-            by = place(s, X, k, w) - s.built[k, w]
-            far = wp.max(far, wp.dot(by, by))
-        far = wp.sqrt(far)
+        far = farthest(s, X, w)
     if s.count[1, w] == 0 or not (far <= s.span[1, w]):
         renew(s, X, P, first, stride, w)
         far = scalar(0.0)
@@ -448,6 +461,49 @@ def node(s: Skin, k: int):
     return out
 
 
+@wp.func
+def free_share(
+    edges: int,
+    a: wp.vec3d,
+    b: wp.vec3d,
+    c: wp.vec3d,
+    d: wp.vec3d,
+    da: wp.vec3d,
+    db: wp.vec3d,
+    dc: wp.vec3d,
+    dd: wp.vec3d,
+    floor: scalar,
+    most: scalar,
+):
+    """Share of the straight way by da to dd on which a corner and a triangle, or two edges, stay `floor` [m] apart.
+
+    The plane across their shortest connection keeps them apart for as long as their points' speeds along it allow, from
+    where the next connection is taken (conservative advancement: Mirtich 1996, section 2.3; Li, Kaufman & Jiang 2021).
+    It ends at `most`, and where they are within a hundredth of the floor.
+    """
+    gone = scalar(0.0)
+    going = int(1)
+    while going == 1:
+        way = wp.vec3d()
+        if edges == 0:
+            way = off_triangle(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+        else:
+            way = off_edge(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
+        apart_now = wp.length(way)
+        n = nearness.unit(way)
+        closing = wp.max(wp.dot(n, dc), wp.dot(n, dd)) - wp.min(wp.dot(n, da), wp.dot(n, db))
+        if edges == 0:
+            closing = wp.max(wp.dot(n, db), wp.max(wp.dot(n, dc), wp.dot(n, dd))) - wp.dot(n, da)
+        free = apart_now - floor
+        if closing <= scalar(0.0) and apart_now > scalar(0.0):
+            gone = scalar(1.0)
+        if gone >= most or free <= scalar(0.01) * floor:  # others allow less, or it may come no nearer
+            going = 0
+        else:
+            gone = gone + free / closing
+    return gone
+
+
 # asked from outside ---------------------------------------------------------------------------------------------------
 
 
@@ -492,9 +548,7 @@ def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), finest: scalar, share: wp.arra
     """Lowers share[0] to that of the straight way to positions X on which no pair comes nearer than it may.
 
     Pairs that touch at less than `finest` [m] are passed over. Others may close to 0.9 of the distance at which they
-    touch, or by a fifth from where they are. The plane across their shortest connection keeps them apart for as long
-    as their points' speeds along it allow, from where the next connection is taken (conservative advancement: Mirtich
-    1996, section 2.3; Li, Kaufman & Jiang 2021).
+    touch, or by a fifth from where they are.
     """
     row = wp.tid()
     p = s.points[row, 0]
@@ -506,32 +560,12 @@ def clear(s: Skin, X: wp.array2d(dtype=wp.vec3d), finest: scalar, share: wp.arra
     db = place(s, X, p[1], 0) - b
     dc = place(s, X, p[2], 0) - c
     dd = place(s, X, p[3], 0) - d
-    gone = scalar(0.0)
-    floor = scalar(0.0)
-    first = int(1)
-    going = int(1)
-    if s.offset[row, 0] < finest:
-        going = 0
-        gone = scalar(1.0)
-    while going == 1:
-        way = wp.vec3d()
-        if s.kind[row, 0][0] == 0:
-            way = off_triangle(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
-        else:
-            way = off_edge(a + gone * da, b + gone * db, c + gone * dc, d + gone * dd)
-        apart_now = wp.length(way)
-        n = nearness.unit(way)
-        if first == 1:
-            floor = wp.min(scalar(0.9) * s.offset[row, 0], scalar(0.8) * apart_now)
-            first = 0
-        closing = wp.max(wp.dot(n, dc), wp.dot(n, dd)) - wp.min(wp.dot(n, da), wp.dot(n, db))
-        if s.kind[row, 0][0] == 0:
-            closing = wp.max(wp.dot(n, db), wp.max(wp.dot(n, dc), wp.dot(n, dd))) - wp.dot(n, da)
-        free = apart_now - floor
-        if closing <= scalar(0.0) and apart_now > scalar(0.0):
-            gone = scalar(1.0)
-        if gone >= share[0] or free <= scalar(0.01) * floor:  # others allow less, or it may come no nearer
-            going = 0
-        else:
-            gone = gone + free / closing
+    gone = scalar(1.0)
+    if s.offset[row, 0] >= finest:
+        edges = s.kind[row, 0][0]
+        now = wp.length(off_triangle(a, b, c, d))
+        if edges != 0:
+            now = wp.length(off_edge(a, b, c, d))
+        floor = wp.min(scalar(0.9) * s.offset[row, 0], scalar(0.8) * now)
+        gone = free_share(edges, a, b, c, d, da, db, dc, dd, floor, share[0])
     wp.atomic_min(share, 0, gone)
