@@ -10,6 +10,7 @@ from effects.test_suspects_mechanical import loss, moments, path, under
 from scipy.integrate import solve_ivp
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import read_calibration
 from origami_sim.drive import Drive, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
@@ -164,3 +165,14 @@ def test_what_is_refused_says_so_and_designs_remember():
         sheet.yields()
     assert sheet.statements[-1] == ("yields", {"moment": -1.0})
     assert get("crease_yield").fitted[0] == "softening"
+
+
+def test_the_stiffness_of_a_published_fold_goes_with_the_bending_of_its_sheet():
+    """Two numbers of one test, by two routes: the fold's stiffness times its length is the film's bending rigidity."""
+    s = read_calibration("fold_tests")
+    plane_modulus = s.mylar_stiffness * s.mylar_length * 12 / s.mylar_thickness**3
+    film = material("pet")
+    assert plane_modulus == pytest.approx(film.modulus / (1 - film.poisson**2), rel=0.25)
+    thick = {s.mylar_length: s.mylar_thickness, s.mylar_length_350: 0.35e-3, s.mylar_length_500: 0.5e-3}
+    for length, thickness in thick.items():
+        assert length / thickness == pytest.approx(200, rel=0.15)
