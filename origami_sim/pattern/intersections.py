@@ -4,6 +4,9 @@ import numpy as np
 
 CHUNK = 2_000_000
 """Pairs tested at a time: some 500 MB."""
+FEW = 400
+"""Triangles up to which boxes are compared each with each: a millisecond, and no tree has to be loaded (30 ms).
+Half and double take as long on meshes of that size."""
 SLACK = 1e-9
 """Share of the size below which a corner lies in a plane, so that triangles that touch do not cross."""
 
@@ -37,20 +40,29 @@ def overlapping_pairs(x, triangles) -> np.ndarray:
 
 def _near_pairs(x, triangles, fewer: int):
     """Yield pairs [P, 2] of triangles whose boxes overlap, with fewer nodes in common than so many."""
-    from shapely import STRtree, box  # only here: a start without patterns need not wait for it
-
     corners = x[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
+    for one, other in _boxes_that_meet(low, high):
+        shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
+        if np.any(shared < fewer):
+            yield np.column_stack([one, other])[shared < fewer]
+
+
+def _boxes_that_meet(low, high):
+    """Yield numbers (first, second) of boxes that overlap, the first the smaller, in their order."""
+    if len(low) <= FEW:
+        meet = np.all((low[:, None] <= high) & (low <= high[:, None]), axis=-1)
+        yield np.nonzero(np.triu(meet, 1))
+        return
+    from shapely import STRtree, box  # only here: a start without large patterns need not wait for it
+
     boxes = np.asarray(box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
-    tree, step = STRtree(boxes), max(1, CHUNK // max(len(boxes), 1))
+    tree, step = STRtree(boxes), max(1, CHUNK // len(boxes))
     for first in range(0, len(boxes), step):
         one, other = tree.query(boxes[first : first + step])
         one = one + first
         keep = (one < other) & (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
-        one, other = one[keep], other[keep]
-        shared = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
-        if np.any(shared < fewer):
-            yield np.column_stack([one, other])[shared < fewer]
+        yield one[keep], other[keep]
 
 
 def _covering(x, triangles, pairs) -> np.ndarray:
