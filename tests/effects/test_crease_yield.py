@@ -15,7 +15,7 @@ from origami_sim.drive import Drive, series
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.pattern import strip
-from origami_sim.physics.materials import yielding_crease
+from origami_sim.physics.materials import material, yielding_crease
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.motion.quasistatic import quasistatic
