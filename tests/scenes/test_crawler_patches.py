@@ -5,12 +5,12 @@ import pytest
 import scipy.sparse.linalg as spla
 
 from origami_sim import Sheet
-from origami_sim.materials import material
+from origami_sim.design.shell import isotropic
+from origami_sim.device.scene import read_calibration
 from origami_sim.pattern import sheet as mesh
-from origami_sim.scene import read_calibration
+from origami_sim.physics.materials import material
 from origami_sim.scenes import crawler
-from origami_sim.shell import isotropic
-from origami_sim.solve.statics import tangent
+from origami_sim.solve.statics.equilibria import tangent
 
 ACROSS, BESIDE = 4, 2
 """Cells across the small patch, and on either side of it."""
