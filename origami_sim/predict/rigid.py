@@ -262,26 +262,27 @@ class RigidRollouts(Rollouts):
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        dt = sum(lasting) / begins[-1]
+        regular = all(even(step, t, n) == step for t, n in zip(lasting, np.diff(begins).tolist(), strict=True))
+        dt = step if regular else sum(lasting) / begins[-1]
         x, turned, kept, ended = batch.film_anew(begins[-1], dt, begins[:-1], angles[:, :, None], rates[:, :, None])
         if not np.all(np.isfinite(x)):
             return None
         memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
         path = np.concatenate([begin.x[None, :, 0], x[:, :, 0]])
         steady = all(s.constant for s in self.drives[r].signals.values())
-        if not steady or any(get(e).family == "drive" for e in model.effects):
-            return Motion(path, memory)  # a segment alone sees the drive at instants of its own
+        if not regular or not steady or any(get(e).family == "drive" for e in model.effects):
+            return Motion(path, memory)  # segments alone take steps, and see the drive at instants, of their own
         at_first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
         later = pictured(model, recording, x, turned)[:, :, 0]
-        kinds: dict[tuple, list[int]] = {}
+        kinds: dict[tuple[int, int], list[int]] = {}
         for n, (block, frames) in enumerate(zip(blocks, np.diff(begins).tolist(), strict=True)):
             ends = frames if block.reach is not None else 0
-            kinds.setdefault((even(step, block.lasting, ends) if ends else step, frames + 1, ends), []).append(n)
+            kinds.setdefault((frames + 1, ends), []).append(n)
         films = {}
-        for (h, frames, ends), mine in kinds.items():
+        for (frames, ends), mine in kinds.items():
             shifts, then = None if local is None else local[:, mine], kept[mine, :, 0].T
             each = [blocks[n] for n in mine]
-            own = replace(first, blocks=each, local=shifts, memory=then, step=h, frames=frames, ends=ends)
+            own = replace(first, blocks=each, local=shifts, memory=then, frames=frames, ends=ends)
             for n, key in zip(mine, self._film_keys(own), strict=True):
                 arrived, end = None, begins[n + 1]
                 if ends:

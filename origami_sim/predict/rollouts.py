@@ -514,9 +514,9 @@ def film_step(times: np.ndarray) -> float:
     At most FINER times as many as were recorded.
     """
     steps = np.diff(times)
-    usual = float(np.median(steps))
-    if np.all(np.abs(steps / usual - np.round(steps / usual)) < 0.1):
-        return usual
+    counts = steps / float(np.median(steps))
+    if np.all(np.abs(counts - np.round(counts)) < 0.1):
+        return float(times[-1] - times[0]) / float(np.round(counts).sum())
     return max(float(steps.min()), float(times[-1] - times[0]) / (FINER * len(times)))
 
 
