@@ -72,6 +72,8 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.on("crease_stop")
     if s.touch == "on" or (s.touch == "auto" and closed(s) < np.pi / 2):
         sheet.touch(friction=s.touch_friction)
+    elif s.touch == "off":
+        sheet.touch(False)
     model, parameters = sheet.build()
     return model, parameters, drive(s)
 

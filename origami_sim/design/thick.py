@@ -25,7 +25,7 @@ from origami_sim.design.statements import statement
 from origami_sim.design.touch import Touches
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, beside
+from origami_sim.model import STATED, Model, Parameters, beside
 from origami_sim.quantities import converted
 
 STIFF = 100.0
@@ -228,6 +228,9 @@ class Thick(Touches):
             ):
                 parameters.set("crease_stop", name, value, [c])
 
+    def _cut(self) -> bool:
+        return bool(self._hinges or self._levels.any())
+
     def _thick(self, model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
         """The model with its panels and hinges at their heights.
 
@@ -375,7 +378,7 @@ def parted(
     found = Parameters(out)
     for name, key in found:
         old, new = parameters[name, key], found[name, key]
-        family = get(name).family if name not in ("inertia", "plane", "body") else ""
+        family = get(name).family if name not in STATED else ""
         if family == "node" or name == "inertia":
             new = np.repeat(new, old.shape[1], axis=1)
             new[corners : corners + len(copies)] = new[first:] = 0.0 if name == "inertia" else new[:1]

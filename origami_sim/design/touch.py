@@ -1,5 +1,6 @@
 """Panels that touch each other: what a designer states of it, and what follows for each triangle."""
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -8,7 +9,8 @@ import numpy as np
 from origami_sim.design.masses import Masses, positive
 from origami_sim.design.statements import statement
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters
+from origami_sim.model import SURFACE, Model, Parameters
+from origami_sim.model.contact import CONTACT, FRICTION, set_contact
 
 SQUEEZE = 0.2
 """Stiffness of a pair that touches, over modulus times thickness of its panels, which is what a corner of a panel
@@ -31,6 +33,7 @@ most pairs that may touch at once.
 class Touch:
     """How panels touch, as it was stated; see `Touches.touch`."""
 
+    on: bool
     friction: float
     stiffness: float | None
     damping_ratio: float
@@ -48,19 +51,26 @@ class Touches(Masses):
     @statement(stiffness="N/m", thickness="m")
     def touch(
         self,
+        on: bool = True,
         *,
-        friction: float = 0.5,
+        friction: float = FRICTION,
         stiffness: float | None = None,
         damping_ratio: float = LANDING,
         thickness: float | None = None,
     ) -> Self:
-        """Lets panels touch each other, so that none passes through another.
+        """States how panels touch each other, so that none passes through another.
+
+        Without this statement they touch with these defaults: a run goes without contact, which is much faster, until
+        panels come near each other in it, and is then made again with contact (see `solve.watch`). What is stated acts
+        from the start. Patches touch only where it is stated, as those of neighbouring panels may be one piece; so do
+        thick panels (`hinge`, `mitre`, `panel(offset=...)`): contact rounds the edges that they cut.
 
         Their surfaces lie half of their thickness off their middle planes. Where two come nearer they are pushed apart
         and rub; what is pressed in by more than half of the thickness stops the run. Beside a crease two panels come
         closer than that.
 
         Args:
+            on: False lets panels pass through each other; runs count those that do.
             friction: coefficient between panels.
             stiffness: of each pair of a corner and a triangle, or of two edges, that touches [N/m] (default: SQUEEZE
                 times modulus times thickness); 0 leaves it to the diagnosis to ask whether panels touch.
@@ -68,9 +78,13 @@ class Touches(Masses):
             thickness: at which they touch [m], instead of each panel's own.
 
         Raises:
-            InputError: numbers that are negative, a thickness that is not positive. `build` refuses panels that lie
-                in each other at the start.
+            InputError: numbers that are negative, a thickness that is not positive, numbers of what does not touch.
+                `build` refuses panels that lie in each other at the start.
         """
+        if not isinstance(on, bool | np.bool_):
+            raise InputError("panels touch or they do not", field="on", value=on, allowed="true, false")
+        if not on and (friction, stiffness, damping_ratio, thickness) != (FRICTION, None, LANDING, None):
+            raise InputError("panels that pass through each other have no numbers of contact", field="touch")
         if not (friction >= 0 and damping_ratio >= 0 and (stiffness is None or stiffness >= 0)):
             raise InputError(
                 "how panels touch is stated by numbers that are not negative",
@@ -80,8 +94,13 @@ class Touches(Masses):
             )
         if thickness is not None and not positive(thickness):
             raise InputError("panels without thickness cannot touch", field="thickness", value=thickness, allowed="> 0")
-        self._between = Touch(float(friction), stiffness, float(damping_ratio), thickness)
-        return self.on("touch", "touch_friction")
+        self._between = Touch(bool(on), float(friction), stiffness, float(damping_ratio), thickness)
+        self._effects = [e for e in self._effects if e not in CONTACT]
+        return self.on(*CONTACT) if on else self
+
+    @abstractmethod
+    def _cut(self) -> bool:
+        """Whether edges of panels are cut to fold as thick panels do; contact rounds edges by half of the thickness."""
 
     # what follows from it ----------------------------------------------------------------------------------------
 
@@ -89,7 +108,7 @@ class Touches(Masses):
         """The model with the patches that can touch: rectangles in their middle planes, with rounded borders."""
         found: list[tuple[int, np.ndarray, float]] = []
         thickness = []
-        for panel, patch in enumerate(self._patches if self._between is not None else []):
+        for panel, patch in enumerate(self._patches if self._between is not None and self._between.on else []):
             if not patch:
                 continue
             height = patch["side"] * 0.5 * (float(self.thickness[panel]) + patch["thickness"])
@@ -107,9 +126,9 @@ class Touches(Masses):
         )  # fmt: skip
 
     def _touching(self, parameters: Parameters) -> None:
-        """Sets how each triangle touches."""
-        stated = self._between
-        if stated is None:
+        """Sets how each triangle touches, or would as soon as something comes near it."""
+        stated = self._between or Touch(not self._cut(), FRICTION, None, LANDING, None)
+        if not stated.on:
             return
         face = self.mesh.triangle_face
         own = self.thickness[face]
@@ -118,11 +137,13 @@ class Touches(Masses):
             stiffness = np.full(len(face), stated.stiffness)
         mass = parameters["inertia", "mass"][:, 0][self.mesh.triangles].mean(axis=1)
         loss_time = 2 * stated.damping_ratio * np.sqrt(mass / np.where(stiffness > 0, stiffness, np.inf))
-        parameters.set("touch", "thickness", own if stated.thickness is None else stated.thickness)
-        parameters.set("touch", "stiffness", stiffness).set("touch", "loss_time", loss_time)
-        parameters.set("touch_friction", "friction_coefficient", stated.friction)
-        parameters.set("touch_friction", "stiffness", np.maximum(stiffness, 1e-9))
-        parameters.set("touch_friction", "damping", stiffness * loss_time)
+        if self._between is None:
+            for name, value in zip(SURFACE, (own, stiffness, loss_time), strict=True):
+                parameters.set("surface", name, value)
+            return
+        set_contact(
+            parameters, own if stated.thickness is None else stated.thickness, stiffness, loss_time, stated.friction
+        )
 
 
 def refuse_overlap(model: Model, parameters: Parameters) -> None:

@@ -362,7 +362,7 @@ def outcome_of(motion: Trajectory) -> Outcome:
         if abs(far[past]) > 180.0 + PAST:
             summary.append(
                 f"{names[past]} turns past half a turn, to {far[past]:.1f} deg: panels that do not lie beside each "
-                "other have passed through; Sheet.touch() holds panels apart, Sheet.ground() holds them from below."
+                "other have passed through; Sheet.touch(False) lets them, and Sheet.ground() holds them from below."
             )
     if len(model.contacts) and "ground" in model.laws:
         went = (motion.centre_of_mass()[-1, 0] - motion.centre_of_mass()[0, 0]) * 1e3

@@ -17,6 +17,7 @@ from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
+from origami_sim.diagnose.meeting import meetings
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
@@ -108,6 +109,7 @@ def _diagnosed(
     listens = "Whether a drive listens to the device could not be told"
     loop = attempt(noted, listens, lambda: closed_loop(recordings), None)
     noted += [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
+    noted += meetings(forward)
     unseen = unobserved(forward)
     if unseen is not None:
         noted.append(unseen)

@@ -81,7 +81,7 @@ def frequency(model: Model, parameters: Parameters, drive: Drive, recording: Rec
     state, out = State.at_rest(model), np.inf
     for t in np.linspace(0.0, span, INSTANTS):
         held = applied.held(float(t))
-        found = equilibrium(model, parameters, held, state=state)
+        found = equilibrium(model, parameters, held, state=state, contact=False)
         if not found.converged or not found.stable:
             return 0.0
         state = found.state

@@ -13,6 +13,7 @@ from origami_sim.drive import Drive, Signal
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.contact import engaged
 from origami_sim.quantities import ANY, Quantity, converted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.motion.dynamics import Trajectory, simulate
@@ -166,6 +167,10 @@ class Device:
     parameters: Parameters
     drive: Drive
 
+    def touching(self) -> "Device":
+        """The device with contact between panels of which nothing was stated."""
+        return Device(*engaged(self.model, self.parameters), self.drive)
+
 
 def at(build: Build, point: Point) -> Device:
     """The device at a point; other arguments of `build` have their defaults, quantities as numbers.
@@ -219,6 +224,7 @@ def _at_rest(d: Device, way: Way) -> Found:
         state = rest.state
     assert rest is not None
     failure = "" if rest.converged else rest.message
+    d = d.touching() if rest.touching else d
     return Found(d.model, d.parameters, d.drive, rest.x, rest.angles, equilibrium=rest, failure=failure, time=end)
 
 
@@ -256,6 +262,8 @@ def _moving(devices: Sequence[Device], way: Way) -> list[Found]:
     motion = simulate(
         model, parameters, drive, duration=way.duration, rate=way.rate, dt=dt, state=state, threads=way.threads
     )
+    if "touch" in motion.model.laws and "touch" not in model.laws:
+        devices = [d.touching() for d in devices]
     worlds = motion.x.shape[2]
     return [_one(motion, d, w % worlds) for w, d in enumerate(devices)]
 

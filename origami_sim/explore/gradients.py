@@ -112,6 +112,8 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
     rest = found([first], way)[0]
     if rest.failure or rest.equilibrium is None:
         raise InputError(f"there is no gradient without an equilibrium: {rest.failure}", field="point")
+    if rest.equilibrium.touching:
+        return _at_rest([d.touching() for d in devices], way, unknowns, step)
     state = rest.equilibrium.state
     time = lasting(first.drive) if way.time is None else way.time
     if first.model.panels == "rigid":

@@ -11,7 +11,7 @@ import numpy as np
 
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError
-from origami_sim.model.model import Model, Parameters
+from origami_sim.model.model import STATED, Model, Parameters
 
 TETRAHEDRON = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Corners whose mean is zero and whose mean square along every axis is one."""
@@ -132,7 +132,7 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     given = Parameters(out)
     for owner, name in given:
         old = parameters[owner, name]
-        family = get(owner).family if owner not in ("inertia", "plane", "body") else ""
+        family = get(owner).family if owner not in STATED else ""
         if (family == "node" or owner == "inertia") and len(carriers):
             new = np.zeros((n + len(carriers), *old.shape[1:])) + given[owner, name][0]
             new[:n] = old

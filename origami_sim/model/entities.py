@@ -15,7 +15,7 @@ _NAMED = {"crease": "crease", "triangle": "panel", "node": "node", "panel": "pan
 )
 """Family of an effect, and what its entities are named by: the triangles of a panel have its name."""
 
-OWNERS = {"inertia": "node", "body": "panel", "plane": ""}
+OWNERS = {"inertia": "node", "body": "panel", "plane": "", "surface": "triangle"}
 """Owners of parameters that are no effects, and the family of their entities."""
 
 

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 BODY = ("mass", *(f"centre_{a}" for a in "xyz"), *(f"inertia_{a}" for a in ("xx", "yy", "zz", "xy", "xz", "yz")))
 """Numbers of a rigid body: mass, centre of mass, inertia tensor about it."""
 
+SURFACE = ("thickness", "stiffness", "loss_time")
+"""Numbers of the surface of each triangle: [m], [N/m], [s]."""
+
+STATED = ("inertia", "plane", "body", "surface")
+"""Owners of parameters that are no effects."""
+
 PADS = ("pad_triangles", "pad_weights", "pad_heights", "pad_thickness")
 """Attributes of a model that say where patches can touch; a model without them is stored as if there were none."""
 
@@ -162,8 +168,10 @@ class Parameters:
     """Parameter arrays by (owner, name): shape [entity, world] or [entity, 1], tables [entity, world, knot].
 
     Owners are the effects that are switched on, "inertia" (mass [kg] per node), "plane" (the ground's tilt [rad],
-    azimuth [rad], height [m] and reach [m], the gap below which contact laws are evaluated) and "body" (mass [kg],
-    centre [m] and inertia [kg m^2] of each panel as a rigid body in the reference state; zero: not stated).
+    azimuth [rad], height [m] and reach [m], the gap below which contact laws are evaluated), "body" (mass [kg],
+    centre [m] and inertia [kg m^2] of each panel as a rigid body in the reference state; zero: not stated) and
+    "surface" (thickness [m], stiffness [N/m] and loss time [s] with which each triangle touches others as soon as they
+    come near each other in a run, see `contact.engaged`; zero: nothing touches, or by the effect `touch`).
     """
 
     def __init__(self, model: Model, values: Mapping[tuple[str, str], np.ndarray] | None = None):
@@ -171,6 +179,7 @@ class Parameters:
             ("inertia", "mass"): np.ones((len(model.position), 1)),
             **{("plane", n): np.zeros((1, 1)) for n in ("tilt", "azimuth", "height", "reach")},
             **{("body", n): np.zeros((model.panel_count, 1)) for n in BODY},
+            **{("surface", n): np.zeros((len(model.triangles), 1)) for n in SURFACE},
         }
         for name in model.effects:
             effect = get(name)
@@ -231,11 +240,11 @@ class Parameters:
     @staticmethod
     def _check_bounds(owner: str, name: str, value: np.ndarray):
         low, high = 0.0, np.inf
-        if owner not in ("inertia", "plane", "body"):
+        if owner not in STATED:
             low, high = next(p.bounds for p in get(owner).parameters if p.name == name)
-        elif owner != "inertia":
+        elif owner in ("plane", "body"):
             low = -np.inf
-        elif np.any(value <= 0):
+        elif owner == "inertia" and np.any(value <= 0):
             raise InputError(
                 "a mass must be positive", field="inertia.mass", value=float(value.min()), allowed="> 0 kg"
             )
@@ -285,6 +294,8 @@ class Parameters:
     def hash(self) -> str:
         h = hashlib.sha256()
         for key in sorted(self._values):
+            if key[0] == "surface" and not np.any(self._values[key]):
+                continue
             h.update(repr(key).encode() + self._values[key].tobytes())
         return h.hexdigest()[:16]
 

@@ -120,7 +120,9 @@ def _rest(forward: Worlds, r: int, world: World, near: np.ndarray) -> np.ndarray
     arm = Articulation(model)
     pose = arm.reference()
     x = arm.positions(replace(pose, angles=near[:, None]))
-    found = equilibrium(model, parameters, forward.drives[r].held(0.0), state=State.at_rest(model, position=x[:, 0]))
+    found = equilibrium(
+        model, parameters, forward.drives[r].held(0.0), state=State.at_rest(model, position=x[:, 0]), contact=False
+    )
     if not found.converged:
         raise InputError(
             "the model has no equilibrium near the first frame",

@@ -37,6 +37,7 @@ _OWNED = {
     "inertia": [("mass", "kg")],
     "body": [(n, {"mass": "kg", "centre": "m"}.get(n.split("_")[0], "kg m^2")) for n in BODY],
     "plane": [("tilt", "rad"), ("azimuth", "rad"), ("height", "m"), ("reach", "m")],
+    "surface": [("thickness", "m"), ("stiffness", "N/m"), ("loss_time", "s")],
 }
 """Numbers of what is no effect, and their units."""
 

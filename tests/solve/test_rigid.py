@@ -344,7 +344,8 @@ def test_rigid_panels_rest_where_moments_balance():
     assert np.abs(found.angles).min() > 0.01
     assert np.abs(run.creases - run.creases[0]).max() < 1e-9
     model, parameters = hanging().crease(stiffness=1e-4).build()
-    upside_down = equilibrium(model, parameters, state=folded(model, [np.pi - 0.02, 0.01]), unstable=True)
+    folded_back = folded(model, [np.pi - 0.02, 0.01])  # one panel in another
+    upside_down = equilibrium(model, parameters, state=folded_back, unstable=True, contact=False)
     assert upside_down.converged and not upside_down.stable
 
 

@@ -479,7 +479,7 @@ def free_share(
 
     The plane across their shortest connection keeps them apart for as long as their points' speeds along it allow, from
     where the next connection is taken (conservative advancement: Mirtich 1996, section 2.3; Li, Kaufman & Jiang 2021).
-    It ends at `most`, and where they are within a hundredth of the floor.
+    It ends at `most`, and where they are within a hundredth of the floor, or get on by no more than 1e-9 of the way.
     """
     gone = scalar(0.0)
     going = int(1)
@@ -498,6 +498,8 @@ def free_share(
         if closing <= scalar(0.0) and apart_now > scalar(0.0):
             gone = scalar(1.0)
         if gone >= most or free <= scalar(0.01) * floor:  # others allow less, or it may come no nearer
+            going = 0
+        elif free < scalar(1e-9) * closing:
             going = 0
         else:
             gone = gone + free / closing

@@ -11,6 +11,7 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
 from origami_sim.quantities import converted
 from origami_sim.solve.batch import Evaluation
@@ -25,8 +26,9 @@ from origami_sim.solve.oversights import (
 )
 from origami_sim.solve.rigid.batch import TOLERANCE as RIGID
 from origami_sim.solve.rigid.batch import batch_of
-from origami_sim.solve.skin import too_deep
+from origami_sim.solve.skin import PRESSED, too_deep
 from origami_sim.solve.timestep import TimeStep, stable_step
+from origami_sim.solve.watch import Met, continued, watch_of, with_memory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +37,13 @@ PER_STEP = 0.01
 """Error of a step of rigid panels over the accuracy asked for, to begin with: runs of tens of steps add up to it.
 
 Half of it costs 1.15 times the steps and double saves as much; halving the steps tells whether it was enough.
+"""
+
+
+STIFFER = (1.0, 4.0, 16.0)
+"""Factors on the stiffness of contact that was not stated, tried while panels are pressed too deep into each other.
+
+It is a penalty, so more of it only costs steps, half as long for four times. Smaller ratios take more runs.
 """
 
 
@@ -162,6 +171,9 @@ def simulate(
     (`energy_error`), with a note where that is above half a per cent. An `accuracy` has the run repeated at half the
     step until the motion is known that well.
 
+    Panels of which it was not stated whether they touch keep each other off: a run in which any two come near each
+    other is made again with contact, and says so (`solve.watch`).
+
     For stiff parts and slow holds, method="implicit" takes steps of any length: second order, energy kept without
     numerical damping (see `solve.implicit`), world after world, on the CPU.
 
@@ -199,9 +211,50 @@ def simulate(
         "progress": progress,
     }
     drive = drive or Drive()
+    model, parameters = continued(model, parameters, state)
+    try:
+        return _as_asked(model, parameters, drive, accuracy, options)
+    except Met as met:
+        return _touching(model, parameters, drive, accuracy, options, met.sentence)
+
+
+def _touching(
+    model: Model, parameters: Parameters, drive: Drive, accuracy: float | None, options: dict[str, Any], said: str
+) -> Trajectory:
+    """The run with contact, stiffer where panels are pressed too deep into each other."""
+    rate, method, dt, state = (options[n] for n in ("rate", "method", "dt", "state"))
+    before = _substeps(stable_step(model, parameters), dt, rate, method)
+    out, stiffer = None, 1.0
+    for stiffer in STIFFER:
+        other, own = engaged(model, parameters, stiffer)
+        chosen, given = stable_step(other, own), dict(options)
+        if dt is not None and method == "explicit":
+            given["dt"] = min(dt, chosen.dt)
+        if state is not None:
+            given["state"] = with_memory(other, state)
+            if state.step > 0:  # it counts steps, which are shorter now
+                given["state"].step = state.step // before * _substeps(chosen, given["dt"], rate, method)
+        out = _as_asked(other, own, drive, accuracy, given)
+        if not any(PRESSED in f.cause for f in out.failures):
+            break
+    assert out is not None
+    more = f" Its stiffness is {stiffer:g} times the default, by which they were pressed too deep." * (stiffer > 1)
+    out.notes.insert(0, said + more)
+    return out
+
+
+def _as_asked(
+    model: Model, parameters: Parameters, drive: Drive, accuracy: float | None, options: dict[str, Any]
+) -> Trajectory:
+    """One run, or as many as an accuracy asks for.
+
+    Raises:
+        Met: panels came near each other that nothing keeps apart.
+    """
     if accuracy is not None:
         return _accurate(model, parameters, drive, check_accuracy(accuracy), **options)
     out = _simulated(model, parameters, drive, **options)
+    dt, method, spectral_radius = (options[n] for n in ("dt", "method", "spectral_radius"))
     fixed = dt is not None or not (method == "implicit" or model.panels == "rigid")
     out.notes += warning(out, fixed=fixed, damped=method == "implicit" and spectral_radius < 1.0)
     return out
@@ -240,8 +293,7 @@ def _simulated(
         allowed = "> 0 s" if implicit else f"0 < dt <= {chosen.limit:.3g} s, set by {chosen.cause}"
         raise InputError(what, field="dt", value=dt, allowed=allowed)
     frame_time = 1.0 / rate
-    longest = dt or (frame_time if implicit else chosen.dt)
-    substeps = max(1, int(np.ceil(frame_time / min(longest, frame_time) * (1 - 1e-12))))
+    substeps = _substeps(chosen, dt, rate, method)
     step = frame_time / substeps
     frames = round(duration * rate)
     if frames < 1:
@@ -277,6 +329,7 @@ def _simulated(
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 
+    watch, said = watch_of(model, parameters, state, reference=rests, device=device)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     record: list[tuple[State, Evaluation]] = []
     began = clock.perf_counter()
@@ -285,8 +338,12 @@ def _simulated(
         record.append((batch.state(), batch.evaluate(batch.step * step)))
         if i == 0 and rests and "ground" in model.laws:
             refuse_start_inside_the_ground(model, parameters, record[0][0].x, record[0][1].energies["ground"])
+        if watch is not None:
+            watch.add(batch.step * step, record[-1][0].x, record[-1][0].v)
         if progress:
             progress(i / frames)
+    if watch is not None:
+        watch.look()
     wall = clock.perf_counter() - began
 
     last = record[-1][0]
@@ -320,6 +377,7 @@ def _simulated(
         state=last,
         wall=wall,
         notes=[
+            *said,
             *idle_drives(model, parameters, drive),
             *below_the_ground(model, parameters, last.x),
             *(batch.notes() if isinstance(batch, Implicit) else []),
@@ -327,6 +385,12 @@ def _simulated(
     )
     out.energy_error = energy_error(out)
     return out
+
+
+def _substeps(chosen: TimeStep, dt: float | None, rate: float, method: str) -> int:
+    """Steps from frame to frame, none longer than asked for."""
+    longest = dt or (1.0 / rate if method == "implicit" else chosen.dt)
+    return max(1, int(np.ceil(1.0 / rate / min(longest, 1.0 / rate) * (1 - 1e-12))))
 
 
 def _accurate(

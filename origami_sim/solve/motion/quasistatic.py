@@ -20,12 +20,14 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
 from origami_sim.solve.statics.settling import Settling, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
+from origami_sim.solve.watch import Met, continued, watch_of, with_memory
 
 TOLERANCE = 1e-5
 """Error of one step, as a part of the device's size; ten times less costs about twice the steps."""
@@ -103,6 +105,8 @@ def quasistatic(
 ) -> QuasiStatic:
     """Follows the equilibria of all worlds along time, with creep, relaxation and whatever else remembers.
 
+    Panels of which it was not stated whether they touch keep each other off, see `simulate`.
+
     Bars or rigid panels. Inertia and laws of the rate are left out, and where they would
     have mattered a note says so.
 
@@ -123,7 +127,35 @@ def quasistatic(
         InputError: times that are not finite or do not increase, a drive that ends early, worlds that differ,
             no node that is free to move.
     """
-    drive = drive or Drive()
+    model, parameters = continued(model, parameters, state)
+    given = {"before": before, "tolerance": tolerance, "threads": threads, "progress": progress}
+    try:
+        return _quasistatic(model, parameters, drive or Drive(), times, state=state, **given)
+    except Met as met:
+        model, parameters = engaged(model, parameters)
+        start = None if state is None else with_memory(model, state)
+        out = _quasistatic(model, parameters, drive or Drive(), times, state=start, **given)
+        out.notes.insert(1, met.sentence)
+        return out
+
+
+def _quasistatic(
+    model: Model,
+    parameters: Parameters,
+    drive: Drive,
+    times: Sequence[float] | np.ndarray,
+    *,
+    state: State | None,
+    before: Drive | None,
+    tolerance: float | None,
+    threads: int | None,
+    progress: Callable[[float], None] | None,
+) -> QuasiStatic:
+    """The motion of the model as it is.
+
+    Raises:
+        Met: panels came near each other that nothing keeps apart.
+    """
     at = np.asarray(times, float)
     if at.ndim != 1 or not len(at) or not np.all(np.isfinite(at)):
         raise InputError("a quasi-static motion needs finite times", field="times", value=list(at.ravel()[:4]))
@@ -151,15 +183,28 @@ def quasistatic(
     one = [parameters.world(w if parameters.worlds > 1 else 0) for w in range(count)]
     search = settling([(model, p) for p in one], applied, start, threads=threads)
     march = March(search, applied, tolerance if search.held.remembers else None)
+    watch, said = watch_of(model, parameters, start, reference=state is None)
+
+    def look(state: State, time: float):
+        if watch is not None:
+            watch.add(time, state.x, np.zeros_like(state.x))  # so that each node goes straight on
+
+    look(start, float(at[0]))
     march.begin(start, float(at[0]), None if before is None else levels(before, float(at[0]), count))
     states = [march.state]
+    look(march.state, float(at[0]))
     for i, instant in enumerate(at[1:], 1):
         for end in instants[(instants > at[i - 1]) & (instants <= instant)]:
             march.go(float(end), i)
+            look(march.state, float(end))
         states.append(march.state)
         if progress:
             progress(i / (len(at) - 1))
-    return _filmed(model, parameters, drive, at, states, march, clock.perf_counter() - began)
+    if watch is not None:
+        watch.look()
+    out = _filmed(model, parameters, drive, at, states, march, clock.perf_counter() - began)
+    out.notes[1:1] = said
+    return out
 
 
 class March:

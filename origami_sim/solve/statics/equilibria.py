@@ -9,7 +9,7 @@ state. Frozen bristles push back with a constant force, so friction holds no nod
 import math
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,10 +18,12 @@ import scipy.sparse.linalg as spla
 from origami_sim.drive import Drive, Signal
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.contact import engaged, may_touch
 from origami_sim.model.distort import distorted
 from origami_sim.solve.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid.statics import RigidSystem
 from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
+from origami_sim.solve.watch import met_at, with_memory, without_memory
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""
@@ -90,8 +92,12 @@ def equilibrium(
     tolerance: float = 1e-10,
     max_iterations: int = 300,
     unstable: bool = False,
+    contact: bool = True,
 ) -> Equilibrium:
     """Finds the equilibrium that a state settles into, with the drive held at its value at one instant.
+
+    Panels of which it was not stated whether they touch keep each other off: where any two lie in each other at the
+    end, it is sought again with contact, and `touching` says so.
 
     Newton with a tangent that is shifted until it is positive definite, so that steps go downhill and leave saddles
     (at an unstable equilibrium it is pushed off along the lowest mode and goes on). A step turns and strains no element
@@ -107,6 +113,7 @@ def equilibrium(
         world: which world of parameters, drive and state to solve.
         tolerance: largest unbalanced force over the largest force of any one effect.
         unstable: take the nearest equilibrium of any kind (plain Newton directions) instead of a stable one.
+        contact: False lets panels pass through each other of which it was not stated that they touch.
 
     Returns:
         The equilibrium. If it was not found, `converged` is False and `message` says why; nothing is raised.
@@ -117,14 +124,25 @@ def equilibrium(
     """
     _positive(tolerance=tolerance, max_iterations=max_iterations)
     began = clock.perf_counter()
-    if model.panels == "rigid":
-        given = _one_world(model, parameters, drive or Drive(), time, state, world)
-        found = Equilibrium(**RigidSystem(*given).settle(time, tolerance, max_iterations, unstable))
-    else:
-        system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
-        found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    options = tolerance, max_iterations, unstable
+    found = _settled(model, parameters, drive, time, state, world, *options)
+    at = world if parameters.worlds > 1 else 0
+    if contact and may_touch(model, parameters) and (said := met_at(model, parameters, found, at)):
+        other, own = engaged(model, parameters)
+        start = with_memory(other, State.at_rest(model) if state is None else state)
+        again = _settled(other, own, drive, time, start, world, *options)
+        found = replace(again, state=without_memory(model, again.state), touching=said)
     found.wall = clock.perf_counter() - began
     return found
+
+
+def _settled(model, parameters, drive, time, state, world, tolerance, max_iterations, unstable) -> Equilibrium:
+    """The equilibrium of the model as it is."""
+    if model.panels == "rigid":
+        given = _one_world(model, parameters, drive or Drive(), time, state, world)
+        return Equilibrium(**RigidSystem(*given).settle(time, tolerance, max_iterations, unstable))
+    system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
+    return system.settle(x, angles, time, tolerance, max_iterations, unstable)
 
 
 def continuation(

@@ -239,7 +239,9 @@ class Settling(ABC):
         for w in np.flatnonzero(lost):
             drive = self.drive.replace(**dict(zip(self.drive.signals, self.levels[:, w].tolist(), strict=True)))
             state = self.start.select(np.array([w]))
-            one = equilibrium(model, self.worlds[int(w)][1].for_model(model), drive, state=state, time=self.time)
+            one = equilibrium(
+                model, self.worlds[int(w)][1].for_model(model), drive, state=state, time=self.time, contact=False
+            )
             if one.converged:
                 x[:, w], found[w] = one.x, True
         return x, found

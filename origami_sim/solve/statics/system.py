@@ -77,6 +77,7 @@ class Equilibrium:
         mode: [N, 3] shape of the lowest one, largest component 1.
         reactions: [N, 3] forces that the supports exert on held axes [N]; nan for rigid panels, which share them.
         message: what happened, in a sentence. wall: time that it took [s].
+        touching: which panels met, so that it was found with contact that nobody had stated; empty if none did.
     """
 
     state: State
@@ -93,6 +94,7 @@ class Equilibrium:
     reactions: np.ndarray
     message: str
     wall: float = 0.0
+    touching: str = ""
 
     @property
     def x(self) -> np.ndarray:
