@@ -502,7 +502,8 @@ def _tell(args, outcome: "Outcome", folder: Path | None) -> None:
         print(format_table(table, outcome.units or _units(outcome.tables)))
     for sentence in [*outcome.summary, *motion.notes]:
         print(sentence)
-    through = f"{motion.crossings().sum()} pairs of triangles through each other"
+    end, (most, when) = int(motion.crossings().sum()), motion.most_crossings()
+    through = f"{end} pairs of triangles through each other" + f" ({most} at t = {when:.3g} s)" * (most > end)
     said = [str(motion.step), accuracy.sentence(motion), through, f"{motion.wall:.1f} s of computing"]
     print(f"{'; '.join(filter(None, said))}; run folder: {folder or 'none'}")
 

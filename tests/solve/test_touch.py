@@ -500,6 +500,9 @@ def test_every_run_counts_the_pairs_that_pass_through_each_other(tmp_path, capsy
     assert said["crossing_pairs"] == expected
     assert json.loads((Path(said["folder"]) / "manifest.json").read_text())["crossing_pairs"] == [expected]
     assert f"{expected} pairs of triangles through each other" in ran()
+    most, when = motion.most_crossings()
+    triangles = motion.model.triangles.tolist()
+    assert most >= expected and most == pierced(motion.x[np.argmin(np.abs(motion.times - when)), :, 0], triangles)
     assert json.loads(ran("--json", "--set", "touch=stated"))["crossing_pairs"] == 0
     said = json.loads(ran("--json", "--set", "touch=default"))
     assert said["crossing_pairs"] == 0
