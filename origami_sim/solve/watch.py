@@ -85,11 +85,10 @@ class Watch:
             deepest: share of the distance at which they touch by which panels may be pressed together at the start.
         """
         for w in range(self.worlds):
-            sides = inside(self.model, self.parameters, x[:, w], w, deepest)
-            if sides is not None:
-                one, other = _names(self.model, sides)
+            named = panels_inside(self.model, self.parameters, x[:, w], w, deepest)
+            if named is not None:
                 return (
-                    f"{one} and {other} lie in each other at the start, so that panels pass through each other in this "
+                    f"{named} lie in each other at the start, so that panels pass through each other in this "
                     "run; Sheet.touch(thickness=...) states a thickness with which they do not."
                 )
         return ""
@@ -137,12 +136,11 @@ class Watch:
         where = f"at t = {met[w]:.4g} s" + (f" in world {w}" if self.worlds > 1 else "")
         if sides[0, w] < 0:
             raise Met(f"Panels come so near each other that pairs cannot be listed {where}")
-        one, other = _names(self.model, sides[:, w])
-        raise Met(f"{one} and {other} meet {where}")
+        raise Met(f"{_names(self.model, sides[:, w])} meet {where}")
 
 
-def inside(model: Model, parameters: Parameters, x: np.ndarray, world: int, deepest: float = 0.0) -> np.ndarray | None:
-    """Two triangles that lie in each other at positions x [N, 3], None if none do.
+def panels_inside(model: Model, parameters: Parameters, x: np.ndarray, world: int, deepest: float = 0.0) -> str | None:
+    """Names of two panels that lie in each other at positions x [N, 3], None if none do.
 
     Args:
         deepest: share of the distance at which they touch by which they may be pressed together.
@@ -152,10 +150,10 @@ def inside(model: Model, parameters: Parameters, x: np.ndarray, world: int, deep
     beside = {tuple(sorted(p)) for p in carried_sides(model).tolist()}  # by how much a stop gives, they cross
     for pair in crossing_pairs(x, model.triangles, 0.0):
         if tuple(sorted(model.triangle_panel[pair].tolist())) not in beside:
-            return pair
+            return _names(model, pair)
     found = near_pairs(model, parameters, x, world=world, owner="surface")
     deep = found.offset * (1 - deepest) * (1 - 1e-6) - found.distance
-    return found.sides[int(deep.argmax())] if len(deep) and deep.max() > 0 else None
+    return _names(model, found.sides[int(deep.argmax())]) if len(deep) and deep.max() > 0 else None
 
 
 def met_at(model: Model, parameters: Parameters, found: "Equilibrium", world: int) -> str:
@@ -166,15 +164,12 @@ def met_at(model: Model, parameters: Parameters, found: "Equilibrium", world: in
     past = np.abs(found.angles[: len(model.creases)]) > np.pi
     if np.any(past):
         return f"{model.name('crease', int(past.argmax()))} would fold by more than half a turn: {_acting()}"
-    sides = inside(model, parameters, found.x, world)
-    if sides is None:
-        return ""
-    one, other = _names(model, sides)
-    return f"{one} and {other} would lie in each other: {_acting()}"
+    named = panels_inside(model, parameters, found.x, world)
+    return "" if named is None else f"{named} would lie in each other: {_acting()}"
 
 
-def _names(model: Model, sides: np.ndarray) -> list[str]:
-    return [model.name("panel", int(p)) for p in sorted(model.triangle_panel[sides].tolist())]
+def _names(model: Model, sides: np.ndarray) -> str:
+    return " and ".join(model.name("panel", int(p)) for p in sorted(model.triangle_panel[sides].tolist()))
 
 
 def _acting() -> str:

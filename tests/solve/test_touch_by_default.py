@@ -1,12 +1,13 @@
 """Panels of which nobody stated whether they touch: seen from frame to frame, and then kept apart."""
 
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from origami_sim import Drive, Sheet, equilibrium, quasistatic, ramp, simulate, strip
+from origami_sim import Drive, Sheet, continuation, equilibrium, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
 from origami_sim.diagnose.meeting import meetings
 from origami_sim.errors import InputError
@@ -173,3 +174,13 @@ def test_a_diagnosis_says_where_panels_came_near_each_other_in_a_recording():
     (note,) = meetings(Recorded(roll()))
     assert note.startswith("rolled.csv: panel 0 and panel 3 meet at t = 0.06") and "stiffness=0" in note
     assert meetings(Recorded(roll().touch())) == [] == meetings(Recorded(roll().touch(False)))
+
+
+def test_a_path_says_from_where_on_panels_lie_in_each_other():
+    """Bars: two panels that are turned shut, in proportion to the load."""
+    s = Sheet(strip([10 * MM] * 2, 20 * MM), thickness=0.5 * MM).fix(panels=[0]).crease(stiffness=0.2e-3)
+    s.set("crease_drive", drive_stiffness=0.2e-3, target_angle=3.1)
+    path = continuation(*s.build(), Drive(load=1.0), step=0.1)
+    (factor,) = re.findall(r"At the factor (\S+) panel 0 and panel 1 lie in each other", path.message)
+    assert math.pi - 0.1 < 3.1 * float(factor) < math.pi  # 2 asin(h / 2 l) from flat
+    assert "lie in each other" not in continuation(*s.touch(False).build(), Drive(load=1.0), step=0.1).message

@@ -23,7 +23,7 @@ from origami_sim.model.distort import distorted
 from origami_sim.solve.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid.statics import RigidSystem
 from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
-from origami_sim.solve.watch import met_at, with_memory, without_memory
+from origami_sim.solve.watch import met_at, panels_inside, with_memory, without_memory
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""
@@ -196,8 +196,18 @@ def continuation(
     system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
     tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
     path = tracer.follow(x, angles, start, end, max_points, stop)
+    path.message += _through(model, parameters, path, world if parameters.worlds > 1 else 0)
     path.wall = clock.perf_counter() - began
     return path
+
+
+def _through(model: Model, parameters: Parameters, path: Path, world: int) -> str:
+    """From where on panels of which nothing was stated lie in each other along a path, in a sentence; empty if none."""
+    for factor, x in zip(path.factor, path.x, strict=True) if may_touch(model, parameters) else ():
+        if (named := panels_inside(model, parameters, x, world)) is not None:
+            where = f" At the factor {factor:.4g} {named} lie in each other"
+            return f"{where}: paths have contact where Sheet.touch() states it."
+    return ""
 
 
 def _positive(**values):
