@@ -62,6 +62,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("crease_viscosity", viscosity=of_arms(s, "viscosity"))
     sheet.gravity((0, 0, -s.gravity))
     sheet.membrane_damping = 0.0
+    sheet.touch(False)  # arms turn beside each other on their axles
     sheet.name("panel", ("mount", *(f"arm{k}" for k in arms(s))))
     sheet.name("crease", [f"hinge{k}" for k in arms(s)])
     model, parameters = sheet.build()
