@@ -179,6 +179,7 @@ def extended(
         key = _likely(out)
         if n % 2 or key is None:
             key = _alike(out) or _alone(out) or key
+        key = key or _within(out)
         if key is None:
             break
         _tried(out, forward, key)
@@ -270,6 +271,16 @@ def _alike(out: Posterior) -> Key | None:
     near, fitted = out.total[leader.key] + np.log(UNFITTED), {out.effects(k) for k in out.nodes}
     alike = {k: t for k, t in leader.instead.items() if t >= near and out.effects(k) not in fitted}
     return max((k for k in alike if k in out.estimates), key=lambda k: alike[k], default=None)
+
+
+def _within(out: Posterior) -> Key | None:
+    """Where the best set is of too many laws to be named, the best of those within it that may be, if not fitted."""
+    if not out.imitates(out.leader):
+        return None
+    inside = [k for k in out.estimates if k < out.leader and not out.imitates(k)]
+    known = max((out.total[k] for k in out.nodes if k < out.leader and not out.imitates(k)), default=-np.inf)
+    best = max(inside, key=lambda k: out.total[k], default=None)
+    return best if best is not None and out.total[best] > known else None
 
 
 def _in_place_of(out: Posterior, best: Key) -> dict[Key, float]:
