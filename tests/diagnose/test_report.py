@@ -358,10 +358,10 @@ def test_law_is_drawn_through_what_is_missing_without_it():
     x = np.linspace(-2.0, 2.0, 13)
     law = -2e-5 * np.sign(x)
     curve = Curve("rate", "rad/s", x.tolist(), law.tolist(), [1e-7] * 13, [23] * 13)
-    assert "is missing if all acts" not in page(d)
+    assert "lacks without this effect" not in page(d)
     d.partials = [Partial(d.chosen[0], site, curve, law.tolist())]
     text = page(d)
-    said = f"The moment at {site} that is missing if all acts that was found but this, against the rate there."
+    said = f"The moment at {site} that the found model lacks without this effect, against the rate there."
     assert html.escape(said) in text
     line = drawn_law(text)
     dots = re.search(r'class="figures evidence".*', text)[0]

@@ -39,8 +39,7 @@ def _law(p: Partial) -> Html:
     plot = against(p.site, curve, f"missing {name}", unit, height=TALL, also=p.law)
     plot.line(array(curve.x), array(p.law), "law", title=title_of(p.label.partition(" at ")[0]))
     along = " along the motion" if curve.against == REVERSAL else ""
-    what = f"The {name} at {p.site}{along} that is missing if all acts that was found but this"
-    said = f"{what}, against the {goes} there."
+    said = f"The {name} at {p.site}{along} that the found model lacks without this effect, against the {goes} there."
     caption = element("figcaption", element("b", _capital(words_of(p.label))), element("span", said))
     key = legend(("place", "recorded motion, ± 2 se"), ("law", "what it gives with its fitted numbers"))
     return element("figure", caption, element("div", plot.html(), key), class_="law")
