@@ -23,13 +23,14 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect
+from origami_sim.fit.hypothesis import SEPARATOR, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.fit.suspects import suspects
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import Posterior, marginals
@@ -245,8 +246,8 @@ def shown_by(p: Posterior, best: Fit, labels: Sequence[str]) -> list[tuple[Suspe
     for f in fits:
         for s in f.hypothesis.suspects:
             of.setdefault(s.label, (s, f))
-    each = dict.fromkeys(one for label in labels for one in label.split(" + "))
-    return [of[one] for one in each if one in of and get(one.partition(" at ")[0]).family != "measurement"]
+    each = dict.fromkeys(one for label in labels for one in label.split(SEPARATOR))
+    return [of[one] for one in each if one in of and not of_recorder(one.partition(" at ")[0])]
 
 
 def possible_of(source: Source) -> Possible:

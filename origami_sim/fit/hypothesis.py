@@ -14,6 +14,9 @@ from origami_sim.model.bodies import rigid
 from origami_sim.model.entities import tune
 from origami_sim.model.places import across
 
+SEPARATOR = " + "
+"""Between the effects of one explanation in its label."""
+
 NOMINAL = ""
 """Owner of the numbers of the model that was given, as opposed to those of an effect that is suspected."""
 
@@ -121,7 +124,7 @@ class Hypothesis:
 
     @property
     def label(self) -> str:
-        return " + ".join(s.label for s in self.suspects) or "nominal"
+        return SEPARATOR.join(s.label for s in self.suspects) or "nominal"
 
     @property
     def effects(self) -> tuple[str, ...]:

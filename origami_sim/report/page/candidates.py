@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from origami_sim.fit.hypothesis import SEPARATOR
 from origami_sim.infer.diagnosis import Candidate, Diagnosis, Number
 from origami_sim.report.page.markup import MISSING, Html, amount, element, interval, number, times
 from origami_sim.report.page.measures import has_noise, known, multiples
 from origami_sim.report.page.pieces import bar, figure, fold, nothing, quiet, row, table
-from origami_sim.report.page.wording import SEPARATOR, number_of, worded, words_of
+from origami_sim.report.page.wording import number_of, worded, words_of
 
 OPEN = 5
 """Explanations that are listed at first."""

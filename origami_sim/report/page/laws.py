@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import CATALOGUE
+from origami_sim.fit.hypothesis import SEPARATOR
 from origami_sim.infer.diagnosis import REVERSAL, Curve, Diagnosis, Partial, Trace
+from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.report.page.markup import Html, element
 from origami_sim.report.page.measures import array
 from origami_sim.report.page.pieces import against, legend, moment_of
 from origami_sim.report.page.plots import Plot, span_of
-from origami_sim.report.page.wording import SEPARATOR, title_of, words_of
+from origami_sim.report.page.wording import title_of, words_of
 
 MOST = 4
 """Laws that are drawn; more are named in the headline only."""
@@ -48,7 +50,7 @@ def _law(p: Partial) -> Html:
 def _of_recording(d: Diagnosis, label: str) -> Html | None:
     """For what acts on no coordinate: the residual that it explains, in time."""
     effect, _, site = label.partition(" at ")
-    channel = site.removeprefix("channel ") if CATALOGUE[effect].family == "measurement" else ""
+    channel = site.removeprefix("channel ") if of_recorder(effect) else ""
     return _trace(d, _capital(words_of(label)), channel=channel)
 
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from origami_sim.fit.hypothesis import SEPARATOR
 from origami_sim.infer.diagnosis import Diagnosis, Suspected
 from origami_sim.report.page.markup import MISSING, Html, element, number, percent, plus_minus
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.pieces import bar, figure, fold, nothing, quiet, row, table
 from origami_sim.report.page.plots import colour, is_dark
-from origami_sim.report.page.wording import SEPARATOR, effect_of, site_of, title_of, worded, words_of
+from origami_sim.report.page.wording import effect_of, site_of, title_of, worded, words_of
 
 OPEN = 12
 """Suspects that are listed at first."""

@@ -4,10 +4,8 @@ import re
 from functools import cache
 
 from origami_sim.effects import CATALOGUE, get
+from origami_sim.fit.hypothesis import SEPARATOR
 from origami_sim.infer.words import WHOLE, title
-
-SEPARATOR = " + "
-"""Between the effects of one explanation in its label."""
 
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
 _PLAIN_OWNERS = ("inertia", "setting")
