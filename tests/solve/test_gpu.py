@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from solve.sheets import rimmed_end
 from solve.test_touch import letter, made, plates
+from solve.test_touch_by_default import roll
 
 from origami_sim import Drive, FieldTable, Sheet, coil, field_at, field_table, magnet, ramp, series, simulate, strip
 from origami_sim.model import State
@@ -80,6 +81,17 @@ def test_shells_touch(cuda):
     model, parameters = s.build()
     run = same_on(cuda, model, parameters, Drive(), duration=8e-3, rate=500)
     assert run.energies["touch"].max() > 0 and run.energies["shell_bending"].max() > 0
+
+
+def test_panels_of_which_nothing_is_stated_are_seen_to_meet(cuda):
+    """In one world of two; there the watch and what follows from it are the same on both devices."""
+    model, parameters = roll().build()
+    rest = parameters["crease", "rest_angle"] * np.array([[0.6, 1.0]])
+    parameters.set("crease", "rest_angle", rest)
+    cpu, gpu = (simulate(model, parameters, duration=0.1, rate=60, device=d) for d in ("cpu", cuda))
+    assert "meet" in cpu.notes[0] and gpu.notes[0] == cpu.notes[0]
+    assert gpu.model.laws == cpu.model.laws and "touch" in gpu.model.laws
+    assert np.abs(gpu.x - cpu.x).max() < 1e-9
 
 
 @pytest.mark.parametrize("panels", ["elastic", "rigid"])
