@@ -1,7 +1,8 @@
 """Rollouts of rigid panels: recordings cut into short segments that are tied to each other."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +29,7 @@ from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import RigidBatch, Topology, check_inertia
+from origami_sim.threads import shared
 
 FEWEST = 8
 """Frames of a segment, at least: as many as tell its start's rate."""
@@ -40,6 +42,9 @@ where this would let them go over three: worlds that differ by a nudge then take
 differences, where steps of their own made intervals fifty times too narrow.
 """
 
+FOLLOWED = 4
+"""Worlds that are followed together from segment to segment, while other cores follow others."""
+
 FINEST = 1e-4
 """Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
 
@@ -49,6 +54,31 @@ Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis 
 
 POINTS = 8
 """Motions that are kept: those of the last points that a fit tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chained:
+    """Segments of a recording, each tied to the next.
+
+    Attributes:
+        recording: its index. blocks: (B). local: [1, B, L] shifts of their starts, or None. angles, rates: [B, m] where
+            they begin. begins: (B + 1,) frames at which they do, and the end. step: between frames [s]. dt: alike,
+            where blocks do not last as long.
+    """
+
+    recording: int
+    blocks: list[Block]
+    local: np.ndarray | None
+    angles: np.ndarray
+    rates: np.ndarray
+    begins: list[int]
+    step: float
+    dt: float
+
+    def shots(self, worlds: list[World], frames: int) -> Shots:
+        """Rollouts of worlds that begin with the first block."""
+        local = None if self.local is None else np.repeat(self.local[:, :1], len(worlds), axis=0)
+        return Shots(self.recording, self.blocks[:1], worlds, None, local, None, self.step, frames, 0)
 
 
 class RigidRollouts(Rollouts):
@@ -219,58 +249,92 @@ class RigidRollouts(Rollouts):
 
         A point of a fit is asked for again where derivatives are taken there.
         """
-        numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
-        blocks = [self.blocks[n] for n in numbers]
-        if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
+        chained = self._chained(r, local)
+        if chained is None:
             return super()._motion(r, world, local)
-        m, shifts = self.articulation.size, np.zeros((len(blocks), self.local)) if local is None else local[numbers]
-        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)])
-        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)])
-        begins = tuple((b.first, b.lasting, b.times[-1]) for b in blocks)
+        begins = tuple((b.first, b.lasting, b.times[-1]) for b in chained.blocks)
         (model, parameters), drive = world, self.drives[r]
-        key = (r, id(drive), begins, model.hash, parameters.hash, angles.tobytes(), rates.tobytes())
-        key += (b"" if local is None else shifts.tobytes(),)  # by which its films are known
+        starts = (
+            chained.angles.tobytes(),
+            chained.rates.tobytes(),
+            b"" if chained.local is None else chained.local.tobytes(),
+        )
+        key = (r, id(drive), begins, model.hash, parameters.hash, *starts)  # shifts: by which its films are known
         if key not in self._moved:
             if len(self._moved) >= POINTS:
                 del self._moved[next(iter(self._moved))]
-            found = self._followed(r, world, blocks, angles, rates, None if local is None else shifts[None])
+            found = self._followed(chained, world)
             self._moved[key] = drive, super()._motion(r, world, local) if found is None else found
         motion = self._moved[key][1]
         self._films.update(motion.films if motion is not None else {})
         return motion
 
-    def _followed(
-        self, r: int, world: World, blocks: list[Block], angles: np.ndarray, rates: np.ndarray, local: np.ndarray | None
-    ) -> Motion | None:
-        """The motion of a world from segment to segment, that start at angles and rates [B, m]; None: unstable.
-
-        With films of the segments, which are those of segments alone but for rounding.
-
-        Args:
-            local: [1, B, L] shifts of the starts that lead there, or None.
-        """
-        model, parameters = world
-        recording, step = self.recordings[r], film_step(self.recordings[r].times)
+    def _chained(self, r: int, local: np.ndarray | None) -> Chained | None:
+        """The segments of a recording, of which each begins where the one before ends; None if they do not."""
+        numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
+        blocks = [self.blocks[n] for n in numbers]
+        if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
+            return None
+        m, shifts = self.articulation.size, np.zeros((len(blocks), self.local)) if local is None else local[numbers]
+        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)])
+        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)])
+        step = film_step(self.recordings[r].times)
         lasting = [b.lasting if b.reach is not None else float(b.times[-1]) for b in blocks]
         begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
-        shots = Shots(r, blocks, [world], None, local, None, step, len(recording.times), 0)
-        starts = self._state(shots)
-        begin = State.at_rest(model, position=starts.x[:, :1], placed=True)
-        begin.memory[:] = self._rested(r, [world], 0, begin.x).remembered()
-        first = replace(shots, blocks=blocks[:1])
-        drive = self._driven(first, model, parameters)
+        regular = all(even(step, t, n) == step for t, n in zip(lasting, np.diff(begins).tolist(), strict=True))
+        dt = step if regular else sum(lasting) / begins[-1]
+        return Chained(r, blocks, None if local is None else shifts[None], angles, rates, begins, step, dt)
+
+    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray] | None:
+        """See `Rollouts._own_memories`: each world's segments begin where those of the first do.
+
+        An arm that has come to rest against dry friction shows why: what is told of a world that is carried along the
+        first one's motion would push it off.
+        """
+        chained, motion = self._chained(r, local), self._motion(r, worlds[0], local)
+        if chained is None or motion is None:
+            return None
+
+        def remembered(part: list[World]) -> np.ndarray:
+            return self._anew(chained, part)[2]
+
+        others = worlds[1:]
+        parts = [others[k : k + FOLLOWED] for k in range(0, len(others), FOLLOWED)]
+        found = zip(*shared([partial(remembered, part) for part in parts]), strict=True)
+        return {
+            b.first: np.column_stack([motion.memory[b.first], *k]) for b, k in zip(chained.blocks, found, strict=True)
+        }
+
+    def _anew(self, chained: Chained, worlds: list[World]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Worlds that go on from segment to segment, see `film_anew`."""
+        r, count = chained.recording, len(worlds)
+        shots = chained.shots(worlds, len(self.recordings[r].times))
+        (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
+        begin = State.at_rest(model, count, position=self._state(shots).x, placed=True)
+        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1]).remembered()
+        drive = self._driven(shots, model, parameters)
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
-        regular = all(even(step, t, n) == step for t, n in zip(lasting, np.diff(begins).tolist(), strict=True))
-        dt = step if regular else sum(lasting) / begins[-1]
-        x, turned, kept, ended = batch.film_anew(begins[-1], dt, begins[:-1], angles[:, :, None], rates[:, :, None])
+        starts = [np.repeat(a[:, :, None], count, axis=2) for a in (chained.angles, chained.rates)]
+        return batch.film_anew(chained.begins[-1], chained.dt, chained.begins[:-1], *starts)
+
+    def _followed(self, chained: Chained, world: World) -> Motion | None:
+        """The motion of a world from segment to segment; None: unstable.
+
+        With films of the segments, which are those of segments alone but for rounding.
+        """
+        r, blocks, begins = chained.recording, chained.blocks, chained.begins
+        (model, _), recording = world, self.recordings[r]
+        x, turned, kept, ended = self._anew(chained, [world])
         if not np.all(np.isfinite(x)):
             return None
         memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
-        path = np.concatenate([begin.x[None, :, 0], x[:, :, 0]])
+        first = chained.shots([world], len(recording.times))
+        starts = self._state(replace(first, blocks=blocks, local=chained.local))
+        path = np.concatenate([starts.x[None, :, 0], x[:, :, 0]])
         steady = all(s.constant for s in self.drives[r].signals.values())
-        if not regular or not steady or any(get(e).family == "drive" for e in model.effects):
+        if chained.dt != chained.step or not steady or any(get(e).family == "drive" for e in model.effects):
             return Motion(path, memory)  # segments alone take steps, and see the drive at instants, of their own
         at_first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
         later = pictured(model, recording, x, turned)[:, :, 0]
@@ -280,7 +344,7 @@ class RigidRollouts(Rollouts):
             kinds.setdefault((frames + 1, ends), []).append(n)
         films = {}
         for (frames, ends), mine in kinds.items():
-            shifts, then = None if local is None else local[:, mine], kept[mine, :, 0].T
+            shifts, then = None if chained.local is None else chained.local[:, mine], kept[mine, :, 0].T
             each = [blocks[n] for n in mine]
             own = replace(first, blocks=each, local=shifts, memory=then, frames=frames, ends=ends)
             for n, key in zip(mine, self._film_keys(own), strict=True):

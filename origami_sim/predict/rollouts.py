@@ -390,9 +390,10 @@ class Rollouts(Worlds, ABC):
     ) -> dict[int, np.ndarray] | None:
         """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
 
-        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
-        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
-        carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
+        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L], or
+        of each world's own where that can be followed. Else all nodes are held and carried along the first world's: the
+        laws feel the motion without changing it. Before that they rest. What carrying straight from frame to frame does
+        wrong to the first world, whose memory is known, it does to all.
         """
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
@@ -407,10 +408,19 @@ class Rollouts(Worlds, ABC):
         some, of = distinct_memories(worlds)
         if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
             return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
-        worlds, path = [worlds[k] for k in some], motion.positions[:, :, None]
+        worlds = [worlds[k] for k in some]
+        own = self._own_memories(r, worlds, local) if motion.memory else None
+        out = self._carried_memories(r, worlds, motion, every, max(b.first for b in wanted)) if own is None else own
+        return {first: memory[:, of] for first, memory in out.items()}
+
+    def _carried_memories(
+        self, r: int, worlds: list[World], motion: Motion, every: np.ndarray, last: int
+    ) -> dict[int, np.ndarray]:
+        """Memory [M, K] of worlds that are carried along the motion of the first, by first frame up to the last."""
+        path = motion.positions[:, :, None]
         step = float(np.median(np.diff(self.recordings[r].times)))
         out: dict[int, np.ndarray] = {}
-        asked = every[every <= max(b.first for b in wanted)]
+        asked = every[every <= last]
         for near in np.split(asked, np.flatnonzero(np.diff(asked) > LEAD) + 1):  # carried from one to the next
             begin = max(int(near[0]) - LEAD, 0)
             batch = self._rested(r, worlds, begin, path[begin])
@@ -423,8 +433,12 @@ class Rollouts(Worlds, ABC):
                 if first in motion.memory:
                     carried = carried + (motion.memory[first][:, None] - carried[:, :1])
                     carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
-                out[first] = carried[:, of]
+                out[first] = carried
         return out
+
+    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray] | None:
+        """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; None: not known."""
+        return None
 
     def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:
         """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on.

@@ -238,6 +238,23 @@ def test_laws_remember_the_simulated_motion_where_a_segment_starts():
     assert len(forward.blocks) == 5 and np.abs(left).max() < 0.15 * NOISE
 
 
+def test_worlds_side_by_side_remember_their_own_motion():
+    """A panel that comes to rest against dry friction: of worlds that yield later, each stays where it stopped."""
+    model, parameters = hanging(2)
+    richer = model.with_effects("crease_friction")
+    rubbing = parameters.for_model(richer).set("crease_friction", "friction_moment", 1e-4)
+    forward = RigidRollouts(subject(2), [swung(richer, rubbing, duration=2.0)], segment=0.3)
+    assert np.ptp(forward.blocks[-1].values) < 1e-3 < np.ptp(forward.blocks[0].values), "it does not come to rest"
+    friction = next(
+        s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect == "crease_friction"
+    )
+    thetas = [np.array([1.0, 1.0, 1.0, 1e-4, angle]) for angle in (0.01, 0.011, 0.02)]
+    together = forward.predict(Hypothesis((friction,)), thetas)
+    for k, theta in enumerate(thetas):
+        for values, alone in zip(together, forward.predict(Hypothesis((friction,)), [theta]), strict=True):
+            np.testing.assert_allclose(values[k], alone[0], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["mass_1", "centre_1", "centre_2", "inertia_1", "inertia_2", "length_1"])
 def test_every_number_of_a_body_moves_what_is_predicted(name):
     """Worlds whose bodies have other centres and inertia, side by side, move as each does by itself."""
