@@ -227,10 +227,9 @@ class Summed:
         full, value, move, force = a, sets.at, sets.at, np.zeros_like(sets.at)
         for turn in range(ROUNDS):
             if turn:  # as narrow as the normals are that a strength of this size may come from
-                slab = np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(sets.usual, value))
-                tight = np.where(sets.strength, slab, tight)
+                tight = np.where(sets.strength, sharpness(value, norm, sets.usual, hyper), tight)
             full = a + np.eye(k) * (tight**2)[..., None, :]
-            move, force = _least(full, b - sets.at * tight**2, sets.low - sets.at, sets.high - sets.at)
+            move, force = least_within(full, b - sets.at * tight**2, sets.low - sets.at, sets.high - sets.at)
             value = sets.at + move
         inverse = np.linalg.inv(full)
         sd = np.sqrt(np.maximum(inverse[..., range(k), range(k)], 1e-300))
@@ -296,7 +295,7 @@ def log_usual(c: np.ndarray, hyper: Hyper) -> np.ndarray:
     return np.where(np.isfinite(c), np.log(share), 0.0)
 
 
-def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def least_within(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where x' A x / 2 - b' x is least within bounds, and its slope there: none but in numbers that a bound holds.
 
     A sweep over coordinates finds which numbers are held, and a Newton step up to the next bound moves the others, in
@@ -338,6 +337,15 @@ def _least(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> t
     x[met] = found
     slope[met] = np.where((found <= low) | (found >= high), b - (a @ found[..., None])[..., 0], 0.0)
     return x, slope
+
+
+def sharpness(value: np.ndarray, norm: np.ndarray, usual: np.ndarray, hyper: Hyper) -> np.ndarray:
+    """One over the standard deviation of the normal prior of a strength that turned out to have this value.
+
+    Args:
+        norm: detectability of a strength of one. usual: strengths as they usually are.
+    """
+    return np.hypot(norm * _narrow(value * norm, hyper), np.sqrt(2.0) / np.hypot(usual, value))
 
 
 def _narrow(d: np.ndarray, hyper: Hyper) -> np.ndarray:

@@ -4,11 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
+from origami_sim.fit.evidence import ROUNDS, least_within, sharpness
+from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.least_squares import Fit, precision
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, restored
+from origami_sim.infer.implied import OwnColumns
 from origami_sim.recording import Recording
 
 FOLDS = 5
@@ -31,7 +33,7 @@ class HeldOut:
 
 
 def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
-    """Errors with numbers from all other folds, by one Gauss-Newton step from the full fit; starts are adapted.
+    """Errors with numbers from all other folds, by a Gauss-Newton step from the full fit; starts are adapted.
 
     Args:
         alike: the noise, and the gaps between segments, to which starts are adapted: the same for all that is compared.
@@ -56,29 +58,45 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
     return HeldOut(np.sqrt(squares / np.maximum(seen, 1)), np.array(folds_))
 
 
-def steps_without(f: Fit, parts: Sequence[Sequence[int]]) -> Iterator[np.ndarray]:
+def steps_without(f: Fit, parts: Sequence[Sequence[int]], hyper: Hyper = HYPER) -> Iterator[np.ndarray]:
     """Changes of the numbers (P,) of a fit, over their scales, without each of some parts of its segments.
 
-    One Gauss-Newton step within the bounds. Nothing if the fit left the numbers as they were.
+    The mode of the normal model that the evidence is of, within the bounds: what all other segments do not tell of a
+    strength, its prior does. Nothing if the fit left the numbers as they were.
     """
-    line = f.linear
+    line, own, known = f.linear, OwnColumns(f), precision(f.free)
     assert line is not None
-    width = line.tangent[0].shape[1]
+    width, nominal = line.tangent[0].shape[1], own.nominal
     cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
-    scale, prior = np.array([n.scale for n in f.free]), precision(f.free)
-    away = prior * ((np.array([n.start for n in f.free]) - f.theta) / scale)
+    scale = np.array([n.scale for n in f.free])
+    value = (f.theta - np.array([n.start for n in f.free])) / scale
     low, high = ((np.array([getattr(n, end) for n in f.free]) - f.theta) / scale for end in ("lower", "upper"))
+    strong = np.array([own.columns[c] for g in own.groups for c in g.columns[: g.strengths]], int)
+    usual = np.concatenate([np.zeros(0), *(g.sizes()[: g.strengths] for g in own.groups)])
+    none = np.zeros(width)
+    none[strong] = value[strong]
     for part in parts:
         if not width:
             yield np.zeros(0)
             continue
-        rows = [cleared[n] for n in range(len(cleared)) if n not in part]
-        a = np.concatenate([*(r[:, :-1] for r in rows), np.diag(prior)])
-        y = np.concatenate([*(r[:, -1] for r in rows), away])
-        a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
-        y = np.concatenate([y, np.zeros(width)])
-        q, r = np.linalg.qr(a)
-        yield lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x
+        rows = np.concatenate([cleared[0][:0], *(cleared[n] for n in range(len(cleared)) if n not in part)])
+        size = np.linalg.norm(rows[:, :-1], axis=0)
+        least = np.maximum(1e-6 * size, max(1e-9 * size.max(initial=0.0), 1e-18))  # of what nothing tells
+        q, r = np.linalg.qr(np.concatenate([rows[:, :-1], np.diag(least)]))
+        right = q.T @ np.append(rows[:, -1], -least * none)
+        given = np.concatenate([r[:, nominal], np.diag(known[nominal])])
+        told = np.concatenate([r[:, strong], np.zeros((len(nominal), len(strong)))])
+        basis = np.linalg.qr(given)[0]
+        norm = np.maximum(np.linalg.norm(told - basis @ (basis.T @ told), axis=0), 1e-12)
+        sharp, step = known.copy(), np.zeros(width)
+        for turn in range(ROUNDS):
+            found = (value + step)[strong]
+            sharp[strong] = sharpness(found, norm, usual, hyper) if turn else norm / hyper.slabs[-1]
+            a = np.concatenate([r, np.diag(sharp)])
+            size = np.linalg.norm(a, axis=0)
+            gram, y = (a / size).T @ (a / size), (a / size).T @ np.concatenate([right, -sharp * value])
+            step = least_within(gram[None, None], y[None, None], low * size, high * size)[0][0, 0] / size
+        yield step
 
 
 def folds(forward: Predictor, blocks: Sequence[int]) -> list[list[int]]:

@@ -17,7 +17,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.suspects import suspects
-from origami_sim.infer.held_out import folds, held_out
+from origami_sim.infer.held_out import folds, held_out, steps_without
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
@@ -186,6 +186,21 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
     left = held_out(forward, replace(base, free=wide, linear=replace(line, residual=asks)), base.weights)
     assert len(left.folds) == 5 and left.folds[0] > 3.0 * max(left.folds[1:])
+
+
+def test_a_strength_of_which_one_stretch_alone_tells_is_none_when_that_is_left_out(found, rubbing):
+    """No number is kept that only what is held out tells, and none is sought that follows the rest's noise."""
+    forward = rubbing[0]
+    best = next(n.fit for k, n in found.nodes.items() if found.label(k) == "crease_friction at crease 1")
+    last, column = folds(forward, best.blocks)[-1], len(forward.subject.nominals)
+    tangent = [t.copy() for t in best.linear.tangent]
+    for n, t in enumerate(tangent):
+        t[:, column] *= n in last
+    alone = replace(best, linear=replace(best.linear, tangent=tangent))
+    for f, left in ((alone, 0.0), (best, 1.0)):
+        (step,) = steps_without(f, [last])
+        now = f.theta[column] / f.free[column].scale
+        assert now > 0 and now + step[column] == pytest.approx(left * now, abs=0.1 * now)
 
 
 LEVELS = [
