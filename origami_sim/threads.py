@@ -94,11 +94,17 @@ def side_by_side(
     return shared(jobs, done)
 
 
-def shared(jobs: Sequence[Callable[[], T]], progress: Callable[[float], None] | None = None) -> list[T]:
-    """What jobs return that are too short for copies of their own: as `side_by_side`, if processes go in step."""
+def shared(
+    jobs: Sequence[Callable[[], T]], progress: Callable[[float], None] | None = None, *, led: int = 0
+) -> list[T]:
+    """What jobs return that are too short for copies of their own: as `side_by_side`, if processes go in step.
+
+    Args:
+        led: so many of them, the last ones, are for the process that `leads`, which does them first.
+    """
     done = progress or (lambda part: None)
     if _team is not None and not _busy and len(jobs) > 1:
-        return _team.share(jobs, len(jobs), done)
+        return _team.share(jobs, len(jobs) - led, done)
     out = []
     for n, job in enumerate(jobs):
         out.append(job())

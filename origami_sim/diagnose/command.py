@@ -30,7 +30,6 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import attempt
 from origami_sim.diagnose.observed import assumed, check_recording
 from origami_sim.diagnose.options import Options
-from origami_sim.diagnose.overlay import write_overlays
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Free, Subject
@@ -98,10 +97,11 @@ def run(args: Namespace) -> int:
         print("\n".join(said), flush=True)
     keep, progress = Keep(folder / RESUME), Progress()
     files = keep.write = Files(folder, settings, given if is_device(given) else name, keep)
+    keep.film = files.film
     try:
         with ending_as_interrupted():
             found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
-            progress.stage("replay")
+            progress.stage("page")
             files.finish(found)
     except KeyboardInterrupt:
         progress.end()
@@ -358,14 +358,17 @@ class Files:
         self.made = {"replays": []}
         found.notes.append(f"{fault} Only what is printed is left.")
 
+    def film(self, found: Diagnosis) -> list[Path]:
+        """Writes replays."""
+        from origami_sim.diagnose.overlay import write_overlays  # what draws takes 0.4 s to load
+
+        return write_overlays(self.folder, self.keep, found)
+
     def finish(self, found: Diagnosis) -> None:
-        """Writes replays, page, and the data once more, with notes of what failed."""
-        keep, made = self.keep, self.made
-        forward = keep.forward
+        """Writes the page, and the data once more, with notes of what failed."""
+        forward, made = self.keep.forward, self.made
         assert forward is not None
-        made["replays"] = attempt(
-            found.notes, "The replay could not be written", lambda: write_overlays(self.folder, keep, found), []
-        )
+        made["replays"] = self.keep.films
         page = attempt(
             found.notes,
             "The page could not be written",

@@ -215,18 +215,24 @@ def _diagnosed(
     def others() -> dict:
         return {"baselines": baselines(forward, base, weights, errors[frozenset()])}
 
+    film = None if keep is None else keep.film
+
+    def replay() -> dict:
+        return {} if film is None else {"films": film(out)}
+
     rest = lambda: {"correlations": correlations(forward, base, best)}  # noqa: E731
     blows = lambda: {"impulses": impulses(forward, base)}  # type: ignore[arg-type]  # noqa: E731
     since = lambda: {"onset": onset(forward, base)}  # noqa: E731
     parts = [
         Part("curves", "What was predicted cannot be shown", curves, quick=True),
-        Part("curves", "Correlations could not be told", rest, quick=True),
-        Part("curves", "What looks alike could not be told", lambda: alike(shown, base), quick=True),
-        Part("locate", "Where the mismatch is could not be told", places),
-        Part("locate", "What each effect gives could not be told", laws_shown),
         Part("locate", "What is left could not be described", left, quick=True),
-        Part("locate", "Impulses could not be told", blows, quick=True),
-        Part("locate", "The onset could not be told", since),
+        Part("locate", "What each effect gives could not be told", laws_shown, alone=True),
+        Part("locate", "Where the mismatch is could not be told", places, alone=True),
+        Part("locate", "Impulses could not be told", blows, alone=True),
+        Part("locate", "The onset could not be told", since, alone=True),
+        Part("curves", "Correlations could not be told", rest, alone=True),
+        Part("curves", "What looks alike could not be told", lambda: alike(shown, base), alone=True),
+        *([] if film is None else [Part("replay", "The replay could not be written", replay, alone=True, of=keep)]),
         Part("next experiment", "The next experiment could not be told", experiments),
         Part("baselines", "Baselines could not be told", others),
     ]

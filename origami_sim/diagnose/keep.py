@@ -20,6 +20,7 @@ class Keep:
         cache: predictions on disk, if there is a folder for them.
         found: the diagnosis as far as it stands; None before there is a verdict.
         write: called with it whenever it has changed; may be set.
+        film: writes its replays and returns them; may be set. films: what it returned.
         store: whether `stored` is wanted: what is needed to judge the search anew; there as soon as the verdict stands.
     """
 
@@ -31,6 +32,8 @@ class Keep:
         self.store = store
         self.stored: Stored | None = None
         self.write: Callable[[Diagnosis], object] | None = None
+        self.film: Callable[[Diagnosis], list[Path]] | None = None
+        self.films: list[Path] = []
 
     def follow(self, forward: Predictor) -> None:
         """From now on, predictions of this predictor, and of copies of it, are remembered."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -60,7 +61,6 @@ class Fit:
         penalty: of the departures from priors.
         residuals: per fitted block (n, D), recorded minus predicted [SI].
         tangent: [R, P] whitened derivative of all predictions by theta (scaled), with the starts projected out.
-        covariance: [P, P] of theta [SI], given the weights.
         at_bound: (P,) whether a number lies on a bound.
         failed: why the fit could not be made, or "".
         wider: (P,) by how much effects that are too small to be told widen what is known of theta; None: not asked.
@@ -76,7 +76,6 @@ class Fit:
     misfit: float
     penalty: float
     residuals: list[np.ndarray]
-    covariance: np.ndarray
     at_bound: np.ndarray
     failed: str = ""
     linear: "Linearisation | None" = None
@@ -87,6 +86,18 @@ class Fit:
     @property
     def cost(self) -> float:
         return self.misfit + self.penalty
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """[P, P] of theta [SI], given the weights; zero if the numbers were not fitted."""
+        count = len(self.free)
+        if self.linear is None:
+            return np.full((count, count), np.nan)
+        if not self.linear.tangent[0].shape[1]:
+            return np.zeros((count, count))
+        scale = np.array([f.scale for f in self.free])
+        a = np.concatenate([self.linear.eliminated.rows[:, :-1], np.diag(precision(self.free))])
+        return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
 
     def rms(self) -> np.ndarray:
         """(D,) root mean square of the residuals [SI]; nan where nothing was seen."""
@@ -107,9 +118,7 @@ class Fit:
         assert self.linear is not None and self.weights is not None
         line = self.linear.reweighted(self.weights, new)
         misfit = float(sum(r @ r for r in line.residual))
-        return replace(
-            self, linear=line, misfit=misfit, covariance=_covariance(self.free, line), weights=new, exact=False
-        )
+        return replace(self, linear=line, misfit=misfit, weights=new, exact=False)
 
 
 def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
@@ -435,7 +444,7 @@ def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple
     lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
     width = line.tangent[0].shape[1]
     change = np.zeros(len(free))
-    chain = line.chain.eliminated()
+    chain = line.eliminated
     whole = chain.rows
     if width:
         prior = precision(free)
@@ -477,24 +486,11 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) ->
         misfit,
         penalty(free, theta),
         residuals,
-        _covariance(free, line),
         at_bound,
         linear=line,
         weights=weights,
     )
 
 
-def _covariance(free: Sequence[Free], line: Linearisation) -> np.ndarray:
-    """[P, P] covariance of theta; zero if the numbers were not fitted."""
-    if not line.tangent[0].shape[1]:
-        return np.zeros((len(free), len(free)))
-    scale = np.array([f.scale for f in free])
-    a = np.concatenate([line.chain.eliminated().rows[:, :-1], np.diag(precision(free))])
-    return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
-
-
 def _failed(hypothesis, free, theta, local, blocks, why: str) -> Fit:
-    n = len(free)
-    return Fit(
-        hypothesis, free, theta, local, blocks, np.inf, 0.0, [], np.full((n, n), np.nan), np.zeros(n, bool), failed=why
-    )
+    return Fit(hypothesis, free, theta, local, blocks, np.inf, 0.0, [], np.zeros(len(free), bool), failed=why)

@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.linalg.lapack import dgeqrf, dorgqr
 
-from origami_sim.fit.chain import Chain
+from origami_sim.fit.chain import Chain, Eliminated
 from origami_sim.fit.weights import Rows, Weights, recast
 
 
@@ -79,6 +79,11 @@ class Linearisation:
         """The tangent and the residual as a chain."""
         both = [np.column_stack(parts) for parts in zip(self.tangent, self.residual, strict=True)]
         return Chain.of(self, both)
+
+    @cached_property
+    def eliminated(self) -> Eliminated:
+        """These without what starts explain."""
+        return self.chain.eliminated()
 
     def smoothed(self, parts: Sequence[np.ndarray], found: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Columns [r, ...] of each segment, in its own rows, without what changes of the starts [L, ...] explain."""

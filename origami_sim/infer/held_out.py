@@ -43,7 +43,7 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
     assert line is not None and weights is not None
     judged, dims, parts = line.reweighted(weights, alike), len(weights.deviation), folds(forward, f.blocks)
     squares, seen, folds_ = np.zeros(dims), np.zeros(dims), []
-    chain = judged.chain.eliminated()
+    chain = judged.eliminated
     for part, step in zip(parts, steps_without(f, parts), strict=True):
         starts = list(chain.starts(np.append(-step, 1.0)[:, None])[:, :, 0])
         left = judged.smoothed([r - t @ step for r, t in zip(judged.residual, judged.tangent, strict=True)], starts)

@@ -138,9 +138,7 @@ class Stored:
 
     def _node(self, key, members, groups, others, problems, signatures, hyper: Hyper) -> Node:
         hypothesis = Hypothesis(tuple(signatures[m].suspect for m in members))
-        fit = Fit(
-            hypothesis, hypothesis.free, np.zeros(0), np.zeros((0, 0)), (), 0.0, 0.0, [], np.zeros((0, 0)), np.zeros(0)
-        )
+        fit = Fit(hypothesis, hypothesis.free, np.zeros(0), np.zeros((0, 0)), (), 0.0, 0.0, [], np.zeros(0))
         own = [tuple(range(len(members)))]
         laid = Sets.of(own, groups, len(members), len(next(iter(problems.values())).gram) - 1)
         grid, evidence = [], np.full(len(hyper.cells), -np.inf)

@@ -51,13 +51,14 @@ def test_a_verdict_outlives_the_process_and_all_that_fails_after_it(recorded, tm
     assert found["verdict"] == "MECHANISM" and found["unfinished"] == ["baselines"]
     assert found["places"] and found["candidates"] and not found["baselines"]
     assert "crease_friction" in tomllib.loads((out / "patched.toml").read_text())["effects"]
-    assert {p.name for p in out.iterdir()} == {"diagnosis.json", "patched.toml", ".resume"}
+    assert {p.name for p in out.iterdir()} == {"diagnosis.json", "patched.toml", "replay.rrd", ".resume"}
 
     def crash(*_):
         raise RuntimeError("no memory for that")
 
     (out / "report.html").mkdir()  # so that the page cannot be written
     (out / "report.html" / "taken").write_text("")
+    (out / "replay.rrd").unlink()
     (out / "replay.rrd").mkdir()
     monkeypatch.setattr(import_module("origami_sim.diagnose.diagnose"), "baselines", crash)
     assert main(*arguments) == EXIT["MECHANISM"]

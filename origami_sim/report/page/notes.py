@@ -59,7 +59,7 @@ def section(d: Diagnosis, geometry: dict | None) -> list:
 def packed(d: Diagnosis, geometry: dict | None) -> Html:
     """Address that holds all data: {"diagnosis": as `Diagnosis.to_dict()`, "geometry": as given or None}."""
     text = json.dumps({"diagnosis": d.to_dict(), "geometry": geometry}, allow_nan=False, separators=(",", ":"))
-    return Html("data:application/gzip;base64," + base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode())
+    return Html("data:application/gzip;base64," + base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode())
 
 
 def _setting(value) -> str:
