@@ -6,7 +6,7 @@ at once, then every other one of those that remain (cyclic reduction; Golub & Va
 transformations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -60,11 +60,19 @@ class Chain:
         return cls._joined(line, [_condensed(line, columns, range(len(line.rows)))])
 
     @classmethod
-    def shared(cls, line: "Linearisation", columns: Sequence[np.ndarray]) -> "Chain":
-        """The same of many columns, which processes that go in step condense together."""
+    def shared(cls, line: "Linearisation", columns: Callable[[Sequence[int]], Sequence[np.ndarray]]) -> "Chain":
+        """The same of many columns, which processes that go in step make and condense together.
+
+        Args:
+            columns: gives those [r, k] of some segments.
+        """
         segments = range(len(line.rows))
         parts = [segments[n : n + SEGMENTS] for n in range(0, len(segments), SEGMENTS)]
-        return cls._joined(line, shared([partial(_condensed, line, columns, part) for part in parts]))
+
+        def condensed(part: Sequence[int]) -> tuple[np.ndarray, ...]:
+            return _condensed(line, columns(part), part)
+
+        return cls._joined(line, shared([partial(condensed, part) for part in parts]))
 
     @classmethod
     def _joined(cls, line: "Linearisation", parts: Sequence[tuple[np.ndarray, ...]]) -> "Chain":
@@ -149,7 +157,7 @@ def _solved(factors: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _condensed(line: "Linearisation", columns: Sequence[np.ndarray], segments: Sequence[int]) -> tuple[np.ndarray, ...]:
-    """Slopes and rows that starts reach, the same of the gaps, and a triangle of what no start reaches."""
+    """Of columns [r, k] of some segments the rows that starts reach, with slopes, and a triangle of all others."""
     size, count = line.slopes[segments[0]].shape[1], columns[0].shape[1]
     slopes, ends = np.zeros((2, len(segments), size, size))
     own, over = np.zeros((2, len(segments), size, count))
@@ -158,7 +166,8 @@ def _condensed(line: "Linearisation", columns: Sequence[np.ndarray], segments: S
         alike.setdefault(line.rows[n].count - line.rows[n].tie, []).append((place, n))
     for length, mine in alike.items():
         places = [place for place, _ in mine]
-        slope, part = (np.stack([each[n][:length] for _, n in mine]) for each in (line.slopes, columns))
+        slope = np.stack([line.slopes[n][:length] for _, n in mine])
+        part = np.stack([columns[place][:length] for place in places])
         slope[~np.isfinite(slope).all(axis=(1, 2))] = 0.0
         q, r = np.linalg.qr(slope)
         reached = np.swapaxes(q, 1, 2) @ part
@@ -168,7 +177,7 @@ def _condensed(line: "Linearisation", columns: Sequence[np.ndarray], segments: S
         if line.rows[n].tie:
             slope = line.slopes[n]
             ends[place] = slope[-size:] if np.isfinite(slope).all() else 0.0
-            over[place] = columns[n][-size:]
+            over[place] = columns[place][-size:]
     return slopes, own, ends, over, _triangle(np.concatenate(beyond))
 
 

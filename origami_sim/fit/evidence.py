@@ -107,7 +107,7 @@ def problem(
         effects: per segment [r, C]. smooth: per segment [r, K].
     """
     more = [np.concatenate(both, axis=1) for both in zip(effects, smooth, strict=True)]
-    chain = Chain.of(line, beside_numbers(line, nominal, more))
+    chain = Chain.of(line, beside_numbers(line, nominal, range(len(line.rows)), more))
     return reduced(chain, precision[nominal], away[nominal], effects[0].shape[1])
 
 
@@ -117,11 +117,13 @@ def reduced(chain: Chain, precision: np.ndarray, away: np.ndarray, columns: int)
     return without_numbers(with_priors(left.rows, precision, away), len(precision), columns, -left.spread)
 
 
-def beside_numbers(line: Linearisation, nominal: np.ndarray, columns: list[np.ndarray]) -> list[np.ndarray]:
-    """Per segment [r, P + k + 1]: columns of nominal numbers, others [r, k], and the residual."""
+def beside_numbers(
+    line: Linearisation, nominal: np.ndarray, segments: Sequence[int], columns: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Of each of some segments [r, P + k + 1]: columns of nominal numbers, others [r, k], and the residual."""
     return [
-        np.concatenate([t[:, nominal], x, r[:, None]], axis=1)
-        for t, x, r in zip(line.tangent, columns, line.residual, strict=True)
+        np.concatenate([line.tangent[n][:, nominal], x, line.residual[n][:, None]], axis=1)
+        for n, x in zip(segments, columns, strict=True)
     ]
 
 

@@ -85,7 +85,8 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
     def missed(f: Fit) -> float:
         line = f.reweighted(noise).linear
         assert line is not None
-        return sum(float(r @ r) for r in line.cleared(line.residual)) + f.penalty
+        left = line.eliminated.rows[:, -1]
+        return float(left @ left) + f.penalty
 
     first, second, last = missed(given), missed(base), missed(best)
     numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
@@ -142,9 +143,7 @@ def _without(f: Fit, line: Linearisation, lacking: list[int], ends: np.ndarray) 
     back = np.zeros(len(f.free))
     for k in firsts:
         back[k] = (f.theta[k] - f.free[k].start) / scale[k]
-    whole = np.concatenate(
-        line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
-    )
+    whole = line.eliminated.rows
     tangent, left = whole[:, :-1], whole[:, -1] + whole[:, :-1] @ back
     prior = precision(f.free)
     away = prior * (np.array([n.start for n in f.free]) - f.theta) / scale

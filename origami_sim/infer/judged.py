@@ -1,5 +1,6 @@
 """A fit with its evidence: of the set of its effects, under every size of gaps, flaws and discrepancy."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -10,15 +11,16 @@ from origami_sim.fit.chain import Chain
 from origami_sim.fit.evidence import Problem, Summed, beside_numbers, summed
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.weights import log_volume, recast
+from origami_sim.fit.weights import log_volume
+from origami_sim.infer.columns import Columns
 from origami_sim.infer.discrepancy import cosines
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.threads import shared
 
 
-def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, list[np.ndarray]]:
-    """A fit judged by the weights that it has, and the columns of its own and of all further effects, per segment."""
+def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, Columns]:
+    """A fit judged by the weights that it has, and the columns of its own and of all further effects."""
     hyper, line, own = out.hyper, f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
     # order: the fit's own columns by suspect, then those of the strengths of each other suspect
@@ -28,15 +30,16 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     for one in known:
         groups.append(one.group(width))
         width += len(one.size)
-    none = [np.zeros((len(t), 0)) for t in line.tangent]
-    added = [np.concatenate([n, *(s.parts[b] for s in known)], axis=1) for b, n in enumerate(none)]
-    added = recast(added, line.rows, out.weights, f.weights)
-    effects = [np.concatenate([t[:, own.columns], a], axis=1) for t, a in zip(line.tangent, added, strict=True)]
     weights = f.weights
+    effects = Columns(line, weights, own.columns, known, out.weights)
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
-    out.smooth = out.smooth or cosines(forward, f, line)
-    both = [np.concatenate(c, axis=1) for c in zip(effects, out.smooth, strict=True)]
-    chain = Chain.shared(line, beside_numbers(line, own.nominal, both))
+    out.smooth = smooth = out.smooth or cosines(forward, f, line)
+
+    def columns(some: Sequence[int]) -> list[np.ndarray]:
+        both = [np.concatenate([x, smooth[n]], axis=1) for n, x in zip(some, effects.of(some), strict=True)]
+        return beside_numbers(line, own.nominal, some, both)
+
+    chain = Chain.shared(line, columns)
 
     def of_gap(gap: float) -> tuple[Problem, list[Summed]]:
         made = own.problem(chain.regapped(weights.gap / gap), width)

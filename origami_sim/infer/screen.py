@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from origami_sim.effects import get
+from origami_sim.fit.chain import Chain
 from origami_sim.fit.evidence import Group
 from origami_sim.fit.hypothesis import Suspect, along_each_axis, scaled, usual
 from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision, small
@@ -126,13 +127,15 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     """The signatures with their norms about a fit, and what cannot be tested there."""
     line = base.linear
     assert line is not None
-    good = [s for s in found if s.parts and all(np.all(np.isfinite(p)) for p in s.parts)]
+    good = [s for s in found if s.parts and np.all(np.isfinite(np.concatenate(s.parts)))]
     if not good:
         return [replace(s, status=s.status or "its simulation goes unstable") for s in found]
-    own = len(base.free)
-    stacked = [np.concatenate([t[:, :own], *(s.parts[n] for s in good)], axis=1) for n, t in enumerate(line.tangent)]
     prior = precision(base.free)
-    whole = np.concatenate(line.cleared(stacked))
+
+    def columns(some: Sequence[int]) -> list[np.ndarray]:
+        return [np.concatenate([line.tangent[n], *(s.parts[n] for s in good)], axis=1) for n in some]
+
+    whole = Chain.shared(line, columns).eliminated().rows
     width = line.tangent[0].shape[1]
     below = np.zeros((width, whole.shape[1]))
     below[:, :width] = np.diag(prior[:width])
@@ -148,7 +151,7 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
             out.append(replace(s, parts=[], status="its simulation goes unstable"))
             continue
         mine = slice(place[id(s)], place[id(s)] + len(s.size))
-        loud = np.sqrt(np.sum([np.sum(p**2, axis=0) for p in s.parts], axis=0))
+        loud = np.linalg.norm(np.concatenate(s.parts), axis=0)
         axes = along_each_axis(s.suspect)
         most = [_admissible(a, 10 * np.sign(z) * _typical(a)) / z for a, z in zip(axes, s.size, strict=True)]
         reach = np.maximum(1.0, most)

@@ -24,6 +24,7 @@ from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewe
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import FAR, over_noise
+from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns, with_own_noise
 from origami_sim.infer.judged import judged
@@ -497,8 +498,8 @@ def _same_place(a: Suspect, b: Suspect) -> bool:
     return a.effect == b.effect and (a.entities is None or b.entities is None)
 
 
-def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, list[np.ndarray]]:
-    """A fit judged by its own noise, and the columns of its own and of all further effects, per segment."""
+def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, Columns]:
+    """A fit judged by its own noise, and the columns of its own and of all further effects."""
     return judged(out, forward, key, with_own_noise(forward, f, out.hyper))
 
 

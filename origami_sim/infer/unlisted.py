@@ -19,6 +19,7 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.suspects import suspects, told_apart
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.screen import Signature, screen
@@ -114,10 +115,7 @@ def beside(
         k = len(mine)
         groups.append(Group(tuple(range(count, count + k)), k, np.zeros(k), 0, np.full(k, np.inf)))
         count += k
-    effects = [
-        np.concatenate([t[:, own.columns], *(s.parts[b] for s in each)], axis=1) for b, t in enumerate(f.linear.tangent)
-    ]
-    ahead = Foresight.of(forward, f, own, effects, hyper)
+    ahead = Foresight.of(forward, f, own, Columns(f.linear, f.weights, own.columns, each, f.weights), hyper)
     sets = [(*range(before), before + n) for n in range(len(sites))]
     gains = ahead.gains([[groups[g] for g in s] for s in sets], hyper)
     out = []
