@@ -285,25 +285,20 @@ class RigidRollouts(Rollouts):
         dt = step if regular else sum(lasting) / begins[-1]
         return Chained(r, blocks, None if local is None else shifts[None], angles, rates, begins, step, dt)
 
-    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray] | None:
-        """See `Rollouts._own_memories`: each world's segments begin where those of the first do.
-
-        An arm that has come to rest against dry friction shows why: what is told of a world that is carried along the
-        first one's motion would push it off.
-        """
+    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
+        """See `Rollouts._own_memories`: each world's segments begin where those of the first do."""
         chained, motion = self._chained(r, local), self._motion(r, worlds[0], local)
         if chained is None or motion is None:
-            return None
+            return {}
 
         def remembered(part: list[World]) -> np.ndarray:
             return self._anew(chained, part)[2]
 
         others = worlds[1:]
         parts = [others[k : k + FOLLOWED] for k in range(0, len(others), FOLLOWED)]
-        found = zip(*shared([partial(remembered, part) for part in parts]), strict=True)
-        return {
-            b.first: np.column_stack([motion.memory[b.first], *k]) for b, k in zip(chained.blocks, found, strict=True)
-        }
+        found = np.concatenate(shared([partial(remembered, part) for part in parts]), axis=2)
+        first = [motion.memory[b.first][:, None] for b in chained.blocks]
+        return {b.first: np.hstack(both) for b, *both in zip(chained.blocks, first, found, strict=True)}
 
     def _anew(self, chained: Chained, worlds: list[World]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Worlds that go on from segment to segment, see `film_anew`."""

@@ -227,9 +227,9 @@ class Rollouts(Worlds, ABC):
         for (r, part, impossible), (made, arrived, first) in zip(parts, rolled, strict=True):
             self._keep(r, [self.blocks[b] for b in part], first)
             for n, b in enumerate(part):
-                values[b] = np.ascontiguousarray(made[n])  # as stored ones are: sums depend on it in their last digit
-                ends[b] = None if arrived is None else np.ascontiguousarray(arrived[n])
-                values[b][impossible] = np.nan
+                values[b], ends[b] = made[n], None if arrived is None else arrived[n]
+                if impossible:
+                    values[b][impossible] = np.nan
         return Prediction([values[b] for b in wanted], [ends[b] for b in wanted])
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
@@ -332,9 +332,10 @@ class Rollouts(Worlds, ABC):
         if arrived is not None:
             near = arrived[..., columns]
             tied = (carried(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
+        # as stored ones lie in memory: sums depend on it in their last digit
         return (
-            [np.moveaxis(values[:, :, :, b], 2, 0) for b in range(count)],
-            None if tied is None else [tied[:, :, b].T for b in range(count)],
+            [np.ascontiguousarray(np.moveaxis(values[:, :, :, b], 2, 0)) for b in range(count)],
+            None if tied is None else [np.ascontiguousarray(tied[:, :, b].T) for b in range(count)],
             simulated.first,
         )
 
@@ -390,10 +391,11 @@ class Rollouts(Worlds, ABC):
     ) -> dict[int, np.ndarray] | None:
         """Memory [M, K] of the laws where segments start, by first frame; None: no memory.
 
-        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L], or
-        of each world's own where that can be followed. Else all nodes are held and carried along the first world's: the
-        laws feel the motion without changing it. Before that they rest. What carrying straight from frame to frame does
-        wrong to the first world, whose memory is known, it does to all.
+        It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
+        nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
+        carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
+        What does not fade is that of each world's own motion, where that can be followed: an arm that has come to rest
+        against dry friction rests in another place if it yields elsewhere.
         """
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
@@ -409,38 +411,43 @@ class Rollouts(Worlds, ABC):
         if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
             return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
         worlds = [worlds[k] for k in some]
-        own = self._own_memories(r, worlds, local) if motion.memory else None
-        out = self._carried_memories(r, worlds, motion, every, max(b.first for b in wanted)) if own is None else own
+        out = self._carried_along(r, worlds, motion, every[every <= max(b.first for b in wanted)])
+        rows = lasting(model)
+        own = self._own_memories(r, worlds, local) if motion.memory and len(rows) else {}
+        for first in out if own else ():
+            out[first][rows] = own[first][rows]
         return {first: memory[:, of] for first, memory in out.items()}
 
-    def _carried_memories(
-        self, r: int, worlds: list[World], motion: Motion, every: np.ndarray, last: int
-    ) -> dict[int, np.ndarray]:
-        """Memory [M, K] of worlds that are carried along the motion of the first, by first frame up to the last."""
+    def _carried_along(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:
+        """Memory [M, K] by first frame of worlds that are carried along the motion of the first."""
         path = motion.positions[:, :, None]
-        step = float(np.median(np.diff(self.recordings[r].times)))
         out: dict[int, np.ndarray] = {}
-        asked = every[every <= last]
         for near in np.split(asked, np.flatnonzero(np.diff(asked) > LEAD) + 1):  # carried from one to the next
-            begin = max(int(near[0]) - LEAD, 0)
-            batch = self._rested(r, worlds, begin, path[begin])
-            rested = batch.remembered()[None]
-            found = rested
-            if near[-1] > begin:
-                later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
-                found = np.concatenate([rested, later])[-len(near) :]
-            for first, carried in zip(near.tolist(), found, strict=True):
+            parts = np.array_split(np.arange(len(worlds)), min(sharing(), len(worlds)))
+            cores = -(-(self.threads or default_threads()) // len(parts))
+            jobs = [partial(self._carried, r, [worlds[k] for k in part], near, path, cores) for part in parts]
+            for first, carried in zip(near.tolist(), np.concatenate(shared(jobs), axis=2), strict=True):
                 if first in motion.memory:
                     carried = carried + (motion.memory[first][:, None] - carried[:, :1])
                     carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
                 out[first] = carried
         return out
 
-    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray] | None:
-        """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; None: not known."""
-        return None
+    def _carried(self, r: int, worlds: list[World], near: np.ndarray, path: np.ndarray, threads: int) -> np.ndarray:
+        """Memory [n, M, K] at frames that are near each other, carried along positions [F, N, 1, 3] of all frames."""
+        begin, step = max(int(near[0]) - LEAD, 0), float(np.median(np.diff(self.recordings[r].times)))
+        batch = self._rested(r, worlds, begin, path[begin], threads)
+        rested = batch.remembered()[None]
+        if near[-1] <= begin:
+            return rested
+        later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
+        return np.concatenate([rested, later])[-len(near) :]
 
-    def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray) -> Batch:
+    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
+        """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; none: not known."""
+        return {}
+
+    def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray, threads: int = 1) -> Batch:
         """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on.
 
         At the first frame with what `begins` says beside.
@@ -452,18 +459,19 @@ class Rollouts(Worlds, ABC):
         drive = distorted(model, parameters, shifted(self.drives[r], times[[frame]], span, len(worlds)), span)
         held = replace(model, free=np.zeros_like(model.free))
         state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
-        batch = self._batch(held, parameters, drive.held(0.0), state, supports=model)
+        one = {"supports": model, "threads": threads}
+        batch = self._batch(held, parameters, drive.held(0.0), state, **one)
         batch.carry(np.stack([x, x]), LEAD * step)
         rested, motion = batch.remembered(), self.recorded(r)
         moved = begins(model, parameters) if not frame and motion is not None else []
         if moved:  # as unknown as the start's angles are
             assert motion is not None
-            batch = self._batch(held, parameters, drive, replace(state, memory=rested), supports=model)
+            batch = self._batch(held, parameters, drive, replace(state, memory=rested), **one)
             path = motion.positions[:, :, None]
             usual = batch.carry(path, step, range(1, len(path)))
             for rows, given in moved:
                 rested[rows] += given * np.abs(usual[:, rows]).max(axis=0)
-        return self._batch(held, parameters, drive, replace(state, memory=rested), supports=model)
+        return self._batch(held, parameters, drive, replace(state, memory=rested), **one)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, among=self.shared, **{"threads": self.threads, **options})
@@ -491,6 +499,12 @@ class Rollouts(Worlds, ABC):
         arm = self.articulation
         pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
         return np.moveaxis(arm.positions(pose), 1, 0)
+
+
+def lasting(model: Model) -> np.ndarray:
+    """Rows of a model's memory that do not fade: those of laws in which no time passes, such as dry friction."""
+    fades = [np.full(size, "dt" in get(effect).arguments) for effect, _, size in model.memories]
+    return np.flatnonzero(~np.concatenate([np.zeros(0, bool), *fades]))
 
 
 def remembering(state: State, shots: Shots) -> State:
