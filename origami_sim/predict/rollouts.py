@@ -413,8 +413,8 @@ class Rollouts(Worlds, ABC):
         worlds = [worlds[k] for k in some]
         out = self._carried_along(r, worlds, motion, every[every <= max(b.first for b in wanted)])
         rows = lasting(model)
-        own = self._own_memories(r, worlds, local) if motion.memory and len(rows) else {}
-        for first in out if own else ():
+        own = self._own_memories(r, worlds, local) if motion.memory and len(rows) and len(worlds) > 1 else {}
+        for first in out.keys() & own.keys():
             out[first][rows] = own[first][rows]
         return {first: memory[:, of] for first, memory in out.items()}
 
