@@ -55,8 +55,8 @@ class Chain:
     beyond: np.ndarray
 
     @classmethod
-    def of(cls, line: "Linearisation", columns: Sequence[np.ndarray]) -> "Chain":
-        """Columns [r, k] of all segments of a linearisation."""
+    def of(cls, line: "Linearisation", *columns: Sequence[np.ndarray]) -> "Chain":
+        """Columns [r, k] of all segments of a linearisation, beside each other."""
         return cls._joined(line, [_condensed(line, columns, range(len(line.rows)))])
 
     @classmethod
@@ -70,7 +70,7 @@ class Chain:
         parts = [segments[n : n + SEGMENTS] for n in range(0, len(segments), SEGMENTS)]
 
         def condensed(part: Sequence[int]) -> tuple[np.ndarray, ...]:
-            return _condensed(line, columns(part), part)
+            return _condensed(line, [columns(part)], part)
 
         return cls._joined(line, shared([partial(condensed, part) for part in parts]))
 
@@ -156,9 +156,11 @@ def _solved(factors: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.linalg.solve(known, np.where(told[:, :, None], right, 0.0))
 
 
-def _condensed(line: "Linearisation", columns: Sequence[np.ndarray], segments: Sequence[int]) -> tuple[np.ndarray, ...]:
+def _condensed(
+    line: "Linearisation", columns: Sequence[Sequence[np.ndarray]], segments: Sequence[int]
+) -> tuple[np.ndarray, ...]:
     """Of columns [r, k] of some segments the rows that starts reach, with slopes, and a triangle of all others."""
-    size, count = line.slopes[segments[0]].shape[1], columns[0].shape[1]
+    size, count = line.slopes[segments[0]].shape[1], sum(some[0].shape[1] for some in columns)
     slopes, ends = np.zeros((2, len(segments), size, size))
     own, over = np.zeros((2, len(segments), size, count))
     beyond, alike = [np.zeros((0, count))], {}
@@ -167,17 +169,18 @@ def _condensed(line: "Linearisation", columns: Sequence[np.ndarray], segments: S
     for length, mine in alike.items():
         places = [place for place, _ in mine]
         slope = np.stack([line.slopes[n][:length] for _, n in mine])
-        part = np.stack([columns[place][:length] for place in places])
+        part = np.concatenate([np.stack([some[place][:length] for place in places]) for some in columns], axis=2)
         slope[~np.isfinite(slope).all(axis=(1, 2))] = 0.0
         q, r = np.linalg.qr(slope)
         reached = np.swapaxes(q, 1, 2) @ part
         slopes[places, : r.shape[1]], own[places, : r.shape[1]] = r, reached
-        beyond.append((part - q @ reached).reshape(-1, count))
+        part -= q @ reached
+        beyond.append(part.reshape(-1, count))
     for place, n in enumerate(segments):
         if line.rows[n].tie:
             slope = line.slopes[n]
             ends[place] = slope[-size:] if np.isfinite(slope).all() else 0.0
-            over[place] = columns[place][-size:]
+            over[place] = np.concatenate([some[place][-size:] for some in columns], axis=1)
     return slopes, own, ends, over, _triangle(np.concatenate(beyond))
 
 

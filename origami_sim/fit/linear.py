@@ -77,8 +77,7 @@ class Linearisation:
     @cached_property
     def chain(self) -> Chain:
         """The tangent and the residual as a chain."""
-        both = [np.column_stack(parts) for parts in zip(self.tangent, self.residual, strict=True)]
-        return Chain.of(self, both)
+        return Chain.of(self, self.tangent, [r[:, None] for r in self.residual])
 
     @cached_property
     def eliminated(self) -> Eliminated:

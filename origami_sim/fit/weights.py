@@ -108,23 +108,31 @@ class Weights:
 
 def recast(columns: Sequence[np.ndarray], rows: Sequence[Rows], old: Weights, new: Weights) -> list[np.ndarray]:
     """Columns (r,) or [r, k] of segments for other weights."""
-    out = [np.array(c, float) for c in columns]
-    if not old.like(new):
-        for mine in patterns(rows):
-            own = rows[mine[0]]
-            if own.data <= DENSE:
-                by = new.whitened(old.restored(np.eye(own.data), own), own).T
-                for n in mine:
-                    out[n][: own.data] = by @ out[n][: own.data]
-                continue
-            data = np.moveaxis(np.stack([out[n][: own.data] for n in mine]), 1, -1)
-            data = np.moveaxis(new.whitened(old.restored(data, own), own), -1, 1)
-            for n, part in zip(mine, data, strict=True):
-                out[n][: own.data] = part
-    if old.gap != new.gap:
-        for c, r in zip(out, rows, strict=True):
-            c[r.data + r.start :] *= old.gap / new.gap
+    out: list[np.ndarray] = [np.zeros(0)] * len(rows)
+    for alike in patterns(rows):
+        first, known = rows[alike[0]], old.like(new)
+        by = new.whitened(old.restored(np.eye(first.data), first), first).T if not known and first.data <= DENSE else None
+        for mine in _as_long(rows, alike):
+            own, whole = rows[mine[0]], np.stack([columns[n] for n in mine])
+            data = whole[:, : own.data]
+            if by is not None:
+                whole[:, : own.data] = by @ data if data.ndim > 2 else data @ by.T
+            elif not known:
+                whole[:, : own.data] = np.moveaxis(
+                    new.whitened(old.restored(np.moveaxis(data, 1, -1), own), own), -1, 1
+                )
+            whole[:, own.data + own.start :] *= old.gap / new.gap
+            for n, part in zip(mine, whole, strict=True):
+                out[n] = part
     return out
+
+
+def _as_long(rows: Sequence[Rows], some: Sequence[int]) -> list[list[int]]:
+    """Some segments, together where they have as many rows of each kind."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for n in some:
+        found.setdefault((rows[n].start, rows[n].tie), []).append(n)
+    return list(found.values())
 
 
 def whitened(weights: Weights, values: Sequence[np.ndarray], rows: Sequence[Rows]) -> list[np.ndarray]:
