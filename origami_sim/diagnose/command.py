@@ -365,7 +365,7 @@ class Files:
         return write_overlays(self.folder, self.keep, found)
 
     def finish(self, found: Diagnosis) -> None:
-        """Writes the page, and the data once more, with notes of what failed."""
+        """Writes the page; if it fails, the data once more, with a note of that."""
         forward, made = self.keep.forward, self.made
         assert forward is not None
         made["replays"] = self.keep.films
@@ -375,9 +375,10 @@ class Files:
             lambda: write_report(found, self.folder / REPORT, geometry=geometry_of(forward.model)),
             None,
         )
-        if page is not None:
+        if page is None:
+            self(found)
+        else:
             made["report"] = page
-        self(found)
 
     @property
     def shown(self) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Suspect
 from origami_sim.recording import Channel, Recording, estimate_noise
 from origami_sim.recording.wild import wild_frames
+from origami_sim.threads import shared
 
 EVEN = 1.5
 """Factor between a time step and the median one up to which frames are averaged over it."""
@@ -45,7 +47,6 @@ def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
     if not recordings:
         raise InputError("there is nothing to diagnose", field="recordings", value=0, allowed="at least one recording")
     names = list(recordings[0].channels)
-    out = []
     for r in recordings:
         if list(r.channels) != names:
             raise InputError(
@@ -62,16 +63,20 @@ def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:
                 value=len(r.times),
                 allowed=f"at least {fewest}",
             )
-        every = int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6)
-        out.append(thinned(tamed(r), max(1, min(every, len(r.times) // FRAMES))))
-    return out
+    return shared([partial(_prepared, r, rate) for r in recordings])
+
+
+def _prepared(r: Recording, rate: float) -> Recording:
+    every = int(1.0 / float(np.median(np.diff(r.times))) / rate + 1e-6)
+    return thinned(tamed(r), max(1, min(every, len(r.times) // FRAMES)))
 
 
 def tamed(recording: Recording) -> Recording:
     """The recording without wild frames, of which a note tells; load steps have no course to be far off from."""
     channels, notes = dict(recording.channels), []
-    for name, c in recording.channels.items() if not recording.by_step else ():
-        wild = wild_frames(recording.times, c.values, c.noise)
+    looked = [] if recording.by_step else list(channels.items())
+    found = shared([partial(wild_frames, recording.times, c.values, c.noise) for _, c in looked])
+    for (name, c), wild in zip(looked, found, strict=True):
         if not wild.any():
             continue
         values = np.where(wild if c.values.ndim == 1 else wild[:, None], np.nan, c.values)
@@ -93,8 +98,8 @@ def thinned(recording: Recording, every: int) -> Recording:
     out = recording.only(slice(None, None, every))
     steps = np.diff(recording.times)
     even = (steps < EVEN * np.median(steps)) & (steps > np.median(steps) / EVEN)
-    channels = {n: averaged(c, every, recording.times, even) for n, c in recording.channels.items()}
-    return replace(out, channels=channels)
+    means = shared([partial(averaged, c, every, recording.times, even) for c in recording.channels.values()])
+    return replace(out, channels=dict(zip(recording.channels, means, strict=True)))
 
 
 def averaged(channel: Channel, every: int, times: np.ndarray, even: np.ndarray) -> Channel:

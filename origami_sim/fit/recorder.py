@@ -1,6 +1,7 @@
 """Noise of a recorder that averages over frames, whose slow part neighbouring frames do not show."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from origami_sim.fit.noise import infer
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import autocovariance, level_prior
 from origami_sim.fit.weights import Weights
+from origami_sim.threads import shared
 
 FILTER = 10
 """Frames over which recorders average, at most: trackers take medians of 3 and means of up to 7.
@@ -52,7 +54,7 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
         return [of(own.deviation), of(np.maximum(np.nan_to_num(level), noise))]
     longest = max(joined(forward, f), key=len)
     times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(longest))
-    found = [infer(times, column, stated=float(n)) for column, n in zip(longest.T, noise, strict=True)]
+    found = shared([partial(infer, times, column, stated=float(n)) for column, n in zip(longest.T, noise, strict=True)])
     level = np.maximum([n.deviation for n in found], noise)
     return [of(own.deviation), of(level, tuple(n.colour for n in found))]
 
