@@ -48,8 +48,16 @@ class Block:
 
     def rows(self, before: bool, after: bool) -> Rows:
         """How many rows of a least-squares problem it has, tied or not to the segments before and after it."""
-        size = len(self.known)
-        return Rows(self.values.size, 0 if before else size, size if after else 0, self.seen(), self.frames)
+        if (before, after) not in self._rows:
+            size = len(self.known)
+            made = Rows(self.values.size, 0 if before else size, size if after else 0, self.seen(), self.frames)
+            self._rows[before, after] = made
+        return self._rows[before, after]
+
+    @cached_property
+    def _rows(self) -> dict[tuple[bool, bool], Rows]:
+        """Those that were asked for: segments that are weighed alike are told by them, again and again."""
+        return {}
 
     @cached_property
     def frames(self) -> np.ndarray:

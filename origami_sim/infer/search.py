@@ -14,7 +14,7 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import gammaln, logsumexp
 from scipy.stats import t as student
 
 from origami_sim.fit.evidence import Sets, Summed, log_occam
@@ -337,8 +337,7 @@ def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndar
 
 def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
     """Log prior of a set: any order of the same effects is one set."""
-    k = len(key)
-    return float(sum(prior[n] for n in key) + np.log(1.0 - hyper.effects) + np.sum(np.log(np.arange(1, k + 1))))
+    return float(sum(prior[n] for n in key) + np.log(1.0 - hyper.effects) + gammaln(len(key) + 1))
 
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:

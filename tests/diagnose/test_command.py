@@ -56,7 +56,7 @@ def test_the_missing_friction_is_found_and_all_files_are_there(diagnosed):
     assert out.index("noise") < out.index("MECHANISM: ")  # the lint comes first
     assert "crease_friction at hinge1" in out
     stages = re.findall(r"^ *\d+ s  (\w+)", err, re.M)
-    order = [stages.index(n) for n in ("nominal", "screen", "search", "verdict", "replay", "baselines", "page")]
+    order = [stages.index(n) for n in ("nominal", "screen", "search", "verdict", "locate", "baselines", "page")]
     assert order == sorted(order)
     names = {"report.html", "diagnosis.json", "patched.toml", "replay.rrd"}
     assert {p.name for p in folder.iterdir()} == names
