@@ -109,7 +109,9 @@ def screen(
     goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
     jobs = [partial(_signatures, forward, group, base, weights, goal) for group in groups]
     each = side_by_side(jobs, forward.threads, progress)
-    alone = (one for mine in each for one in mine)
+    assert base.linear is not None
+    ends = np.cumsum([r.count for r in base.linear.rows])[:-1]
+    alone = (Signature(s, np.split(whole[:, None], ends), np.array([z])) for mine in each for s, whole, z in mine)
     found = {id(s): _vector(s, [next(alone) for _ in s.strengths]) for s in suspects if not _together(s, suspects)}
     for s in suspects:
         if not _together(s, suspects):
@@ -188,8 +190,11 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
 
 def _signatures(
     forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights, goal: float
-) -> list[Signature]:
-    """Signatures of suspects' first strengths, simulated together, such that they change about as much as `goal`."""
+) -> list[tuple[Suspect, np.ndarray, float]]:
+    """What suspects change in all rows (R,) by their first strengths, and how large these are.
+
+    They are simulated together, such that they change about as much as `goal`.
+    """
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
     some = _some(forward, base.blocks)
@@ -203,7 +208,7 @@ def _signatures(
         again = _changes(forward, [group[k] for k in redo], suits[redo], base, weights, base.blocks)
         for k, new in zip(redo, again, strict=True):
             parts[k], size[k] = new, suits[k]
-    return [Signature(s, [c[:, None] for c in p], np.array([z])) for s, z, p in zip(group, size, parts, strict=True)]
+    return [(s, np.concatenate(p), float(z)) for s, z, p in zip(group, size, parts, strict=True)]
 
 
 def _some(forward: Predictor, blocks: Sequence[int]) -> Sequence[int]:

@@ -260,7 +260,7 @@ class Rollouts(Worlds, ABC):
         """See `Predictor.step`."""
 
     def _roll(self, r: int, group: list[int], part: list[int], worlds: list[World], local, memories, threads: int):
-        """Per block values [K, n, D] and ends [K, L] of the worlds, and what `_keep` keeps of their rollouts.
+        """Values [B, K, n, D] and ends [B, K, L] of worlds in blocks, and what `_keep` keeps of their rollouts.
 
         Batches run over worlds, then blocks. What is asked of all blocks of a group does not depend on its parts, so
         that bytes do not either.
@@ -333,11 +333,8 @@ class Rollouts(Worlds, ABC):
             near = arrived[..., columns]
             tied = (carried(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
         # as stored ones lie in memory: sums depend on it in their last digit
-        return (
-            [np.ascontiguousarray(np.moveaxis(values[:, :, :, b], 2, 0)) for b in range(count)],
-            None if tied is None else [np.ascontiguousarray(tied[:, :, b].T) for b in range(count)],
-            simulated.first,
-        )
+        ends = None if tied is None else np.ascontiguousarray(tied.T)
+        return np.ascontiguousarray(values.transpose(3, 2, 0, 1)), ends, simulated.first
 
     @abstractmethod
     def _filmed(self, shots: Shots) -> Simulated:
