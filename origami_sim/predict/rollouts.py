@@ -585,16 +585,15 @@ def _begin(block: Block) -> np.ndarray:
 
 def _by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
     """Blocks that share their frame times, and the time until the next."""
-    groups: list[list[int]] = []
-    for i in indices:
-        for g in groups:
-            a, b = blocks[g[0]], blocks[i]
-            alike = len(a.times) == len(b.times) and (a.reach is None) == (b.reach is None)
-            slack = 1e-7 * max(1.0, a.times[-1])
-            alike = alike and abs(a.lasting - b.lasting) < slack
-            if alike and np.all(np.abs(a.times - b.times) <= slack + 1e-5 * b.times):
-                g.append(i)
-                break
-        else:
-            groups.append([i])
+    groups, left = [], list(indices)
+    while left:
+        a = blocks[left[0]]
+        slack, kind = 1e-7 * max(1.0, a.times[-1]), (len(a.times), a.reach is None)
+        near = [i for i in left if (len((b := blocks[i]).times), b.reach is None) == kind]
+        near = [i for i in near if abs(blocks[i].lasting - a.lasting) < slack]
+        times = np.stack([blocks[i].times for i in near])
+        alike = np.all(np.abs(times - a.times) <= slack + 1e-5 * times, axis=1)
+        groups.append([i for i, same in zip(near, alike.tolist(), strict=True) if same])
+        done = set(groups[-1])
+        left = [i for i in left if i not in done]
     return groups
