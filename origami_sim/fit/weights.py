@@ -110,14 +110,15 @@ def recast(columns: Sequence[np.ndarray], rows: Sequence[Rows], old: Weights, ne
     """Columns (r,) or [r, k] of segments for other weights."""
     out: list[np.ndarray] = [np.zeros(0)] * len(rows)
     for alike in patterns(rows):
-        first, known = rows[alike[0]], old.like(new)
-        by = new.whitened(old.restored(np.eye(first.data), first), first).T if not known and first.data <= DENSE else None
+        first, by = rows[alike[0]], None
+        if not old.like(new) and first.data <= DENSE:
+            by = new.whitened(old.restored(np.eye(first.data), first), first).T
         for mine in _as_long(rows, alike):
             own, whole = rows[mine[0]], np.stack([columns[n] for n in mine])
             data = whole[:, : own.data]
             if by is not None:
                 whole[:, : own.data] = by @ data if data.ndim > 2 else data @ by.T
-            elif not known:
+            elif not old.like(new):
                 whole[:, : own.data] = np.moveaxis(
                     new.whitened(old.restored(np.moveaxis(data, 1, -1), own), own), -1, 1
                 )

@@ -57,9 +57,9 @@ MANY = 200
 """Sets beyond which only these cells are looked at."""
 
 TOGETHER = 768
-"""Sets times cells that are judged at once, while other cores judge others: some 10 ms of work. It decides on time alone.
+"""Sets times cells that are judged at once, while other cores judge others: some 10 ms of work.
 
-With twice as many eight cores take 1.4 times as long, and one core 0.95 times."""
+It decides on time alone: with twice as many eight cores take 1.4 times as long, and one core 0.95 times."""
 
 TIGHT = 1e-4
 """Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
