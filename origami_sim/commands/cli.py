@@ -6,6 +6,7 @@ input, nothing written over; 3 a world went unstable; 10 to 17 the verdict of a 
 
 import argparse
 import functools
+import gc
 import os
 import sys
 import time
@@ -398,8 +399,11 @@ def _compare(args) -> int:
 
 
 def _diagnose(args) -> int:
+    gc.disable()  # what is loaded stays: looking through it for what could go, now or later, takes half a second
     from origami_sim.diagnose import command
 
+    gc.freeze()
+    gc.enable()
     return command.run(args)
 
 
