@@ -24,7 +24,7 @@ from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.settling import levels, per_world
 
 FRAMES = 4000
-"""Frames of a recording along which laws with a memory are followed, at most, evenly spread: 0.3 s for each effect.
+"""Frames of a recording along which laws with a memory are followed, at most, evenly spread: 0.3 s.
 
 Half and double take half and twice that; nothing is named by what is drawn."""
 
@@ -94,40 +94,49 @@ def _lacking(forward: Rollouts, f: Fit, thetas: Sequence[np.ndarray], index: int
         m = m.thinned(max(1, len(m.times) // FRAMES))
     times = m.times - forward.recordings[index].times[0]
     drives = [distorted(model, parameters, forward.drives[index], float(times[-1])) for model, parameters in every]
-    out = []
-    for (model, parameters), drive in zip(every, drives, strict=True):
+    out, model = [], every[0][0]
+    remembers = any(get(e).memory for e in model.effects)
+    more = _remembered(forward, model, [p for _, p in every], drives, times, m) if remembers else np.zeros(len(every))
+    for (model, parameters), drive, beside in zip(every, drives, more, strict=True):
         inertia, free, _ = dynamics(forward, model, parameters, frozen(drive, times), m.pose, m.rate)
-        if any(get(e).memory for e in model.effects):
-            free = free + _remembered(forward, model, parameters, drive, times, m)
-        missing = np.einsum("mkw,kw->mw", inertia, m.acceleration) - free
+        missing = np.einsum("mkw,kw->mw", inertia, m.acceleration) - (free + beside)
         missing[~m.told] = 0.0
         out.append(replace(m, missing=missing))
     return out
 
 
 def _remembered(
-    forward: Rollouts, model: Model, parameters: Parameters, drive: Drive, times: np.ndarray, m: Motion
+    forward: Rollouts,
+    model: Model,
+    each: Sequence[Parameters],
+    drives: Sequence[Drive],
+    times: np.ndarray,
+    m: Motion,
 ) -> np.ndarray:
-    """What laws with a memory of the way add [m, n] to the forces that they give without one."""
+    """What laws with a memory of the way add [K, m, n] to the forces that they give without one, in K worlds."""
     arm = forward.articulation
     x = arm.positions(m.pose)
     jacobian = arm.jacobian(m.pose, x)
     velocity = np.einsum("mnwa,mw->nwa", jacobian, m.rate)
-    held = per_world(drive, levels(drive, 0.0, 1))
-    still = replace(model, free=np.zeros_like(model.free))
-    make = lambda: Batch(still, parameters, held, State.at_rest(model, 1, position=x[:, 0]), threads=1, supports=model)  # noqa: E731
-    along, fresh = make(), make()
-    out, steady = np.zeros((arm.size, len(times))), drive.constant
+    still, worlds = replace(model, free=np.zeros_like(model.free)), 2 * len(each)  # of each one that forgets at once
+
+    def level(time: float) -> np.ndarray:
+        return np.repeat(np.concatenate([levels(d, time, 1) for d in drives], axis=1), 2, axis=1)
+
+    state = State.at_rest(model, worlds, position=np.repeat(x[:, :1], worlds, axis=1))
+    held = per_world(drives[0], level(0.0))
+    batch = Batch(still, Parameters.join(each, repeat=2), held, state, threads=1, supports=model)
+    none, steady = batch.remembered()[:, 1::2], all(d.constant for d in drives)
+    out = np.zeros((len(each), arm.size, len(times)))
     for k, t in enumerate(times.tolist()):
-        where = np.ascontiguousarray(x[:, k : k + 1])
         if k:
-            along.lead(where, float(times[k] - times[k - 1]))
-            fresh._overwrite(fresh._x, where)
-        both = []
-        for batch in (along, fresh):
-            if not steady:
-                batch.hold(levels(drive, t, 1))
-            batch._overwrite(batch._v, np.ascontiguousarray(velocity[:, k : k + 1]))
-            both.append(batch.total_force(t))
-        out[:, k] = np.einsum("mna,na->m", jacobian[:, :, k], (both[0] - both[1])[:, 0])
+            batch.lead(np.repeat(x[:, k : k + 1], worlds, axis=1), float(times[k] - times[k - 1]))
+            memory = batch.remembered()
+            memory[:, 1::2] = none
+            batch._overwrite(batch._memory, memory)
+        if not steady:
+            batch.hold(level(t))
+        batch._overwrite(batch._v, np.repeat(velocity[:, k : k + 1], worlds, axis=1))
+        force = batch.total_force(t)
+        out[:, :, k] = np.einsum("mna,nka->km", jacobian[:, :, k], force[:, ::2] - force[:, 1::2])
     return out
