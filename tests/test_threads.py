@@ -120,13 +120,13 @@ def test_large_results_come_whole():
 def test_one_process_leads(tmp_path):
     """What is to happen once happens once; what depends on the process is told by the one that leads."""
 
-    def work() -> tuple[int, list[bool]]:
+    def work() -> tuple[int, list[bool], list[int]]:
         if leads():
             (tmp_path / str(os.getpid())).touch()
         within = shared([leads] * 6)  # a job is done by one process alone
-        return told(os.getpid), within
+        return told(os.getpid), within, shared([os.getpid] * 6, led=2)[-2:]
 
-    assert in_step(work, 3) == (os.getpid(), [True] * 6)
+    assert in_step(work, 3) == (os.getpid(), [True] * 6, [os.getpid()] * 2)
     assert [f.name for f in tmp_path.iterdir()] == [str(os.getpid())]
 
 

@@ -92,6 +92,20 @@ def test_each_part_is_handed_over_when_it_is_there():
         add(found, [Part("end", "", interrupted)], lambda *_: None, lambda _: None)
 
 
+def test_parts_that_are_made_side_by_side_are_handed_over_together():
+    found, keep, seen = example(), Keep(), []
+    parts = [
+        Part("one", "One could not be told", lambda: {"onset": 3.0}, alone=True),
+        Part("two", "Two could not be told", lambda: 1 / 0, alone=True),  # type: ignore[arg-type]
+        Part("film", "The film could not be made", lambda: {"films": [Path("film")]}, alone=True, of=keep),
+        Part("three", "Three could not be told", lambda: {"onset": 4.0}),
+    ]
+    add(found, parts, lambda *_: None, lambda d: seen.append((d.onset, d.unfinished)))
+    assert [u for _, u in seen] == [["one", "two", "film", "three"], ["three"], []]
+    assert [o for o, _ in seen][1:] == [3.0, 4.0] and keep.films == [Path("film")]
+    assert found.notes[-1] == "Two could not be told (ZeroDivisionError: division by zero)."
+
+
 def files(folder: Path, keep: Keep) -> command.Files:
     return command.Files(folder, scene_settings(scene_module("pendulum_chain")), "pendulum_chain", keep)
 
