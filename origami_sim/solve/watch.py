@@ -8,6 +8,7 @@ Between frames nodes are taken to go along the cubic through their positions and
 list of near pairs holds, and on each piece straight on, where `touching.free_share` tells how far pairs come.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +37,9 @@ FRAMES = 8
 """Ways between frames that are looked at together. Half costs small devices 1.03 times the run, double lets a run that
 is made again go on for 16 frames more."""
 
+STATED = "Sheet.touch states it, and touch(False) that panels pass through each other"
+"""How contact that nobody stated is stated, in words."""
+
 AGAIN = 8
 """So many times as many pieces are taken where lists found no room. Half and double: see `PIECES`."""
 
@@ -57,10 +61,18 @@ class Watch:
 
     Args:
         model, parameters: without contact, which `may_touch`. worlds: of the run. device: where it is looked.
+        when: says in words where in the run a time is.
     """
 
-    def __init__(self, model: Model, parameters: Parameters, worlds: int, device: str = "cpu"):
-        self.model, self.parameters, self.worlds, self.device = model, parameters, worlds, device
+    def __init__(
+        self,
+        model: Model,
+        parameters: Parameters,
+        worlds: int,
+        device: str = "cpu",
+        when: Callable[[float], str] = "at t = {:.4g} s".format,
+    ):
+        self.model, self.parameters, self.worlds, self.device, self.when = model, parameters, worlds, device, when
         self._skin = upload(model, self._room, device)
         self._base = surface(model).margin
         self._size = float(np.ptp(model.position, axis=0).max())
@@ -133,7 +145,7 @@ class Watch:
                 return
             if sides[0, w] >= 0:
                 break
-        where = f"at t = {met[w]:.4g} s" + (f" in world {w}" if self.worlds > 1 else "")
+        where = self.when(float(met[w])) + (f" in world {w}" if self.worlds > 1 else "")
         if sides[0, w] < 0:
             raise Met(f"Panels come so near each other that pairs cannot be listed {where}")
         raise Met(f"{_names(self.model, sides[:, w])} meet {where}")
@@ -174,22 +186,22 @@ def _names(model: Model, sides: np.ndarray) -> str:
 
 def _acting() -> str:
     return (
-        f"contact between panels acts in this run, with a friction of {FRICTION:g} (Sheet.touch states it, and "
-        "touch(False) that panels pass through each other)."
+        f"contact between panels acts in this run, with a friction of {FRICTION:g} ({STATED})."
     )
 
 
 def watch_of(
-    model: Model, parameters: Parameters, start: State, *, reference: bool, device: str = "cpu"
+    model: Model, parameters: Parameters, start: State, *, reference: bool, **how
 ) -> tuple[Watch | None, list[str]]:
     """The watch of a run from a state, None where there is nothing to watch; and what is to be said of it.
 
     Args:
         reference: whether the state is the reference state, in which what is stated to touch may not be pressed.
+        how: of `Watch`: device, when.
     """
     if not may_touch(model, parameters) or len(model.triangles) < 2:
         return None, []
-    watch = Watch(model, parameters, start.worlds, device)
+    watch = Watch(model, parameters, start.worlds, **how)
     said = watch.begin(start.x, 0.0 if reference else DEEPEST)
     return (None, [said]) if said else (watch, [])
 

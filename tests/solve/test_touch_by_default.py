@@ -176,11 +176,31 @@ def test_a_diagnosis_says_where_panels_came_near_each_other_in_a_recording():
     assert meetings(Recorded(roll().touch())) == [] == meetings(Recorded(roll().touch(False)))
 
 
-def test_a_path_says_from_where_on_panels_lie_in_each_other():
-    """Bars: two panels that are turned shut, in proportion to the load."""
+def test_a_path_keeps_panels_apart_from_where_they_meet():
+    """Bars: two panels that are turned shut, in proportion to the load, and further."""
     s = Sheet(strip([10 * MM] * 2, 20 * MM), thickness=0.5 * MM).fix(panels=[0]).crease(stiffness=0.2e-3)
     s.set("crease_drive", drive_stiffness=0.2e-3, target_angle=3.1)
-    path = continuation(*s.build(), Drive(load=1.0), step=0.1)
-    (factor,) = re.findall(r"At the factor (\S+) panel 0 and panel 1 lie in each other", path.message)
-    assert math.pi - 0.1 < 3.1 * float(factor) < math.pi  # 2 asin(h / 2 l) from flat
-    assert "lie in each other" not in continuation(*s.touch(False).build(), Drive(load=1.0), step=0.1).message
+    shut = math.pi - 2 * math.asin(0.5 / 20)  # the far corners are a thickness apart
+
+    def path(sheet, end=1.3):
+        return continuation(*sheet.build(), Drive(load=1.0), end=end, step=0.1)
+
+    found = path(s)
+    assert found.reached and found.touching in found.message
+    (factor,) = re.findall(r"panel 0 and panel 1 meet at the factor (\S+): contact .* without friction", found.touching)
+    assert 3.1 * float(factor) == pytest.approx(shut, abs=1e-3)
+    assert shut < found.angles[-1, 0] < shut + 0.01  # by which the drive presses them
+    through = path(s.touch(False))
+    assert through.touching == "" and through.angles[-1, 0] == pytest.approx(1.3 * 3.1)
+    stated = path(s.touch(friction=0.0))
+    assert stated.touching == "" and np.abs(stated.angles[-1] - found.angles[-1]).max() < 1e-9
+
+
+def test_a_path_on_which_none_meet_is_that_without_contact():
+    s = Sheet(strip([10 * MM] * 2, 20 * MM), thickness=0.5 * MM).fix(panels=[0]).crease(stiffness=0.2e-3)
+    s.set("crease_drive", drive_stiffness=0.2e-3, target_angle=2.0)
+    found, bare = (continuation(*one.build(), Drive(load=1.0)) for one in (s, s.touch(False)))
+    assert np.array_equal(found.x, bare.x) and found.touching == ""
+    model, parameters = s.build()
+    assert len(found.state(-1).memory) == len(State.at_rest(model).memory)
+    assert equilibrium(model, parameters, Drive(load=1.0), state=found.state(-1)).converged

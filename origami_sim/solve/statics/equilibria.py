@@ -23,10 +23,17 @@ from origami_sim.model.distort import distorted
 from origami_sim.solve.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid.statics import RigidSystem
 from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
-from origami_sim.solve.watch import met_at, panels_inside, with_memory, without_memory
+from origami_sim.solve.watch import STATED, Met, met_at, watch_of, with_memory, without_memory
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""
+
+ROUNDS, TOUCHING = 10, 60
+"""Newton steps to a point of a path at most, and where parts touch: there they are damped. A step of the path that
+takes more is halved."""
+
+FAINTEST = 1e-6
+"""Share of a Newton step below which none is taken."""
 
 
 @dataclass
@@ -42,6 +49,7 @@ class Path:
         limit_points: indices of the points where the factor is largest or smallest (found to the tolerance).
         branch_points: indices after which the number of negative eigenvalues changes without a limit point.
         reached: whether the path came to its end. message: why it ended. wall: time that it took [s].
+        touching: which panels met, so that the path is one with contact; empty if none did.
     """
 
     factor: np.ndarray
@@ -57,6 +65,7 @@ class Path:
     message: str
     start: State = field(repr=False)
     wall: float = 0.0
+    touching: str = ""
 
     def state(self, i: int) -> State:
         """The i-th point as a state at rest of one world."""
@@ -169,6 +178,9 @@ def continuation(
     continuation with tangent predictor and orthogonal corrector (Keller 1977; Crisfield 1981); limit points are found
     where the tangent's factor component vanishes (regula falsi). Laws that depend on time itself see the factor.
 
+    Panels of which it was not stated whether they touch keep each other off: where any two meet on the way, it is
+    followed again with contact, and `touching` says so. Friction holds nothing on a path.
+
     Args:
         drive, base: the drives at factor 1 and 0. time: instant at which both are taken [s].
         start, end: factors. The path starts with the equilibrium nearest to `state` at `start`, in the direction of
@@ -193,20 +205,44 @@ def continuation(
         )
     _positive(tolerance=tolerance, max_points=max_points, step=step or 1.0, move=move or 1.0)
     worlds = [_fixed(distorted(model, parameters, d, time), time, world) for d in (base or Drive(), drive)]
-    system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
-    tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
-    path = tracer.follow(x, angles, start, end, max_points, stop)
-    path.message += _through(model, parameters, path, world if parameters.worlds > 1 else 0)
+
+    def followed(model: Model, parameters: Parameters, state: State | None) -> Path:
+        system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
+        tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
+        return tracer.follow(x, angles, start, end, max_points, stop)
+
+    path = followed(model, parameters, state)
+    try:
+        path.message += _through(model, parameters.world(world if parameters.worlds > 1 else 0), path)
+    except Met as met:
+        other, own = engaged(model, parameters)
+        again = followed(other, own, with_memory(other, State.at_rest(model) if state is None else state))
+        said = f"{met.where}: contact between panels acts on this path, without friction ({STATED})."
+        path = replace(again, start=without_memory(model, again.start), touching=said)
+        path.message += f" {said}"
     path.wall = clock.perf_counter() - began
     return path
 
 
-def _through(model: Model, parameters: Parameters, path: Path, world: int) -> str:
-    """From where on panels of which nothing was stated lie in each other along a path, in a sentence; empty if none."""
-    for factor, x in zip(path.factor, path.x, strict=True) if may_touch(model, parameters) else ():
-        if (named := panels_inside(model, parameters, x, world)) is not None:
-            where = f" At the factor {factor:.4g} {named} lie in each other"
-            return f"{where}: paths have contact where Sheet.touch() states it."
+def _through(model: Model, parameters: Parameters, path: Path) -> str:
+    """Why panels pass through each other along a path in one world, in a sentence; empty if none can.
+
+    Raises:
+        Met: panels came as near each other as they touch, from point to point straight on.
+    """
+    if not len(path.x):
+        return ""
+    numbers = np.arange(len(path.x))
+
+    def at(number: float) -> str:
+        return f"at the factor {np.interp(number, numbers, path.factor):.4g}"
+
+    watch, said = watch_of(model, parameters, path.state(0), reference=False, when=at)
+    if watch is None:
+        return "".join(f" {s}" for s in said)
+    for n, x in enumerate(path.x[:, :, None]):
+        watch.add(float(n), x, np.zeros_like(x))
+    watch.look()
     return ""
 
 
@@ -302,7 +338,7 @@ class _Tracer:
         """Solves for the equilibrium on the plane through (x, factor) with normal t; None if it does not converge."""
         s, last = self.system, math.inf
         h = 1e-3 * self.span
-        for iteration in range(10):
+        for iteration in range(TOUCHING if s.touches else ROUNDS):
             f, angles = s.force(x, angles, factor)
             k, largest, symmetric = s.reduced(x, angles, factor)
             if not (np.all(np.isfinite(f)) and np.all(np.isfinite(k.data))):
@@ -322,11 +358,34 @@ class _Tracer:
             d = lu.solve(np.append(f.ravel()[s.free], 0.0))
             dx, df = s.spread(d[:-1]), float(d[-1])
             size = math.sqrt(self.mx * (dx**2).sum() + self.mf * df**2)
-            if not np.isfinite(size) or size > 0.7 * last or s.reach(x, dx) < 1.0:
+            if not np.isfinite(size):
                 return None
+            share = s.reach(x, dx)
+            if not s.touches and (size > 0.7 * last or share < 1.0):
+                return None
+            if s.touches:
+                share = self._damped(lu, x, angles, factor, dx, df, share)
+                if not share:
+                    return None
             last = size
-            x, factor = x + dx, factor + df
+            x, factor = x + share * dx, factor + share * df
         return None
+
+    def _damped(self, lu, x, angles, factor, dx, df, share: float) -> float:
+        """Share of a Newton step that the natural monotonicity test admits, 0 if none; see `equilibrium`.
+
+        Where parts touch the tangent has kinks, about which full steps go to and fro.
+        """
+        s = self.system
+        whole = self.mx * (dx**2).sum() + self.mf * df**2
+        while share > FAINTEST:
+            f, _ = s.force(x + share * dx, angles, factor + share * df)
+            d = lu.solve(np.append(f.ravel()[s.free], 0.0))
+            left = self.mx * (s.spread(d[:-1]) ** 2).sum() + self.mf * d[-1] ** 2
+            if left <= (1.0 - 0.5 * share) ** 2 * whole:
+                return share
+            share *= 0.5
+        return 0.0
 
     def ahead(self, p: _Point, sigma: float) -> _Point | None:
         """The point at arc length sigma beyond p."""
@@ -369,7 +428,8 @@ class _Tracer:
             sigma = ease * self.largest(point)
             new = self.ahead(point, sigma)
             sharp = new is not None and self.mx * (new.tx * point.tx).sum() + self.mf * new.tf * point.tf < 0.7
-            if new is None or (sharp and ease > 1e-2):
+            passed = new is not None and s.clear(point.x, new.x - point.x) < 1.0
+            if new is None or passed or (sharp and ease > 1e-2):
                 ease *= 0.5
                 if ease < 1e-5:
                     message = f"the path cannot be followed beyond the factor {point.factor:.6g}."
