@@ -133,10 +133,13 @@ def read_recordings(paths: Sequence[str], sidecar: str | None = None) -> DataSet
             raise InputError("is a folder", field="RECORDING", value=str(file), allowed="tables, or one folder")
     if len(files) == 1 and (files[0].is_dir() or files[0].suffix.lower() == ".toml"):
         return read_dataset(files[0], sidecar=sidecar)
-    shipped = None
     if sidecar is None and not any(f.with_suffix(".toml").exists() for f in files):
-        shipped = next((s for f in files if (s := _shipped(f)) is not None), None)
-    return read_dataset(files, sidecar=sidecar or shipped)
+        shipped = [_shipped(f) for f in files]
+        first = next((s for s in shipped if s is not None), None)
+        if len(set(shipped)) > 1 and first is not None:  # recordings that were driven differently
+            return read_dataset(files, sidecar=[s or first for s in shipped])
+        sidecar = None if first is None else str(first)
+    return read_dataset(files, sidecar=sidecar)
 
 
 def _shipped(recording: Path) -> Path | None:

@@ -81,7 +81,9 @@ class DataSet:
         return list(self.recordings[0].channels)
 
 
-def read_dataset(source: str | Path | Sequence[str | Path], *, sidecar: str | Path | None = None) -> DataSet:
+def read_dataset(
+    source: str | Path | Sequence[str | Path], *, sidecar: str | Path | Sequence[str | Path] | None = None
+) -> DataSet:
     """Read several recordings of one object.
 
     Args:
@@ -96,7 +98,7 @@ def read_dataset(source: str | Path | Sequence[str | Path], *, sidecar: str | Pa
                 name = "step"
 
             (or `recordings = ["a.csv", "b.csv"]`), paths from the folder of that file; or one table.
-        sidecar: one sidecar for all tables; their names are then the files' stems.
+        sidecar: one sidecar for all tables; their names are then the files' stems. For a list of tables also a list.
 
     Raises:
         InputError: the first fault found in any of them, or where they do not fit together.
@@ -104,7 +106,12 @@ def read_dataset(source: str | Path | Sequence[str | Path], *, sidecar: str | Pa
     if not isinstance(source, (str, Path)):
         paths = [Path(one) for one in source]
         name = paths[0].parent.name if paths else "recordings"
-        return DataSet(name or "recordings", tuple(_read(path, sidecar, None, sidecar is not None) for path in paths))
+        alike = sidecar is None or isinstance(sidecar, (str, Path))
+        each = [sidecar] * len(paths) if alike else list(sidecar)
+        found = tuple(_read(p, s, None, alike and s is not None) for p, s in zip(paths, each, strict=True))
+        return DataSet(name or "recordings", found)
+    if not (sidecar is None or isinstance(sidecar, (str, Path))):
+        raise InputError("one sidecar each is for a list of tables", field="sidecar", value=len(sidecar))
     path = Path(source)
     if path.is_dir():
         tables = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)

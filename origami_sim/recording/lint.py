@@ -9,6 +9,9 @@ from origami_sim.errors import InputError
 from origami_sim.recording.recording import CHANNEL_KINDS, Recording, quantisation, scaled_differences
 from origami_sim.recording.units import quantity, unit_factor
 
+SAME = 1e-9
+"""Part of the median step by which two times differ that are one: rounding of a digitised table."""
+
 GAP_FACTOR = 1.5
 """A step longer than this many median steps is a time gap."""
 
@@ -112,18 +115,24 @@ def lint_report(recording: Recording) -> str:
     return "\n".join([*lines, *(f"note: {note}" for note in recording.metadata.get("notes", ()))])
 
 
+def repeated(times: np.ndarray) -> np.ndarray:
+    """(n,) whether a time is that of the row before; digitised tables differ by rounding only."""
+    steps = np.diff(times)
+    return np.concatenate([[False], np.abs(steps) <= SAME * float(np.median(np.abs(steps)))])[: len(times)]
+
+
 def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], allow_gaps: bool) -> list[str]:
     missing = np.flatnonzero(~np.isfinite(times))
     if missing.size:
         raise InputError(f"the time is missing at {place(int(missing[0]))}", file=file, field="time")
     steps = np.diff(times)
-    same = 1e-9 * float(np.median(np.abs(steps)))  # digitised tables differ by rounding only
+    same = SAME * float(np.median(np.abs(steps)))
     backwards = np.flatnonzero(steps <= same)
     if backwards.size:
         row = int(backwards.min())
-        repeated = abs(steps[row]) <= same
-        fault = "is repeated" if repeated else f"runs backwards from {times[row]:.9g} s"
-        if not repeated and np.unique(times).size == times.size:
+        repeats = bool(abs(steps[row]) <= same)
+        fault = "is repeated" if repeats else f"runs backwards from {times[row]:.9g} s"
+        if not repeats and np.unique(times).size == times.size:
             place_, count = place(row + 1), backwards.size
             raise InputError(
                 f"the time {fault} at {place_}: the rows are not sorted ({count} of {len(steps)} steps run backwards)",
@@ -131,7 +140,14 @@ def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], al
                 field="time",
                 value=float(times[row + 1]),
             )
-        raise InputError(f"the time {fault} at {place(row + 1)}", file=file, field="time", value=float(times[row + 1]))
+        allowed = "repeats only with allow_repeats = true in the sidecar" if repeats else None
+        raise InputError(
+            f"the time {fault} at {place(row + 1)}",
+            file=file,
+            field="time",
+            value=float(times[row + 1]),
+            allowed=allowed,
+        )
     typical = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_FACTOR * typical)
     if gaps.size == 0:

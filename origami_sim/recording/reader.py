@@ -11,7 +11,7 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.files import read_bytes
 from origami_sim.recording.camera import Camera
-from origami_sim.recording.lint import Series, lint
+from origami_sim.recording.lint import Series, lint, repeated
 from origami_sim.recording.noise import noise_report
 from origami_sim.recording.placed import placed_sources
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
@@ -43,6 +43,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
     side = Sidecar.read(description)
     table, form = _read_any(path, data, side)
 
+    table, merged = _merged(table, side)
     times = side.times(table)
     if side.start is not None and side.time_base(table) == "step":
         raise InputError("a quasi-static curve has no start", file=description, field="start", value=side.start.state)
@@ -61,7 +62,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
         )
         for name, spec in specs.items()
     }
-    notes = lint(
+    notes = merged + lint(
         times,
         series,
         file=path,
@@ -117,6 +118,23 @@ def _read_any(path: Path, data: bytes, side: Sidecar) -> tuple[Table, str]:
     table = read_export(path, data, form, likelihood=side.source["likelihood"])
     table.require(side.columns)
     return table.check_numbers(), form
+
+
+def _merged(table: Table, side: Sidecar) -> tuple[Table, list[str]]:
+    """The table with rows of one time joined, if the sidecar allows it, and a note that says so."""
+    if not side.allow_repeats or side.time_base(table) == "step":
+        return table, []
+    times = side.times(table)
+    groups = np.cumsum(~repeated(times))
+    if not len(times) or groups[-1] == len(times):
+        return table, []
+    count = len(times) - int(groups[-1])
+    said = (
+        "1 row that repeats the time before it is"
+        if count == 1
+        else f"{count} rows that repeat the time before them are"
+    )
+    return table.averaged(groups - 1), [f"{said} averaged with it."]
 
 
 def _with_unit(name: str, spec: dict, table: Table, side: Sidecar) -> dict:

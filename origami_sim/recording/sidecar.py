@@ -3,6 +3,7 @@
     name = "double pendulum, run 1"     # the file's stem when left out
     description = "..."                 # also licence: free text, kept in the metadata
     allow_gaps = false                  # true: missing values and time gaps become notes instead of errors
+    allow_repeats = false               # true: rows of one time, as where a printed line is steep, become their mean
     motion = "quasistatic"              # optional: inertia does not count, such as in ramps and holds; or "dynamic"
     allow_swaps = false                 # true: markers that seem to exchange names become notes instead of errors
 
@@ -119,6 +120,7 @@ _TOP_KEYS = (
     "source",
     "licence",
     "allow_gaps",
+    "allow_repeats",
     "allow_swaps",
     "model",
     "motion",
@@ -162,6 +164,7 @@ class Sidecar:
     name: str | None
     free_text: dict[str, str]
     allow_gaps: bool
+    allow_repeats: bool
     allow_swaps: bool
     source: dict[str, Any]
     select: dict[str, Any]
@@ -202,6 +205,7 @@ class Sidecar:
             name=top.text("name", None),
             free_text=texts | ({"source": source["about"]} if source["about"] else {}),
             allow_gaps=top.flag("allow_gaps"),
+            allow_repeats=top.flag("allow_repeats"),
             allow_swaps=top.flag("allow_swaps"),
             source=source,
             select={column: top.label("select", column) for column in top.table("select")},

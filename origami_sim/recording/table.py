@@ -75,6 +75,21 @@ class Table:
             rows=self.rows[keep],
         )
 
+    def averaged(self, groups: np.ndarray) -> "Table":
+        """One row for each group of neighbouring rows: the mean of what they measured, else what the first says.
+
+        Args:
+            groups: (n,) number of the group of each row, rising by one.
+        """
+        first = np.flatnonzero(np.diff(groups, prepend=-1))
+        count = np.diff(np.append(first, len(groups)))
+        return replace(
+            self,
+            numbers={name: np.add.reduceat(column, first) / count for name, column in self.numbers.items()},
+            labels={name: column[first] for name, column in self.labels.items()},
+            rows=self.rows[first],
+        )
+
     def require(self, columns: Sequence[str]):
         """Raises InputError where one of these columns is missing."""
         for name in columns:

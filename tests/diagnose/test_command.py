@@ -507,6 +507,11 @@ def test_known_recordings_have_shipped_sidecars():
     data = command.read_recordings(names)
     assert [r.name for r in data] == ["single_a", "single_b"]
     assert command.read_recordings([str(folder / "pendulum_chain" / "double.csv")]).channels == ["theta1", "theta2"]
+    names = [str(folder / "magnetic_arch" / f"{n}.csv") for n in ("step_5mT", "ramp_16p25mT_2p5s")]
+    step, ramp = command.read_recordings(names)  # driven differently, each by its own
+    assert (step.name, ramp.name) == ("step_5mT", "ramp_16p25mT_2p5s")
+    assert step.drive["field"].constant and not ramp.drive["field"].constant
+    assert len(ramp.times) == 94 and any("4 rows that repeat" in n for n in ramp.metadata["notes"])
 
 
 def test_python_takes_a_scene_or_a_model_with_parameters():

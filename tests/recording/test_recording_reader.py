@@ -397,3 +397,18 @@ def test_the_real_pendulum_recordings_read(pendulum_recordings, table, frames):
         assert 1e-5 < channel.noise < 1e-4
     if table == "single_b":  # raw encoder counts at rest: the quantisation of the stated 1.57e-4 rad is all there is
         assert recording.channels["theta1"].noise == pytest.approx(1.57e-4 / np.sqrt(12.0), rel=0.01)
+
+
+def test_rows_of_one_time_are_averaged_where_that_is_allowed(write):
+    rows = ["0,1.0", "1,2.0", "2,3.0", "2,5.0", f"{2 + 4e-16},7.0", "3,4.0", "3,6.0", "4,1.0"]
+    table = "\n".join(["t,a", *rows]) + "\n"
+    with pytest.raises(InputError, match=r"repeated at line 5 .*allow_repeats = true"):
+        read_recording(write(table))
+    found = read_recording(write(table, "allow_repeats = true\n" + SIDECAR))
+    np.testing.assert_allclose(found.times, [0, 1, 2, 3, 4])
+    np.testing.assert_allclose(found.channels["theta"].values, [1, 2, 5, 5, 1])
+    assert "3 rows that repeat the time before them are averaged with it." in found.metadata["notes"]
+    with pytest.raises(InputError, match="runs backwards"):
+        read_recording(write("t,a\n0,1\n1,1\n0.5,2\n2,1\n3,0\n", "allow_repeats = true\n" + SIDECAR))
+    plain = read_recording(write("t,a\n0,1.5\n1,1.2\n2,1.4\n", "allow_repeats = true\n" + SIDECAR))
+    assert not any("averaged" in n for n in plain.metadata["notes"])
