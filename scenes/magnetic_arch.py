@@ -17,7 +17,7 @@ where the recording is present.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as File
 
 import numpy as np
@@ -54,7 +54,17 @@ SECOND_MODE = 8.986818915818128
 
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
-    """The flat strip between two held rows of cells, its left clamp at x = 0, with the drive of the mode.
+    """The strip between two held rows of cells, which starts buckled, with the drive of the mode.
+
+    Raises:
+        InputError: what `flat` and `buckled` refuse.
+    """
+    model, parameters = flat(s)
+    return replace(model, start=buckled(s, model, parameters).x[:, 0]), parameters, drive(s)
+
+
+def flat(s: Settings) -> tuple[Model, Parameters]:
+    """The strip before its clamps are brought together, its left clamp at x = 0.
 
     Raises:
         InputError: an odd number of cells.
@@ -71,7 +81,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         modulus=s.modulus,
         density=s.density,
         membrane_damping=0.0,
-        triangulation="center",
+        triangulation=s.triangulation,
     )
     branch = [(s.relaxing_modulus / s.modulus, s.relaxation_time)] if s.relaxing_modulus else []
     sheet.shell(poisson=s.poisson, relaxation=branch)
@@ -83,8 +93,9 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     sheet.set("mass_damping", decay_rate=s.loop_decay_rate if s.mode == "quasistatic" else s.decay_rate)
     model, parameters = sheet.build()
     parameters.set("shell_bending", "natural_11", s.natural_curvature)
+    model = replace(model, names={**model.names, "node": _labels(model)})
     model.position[:, 0] -= long
-    return model, parameters, drive(s)
+    return model, parameters
 
 
 def direction(s: Settings) -> np.ndarray:
@@ -105,10 +116,20 @@ def drive(s: Settings) -> Drive:
     return Drive(field=wave)
 
 
+def _middle(model: Model) -> int:
+    """The node nearest to the middle of the strip."""
+    low, high = model.position.min(axis=0), model.position.max(axis=0)
+    return int(np.argmin(np.abs(model.position - 0.5 * (low + high)).sum(axis=1)))
+
+
+def _labels(model: Model) -> tuple[str, ...]:
+    """Labels of the nodes, of which recordings name "midspan"."""
+    return tuple("midspan" if n == _middle(model) else f"node {n}" for n in range(len(model.position)))
+
+
 def midspan(model: Model, x: np.ndarray) -> np.ndarray:
     """Height of the middle of the strip [m] from positions [..., N, 3]."""
-    low, high = model.position.min(axis=0), model.position.max(axis=0)
-    return x[..., np.argmin(np.abs(model.position - 0.5 * (low + high)).sum(axis=1)), 2]
+    return x[..., _middle(model), 2]
 
 
 def euler_shortening(s: Settings) -> float:
@@ -207,7 +228,7 @@ class Loop:
 
 def loop(s: Settings) -> Loop:
     """All equilibria between both fields by continuation, through the limit points."""
-    model, parameters, _ = build(s)
+    model, parameters = flat(s)
     state = buckled(s, model, parameters)
     rest = float(midspan(model, state.x[:, 0]))
     end = Drive(field=tuple(s.loop_field * direction(s)))
@@ -233,11 +254,10 @@ def mesh_study(s: Settings, meshes: Sequence[tuple[int, int]]) -> dict[str, np.n
 def move(s: Settings, *, progress: Progress | None = None) -> tuple[Trajectory, np.ndarray]:
     """Motion of the mode from the buckled state, and the displacement of midspan by frame [m]."""
     model, parameters, signals = build(s)
-    state = buckled(s, model, parameters)
     duration = {"ramp": s.rise_time, "step": s.step_time}.get(s.mode, s.loop_time)
     rate = min(RATE, max(100.0, 1000 / duration))
     duration = np.floor(duration * rate * (1 + 1e-12)) / rate  # whole frames within the drive
-    motion = motion_of(s, model, parameters, signals, duration=duration, rate=rate, state=state, progress=progress)
+    motion = motion_of(s, model, parameters, signals, duration=duration, rate=rate, progress=progress)
     height = midspan(model, motion.x[:, :, 0])
     return motion, height[0] - height
 

@@ -59,6 +59,8 @@ class Model:
             above the panels' [m]. pad_thickness: [Q] [m].
         plates: [T, 6] bending stiffness D11, D22, D12, D66, D16, D26 [N m] of the triangles of a shell in their axes
             (`curvature.axes_of`), by which neighbours share the turn of the line between them; empty: all are alike.
+        start: [N, 3] where motions and equilibria begin that are given no state, such as a buckled shape; empty: in
+            the reference state.
     """
 
     position: np.ndarray
@@ -83,6 +85,7 @@ class Model:
     pad_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
     pad_thickness: np.ndarray = field(default_factory=lambda: np.zeros(0))
     plates: np.ndarray = field(default_factory=lambda: ALIKE)
+    start: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import model_line  # only who looks pays for it
@@ -119,6 +122,11 @@ class Model:
                 "node": self.position,
             }[family]
         )
+
+    @property
+    def begins(self) -> np.ndarray:
+        """[N, 3] where it starts: `start`, or its reference positions."""
+        return self.start if len(self.start) else self.position
 
     @property
     def panel_count(self) -> int:
@@ -158,6 +166,8 @@ class Model:
             if f.name == "channels" or (f.name in ("panels", "carriers") and self.panels == "elastic"):
                 continue
             if (f.name in PADS and not len(self.pad_triangles)) or (f.name == "plates" and not len(self.plates)):
+                continue
+            if f.name == "start" and not len(self.start):
                 continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
@@ -328,12 +338,12 @@ class State:
     def at_rest(
         cls, model: Model, worlds: int = 1, position: np.ndarray | None = None, *, placed: bool = False
     ) -> "State":
-        """The reference state, or that of given positions ([N, 3] or [N, W, 3]), without motion.
+        """The state in which the model starts, or that of given positions ([N, 3] or [N, W, 3]), without motion.
 
         The mass points of rigid panels are put where their panels are, as in the model, unless they are `placed`:
         worlds whose bodies have other centres or inertia have them elsewhere.
         """
-        start = model.position if position is None else np.asarray(position, float)
+        start = model.begins if position is None else np.asarray(position, float)
         if start.ndim == 2:
             start = start[:, None, :]
         x = np.array(np.broadcast_to(start, (len(model.position), worlds, 3)))

@@ -28,6 +28,7 @@ _COLUMNS = {
     "position": 3, "free": 3, "bars": 2, "creases": 4, "bends": 4, "triangles": 3, "triangle_panel": 0,
     "contacts": 3, "contact_weights": 3, "contact_offsets": 0, "contact_axes": 3, "electrodes": 0, "carriers": 0,
     "pad_triangles": 0, "pad_weights": 3, "pad_heights": 0, "pad_thickness": 0, "plates": 6,
+    "start": 3,
 }  # fmt: skip
 """Arrays of a model, with the length of their rows."""
 
@@ -44,7 +45,7 @@ def model_tables(model: Model, parameters: Parameters) -> dict[str, dict[str, An
     """
     if parameters.worlds > 1:
         raise InputError("a design is one world", field="parameters", value=f"{parameters.worlds} worlds")
-    empty = ("plates",) * (not len(model.plates)) + PADS * (not len(model.pad_triangles))
+    empty = tuple(n for n in ("plates", "start") if not len(getattr(model, n))) + PADS * (not len(model.pad_triangles))
     kept = [n for n in (*_WORDS, *_COLUMNS) if n not in empty]
     out: dict[str, dict[str, Any]] = {"model": {n: getattr(model, n) for n in kept}}
     out["model"]["effects"] = list(model.effects)
@@ -88,7 +89,7 @@ def read_model(data: Mapping[str, Any], path: Path) -> tuple[Model, Parameters]:
     }  # fmt: skip
     pads = 4 * len(arrays.get("pad_thickness", ()))
     counts |= {n: pads for n in ("pad_triangles", "pad_weights", "pad_heights") if n in arrays}
-    counts |= {"plates": triangles} if len(arrays.get("plates", ())) else {}
+    counts |= {n: count for n, count in (("plates", triangles), ("start", nodes)) if len(arrays.get(n, ()))}
     for name, count in counts.items():
         if len(arrays[name]) != count:
             raise InputError(

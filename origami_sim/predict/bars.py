@@ -103,7 +103,9 @@ class BarRollouts(Rollouts):
             raw += film(batch, recording, calm + 1, finer, step)
             state = _with_effects(batch.state(), model, step=calm * substeps)
         batch = self._batch(model, parameters, drive, state, threads=shots.threads)
-        raw += film(batch, recording, shots.frames - sum(map(len, raw)), substeps, step, first=not calm)
+        begin = state.x.copy() if self.start == "rest" else None
+        left = shots.frames - sum(map(len, raw))
+        raw += film(batch, recording, left, substeps, step, first=not calm, begin=begin)
         out = np.concatenate(raw)
         out[:, :, batch.status() >= 0] = np.nan
         return Simulated(out)

@@ -8,8 +8,13 @@ from origami_sim.observation.observe import _index, body_axes, body_point
 from origami_sim.recording import Camera, Channel, Recording
 
 
-def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+def read(
+    model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | None, begin: np.ndarray | None = None
+) -> np.ndarray:
     """One channel [F, d, W] at positions x [F, N, W, 3]; angles [F, C, W] are the continuous hinge angles if known.
+
+    Args:
+        begin: [N, W, 3] positions since which displacements are counted; None: where the model starts.
 
     Raises:
         InputError: a channel attached to something that the model does not have.
@@ -39,7 +44,7 @@ def read(model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | Non
         return np.moveaxis(_camera(channel).project(_points(model, channel, x)), 2, 1)
     if channel.kind == "tip_displacement":
         node = _index(model, channel, "node", len(model.position))
-        moved = x[:, node] - model.position[node]
+        moved = x[:, node] - (model.begins[node] if begin is None else begin[node])
         along = channel.attachment.get("direction")
         if along is None:
             return np.linalg.norm(moved, axis=-1)[:, None]
@@ -75,9 +80,11 @@ def angle_mask(recording: Recording) -> np.ndarray:
     )
 
 
-def channel_values(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
-    """All components [F, D, W] at positions [F, N, W, 3] (and continuous angles [F, C, W])."""
-    return np.concatenate([read(model, c, x, angles) for c in recording.channels.values()], axis=1)
+def channel_values(
+    model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None, begin: np.ndarray | None = None
+) -> np.ndarray:
+    """All components [F, D, W] at positions [F, N, W, 3] (and continuous angles [F, C, W]); see `read`."""
+    return np.concatenate([read(model, c, x, angles, begin) for c in recording.channels.values()], axis=1)
 
 
 def depths(model: Model, recording: Recording, x: np.ndarray) -> np.ndarray:

@@ -28,13 +28,14 @@ from origami_sim.predict.worlds import World, Worlds, distinct_memories, distinc
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import batch_of
+from origami_sim.solve.statics.equilibria import equilibrium
 from origami_sim.threads import default_threads, shared, sharing, side_by_side
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
 
 FASTEST = 3.0
-"""Frames below which a time constant is not told from none."""
+"""Frames, as close as the closest, below which a time constant is not told from none."""
 
 SPARE = 3
 """Frames simulated beyond a segment, for measurements that lag."""
@@ -118,8 +119,8 @@ class Rollouts(Worlds, ABC):
 
     Args:
         subject: how to build the model. recordings: of one object.
-        start: "fit" if segments have starts that are fitted, "rest" if recordings start from rest in the model's
-            reference state. threads: see `Batch`.
+        start: "fit" if segments have starts that are fitted, "rest" if recordings start from rest where the model
+            does. threads: see `Batch`.
 
     Attributes:
         readings: what recordings say about the state at frames, by recording and frame, where that has been read.
@@ -234,7 +235,7 @@ class Rollouts(Worlds, ABC):
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
         """See `Predictor.admitted`: those with a time constant with several. See also `told_apart`."""
-        frame = float(np.median(np.diff(self.recordings[0].times)))
+        frame = min(film_step(r.times) for r in self.recordings)
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
         every = told_apart(every, len(self.components))
         every = at_several_times(every, FASTEST * frame, longest)
@@ -359,7 +360,7 @@ class Rollouts(Worlds, ABC):
         worlds, blocks, local = shots.worlds, shots.blocks, shots.local
         count, model = len(blocks), worlds[0][0]
         if self.start != "fit":
-            x = np.repeat(np.stack([m.position for m, _ in worlds], axis=1), count, axis=1)
+            x = np.repeat(np.stack([resting(*w) for w in worlds], axis=1), count, axis=1)
             return remembering(State.at_rest(model, x.shape[1], position=x, placed=True), shots)
         m = self.articulation.size
         base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
@@ -504,6 +505,17 @@ def lasting(model: Model) -> np.ndarray:
     return np.flatnonzero(~np.concatenate([np.zeros(0, bool), *fades]))
 
 
+def resting(model: Model, parameters: Parameters) -> np.ndarray:
+    """[N, 3] where a world begins at rest: the equilibrium without a drive that is nearest to where the model starts.
+
+    It begins in the reference state where the model states no start. If there is no such equilibrium, nan.
+    """
+    if not len(model.start):
+        return model.position
+    found = equilibrium(model, parameters, contact=False)
+    return found.x if found.converged else np.full_like(model.position, np.nan)
+
+
 def remembering(state: State, shots: Shots) -> State:
     """The state with the memory that the laws have there."""
     if shots.memory is not None:
@@ -550,10 +562,19 @@ def even(step: float, lasting: float, frames: int) -> float:
     return step if abs(frames * step - lasting) < 1e-9 * lasting else lasting / frames
 
 
-def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: float, *, first: bool = True):
+def film(
+    batch: Batch,
+    recording: Recording,
+    frames: int,
+    substeps: int,
+    step: float,
+    *,
+    first: bool = True,
+    begin: np.ndarray | None = None,
+):
     """Channels of the next frames and what else is asked of markers (`pictured`), in parts [f, D + k, W].
 
-    With the present state as the first frame, if `first`.
+    With the present state as the first frame, if `first`. Displacements are counted since `begin`, see `read`.
     """
     model, out, left = batch.model, [], frames
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
@@ -561,19 +582,21 @@ def film(batch: Batch, recording: Recording, frames: int, substeps: int, step: f
     if first:
         batch.advance(0, step / substeps, limit)
         x, angles = batch.motion()
-        out.append(pictured(model, recording, x[None], angles[None]))
+        out.append(pictured(model, recording, x[None], angles[None], begin))
         left -= 1
     most = max(1, int(FILMED / (24 * len(model.position) * batch.worlds)))
     while left > 0:
         part = min(left, most)
-        out.append(pictured(model, recording, *batch.film(part, substeps, step / substeps, limit)))
+        out.append(pictured(model, recording, *batch.film(part, substeps, step / substeps, limit), begin))
         left -= part
     return out
 
 
-def pictured(model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None) -> np.ndarray:
+def pictured(
+    model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None, begin: np.ndarray | None = None
+) -> np.ndarray:
     """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W]."""
-    parts = [channel_values(model, recording, x, angles), depths(model, recording, x)]
+    parts = [channel_values(model, recording, x, angles, begin), depths(model, recording, x)]
     if any(get(e).on_body for e in model.effects):
         parts.append(turned_axes(model, recording, x))
     return np.concatenate(parts, axis=1)

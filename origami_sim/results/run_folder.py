@@ -46,8 +46,9 @@ MANIFEST, STATES, TABLES, REPLAY = "manifest.json", "states.npz", "tables", "rep
 _PACKAGES = ("origami-sim", "warp-lang", "numpy", "scipy", "rerun-sdk", "pyarrow")
 _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
+_LATER = (*PADS, "start")
 _MODEL = tuple(
-    f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers", *PADS)
+    f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers", *_LATER)
 )
 _REQUIRED = {
     "format": int,
@@ -327,7 +328,7 @@ def _with_plain_names(model: Model) -> Model:
 def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
     out = {name: getattr(t, name) for name in _FRAMES}
     out |= {f"energies.{n}": v for n, v in t.energies.items()} | {f"work.{n}": v for n, v in t.work.items()}
-    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, *PADS, "channels", "panels", "carriers")}
+    out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, *_LATER, "channels", "panels", "carriers")}
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
     for channel, signal in t.drive.signals.items():
         out |= {f"drive.{channel}.{n}": v for n in _SIGNAL if (v := getattr(signal, n)) is not None}
@@ -523,7 +524,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
     given["channels"] = int(arrays.values.get("model.channels", 1))
     if "model.carriers" in arrays.values:  # runs with rigid panels have them
         given |= {"panels": str(arrays["model.panels"]), "carriers": arrays["model.carriers"]}
-    given |= {n: arrays[f"model.{n}"] for n in PADS if f"model.{n}" in arrays.values}
+    given |= {n: arrays[f"model.{n}"] for n in _LATER if f"model.{n}" in arrays.values}
     model = _with_plain_names(Model(**given, effects=tuple(manifest["effects"]), names=manifest["names"]))
     parameters = Parameters(model)  # first, because it names an effect that this version lacks
     if model.hash != manifest["model_hash"]:
