@@ -80,6 +80,16 @@ class BarRollouts(Rollouts):
         compared[: self._calm_frames(self.recordings[index], frames)] = np.nan
         return replace(block, values=compared)
 
+    def _cuts(self, worlds: int, count: int) -> list[slice]:
+        """Of a recording that is one segment, or a few, parts of the worlds, so that all cores have some."""
+        if self.calm:
+            return super()._cuts(worlds, count)
+        ends = np.linspace(0, worlds, min(worlds, count) + 1).round().astype(int)
+        return [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+    def _pace(self, worlds) -> float | None:
+        return stable_step(worlds[0][0], Parameters.join([p for _, p in worlds])).dt
+
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """The solver's step for one world, a frame at most [s]; 0 if no model can be built."""
         frame = float(np.median(np.diff(self.recordings[0].times)))
@@ -90,10 +100,11 @@ class BarRollouts(Rollouts):
         return min(frame, stable_step(*world).dt)
 
     def _filmed(self, shots: Shots) -> Simulated:
-        recording, model = self.recordings[shots.recording], shots.worlds[0][0]
+        recording, model = self.recordings[shots.recording], shots.model or shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         drive, state, step = self._driven(shots, model, parameters), self._state(shots), shots.step
-        substeps = max(1, int(np.ceil(step / stable_step(model, parameters).dt * (1 - 1e-12))))
+        pace = shots.pace or stable_step(model, parameters).dt
+        substeps = max(1, int(np.ceil(step / pace * (1 - 1e-12))))
         raw: list[np.ndarray] = []
         calm = min(self._calm_frames(recording, len(shots.blocks[0].times)), shots.frames - 1)
         if calm:

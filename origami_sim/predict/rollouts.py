@@ -68,6 +68,8 @@ class Shots:
             the frame at which the next blocks begin; 0: none is tied to them. clocked: whether a clock runs fast or
             slow, so that they begin a little before or after that frame. begun: times at which these and all others of
             their kind begin [s]; None: these alone. threads: see `Batch`.
+        model: of the first of all worlds that were asked for together. pace: longest step of the solver with which all
+            of these are stable [s]; None: not asked.
     """
 
     recording: int
@@ -82,6 +84,8 @@ class Shots:
     clocked: bool = False
     begun: np.ndarray | None = None
     threads: int | None = None
+    model: Model | None = None
+    pace: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,12 +224,19 @@ class Rollouts(Worlds, ABC):
             for group in _by_length(self.blocks, mine):
                 count = sharing() if sharing() > 1 or alone else PARTS
                 most = max(1, min(TOGETHER // len(worlds), -(-len(group) // count)))
-                for part in (group[k : k + most] for k in range(0, len(group), most)):
-                    parts.append((r, part, impossible))
-                    jobs.append(partial(self._roll, r, group, part, worlds, local, memories))
+                some = [group[k : k + most] for k in range(0, len(group), most)]
+                cuts = self._cuts(len(worlds), count if len(some) < count else 1)
+                pace = self._pace(worlds) if len(cuts) > 1 else None
+                for part in some:
+                    parts.append((r, part, impossible, len(cuts)))
+                    for cut in cuts:
+                        asked = cut, worlds[0][0], pace
+                        jobs.append(partial(self._roll, r, group, part, worlds, local, memories, asked))
         cores = -(-(self.threads or default_threads()) // max(len(jobs), 1))
         rolled = side_by_side([partial(job, cores) for job in jobs], self.threads)
-        for (r, part, impossible), (made, arrived, first) in zip(parts, rolled, strict=True):
+        several = iter(rolled)
+        for r, part, impossible, count in parts:
+            made, arrived, first = _joined([next(several) for _ in range(count)])
             self._keep(r, [self.blocks[b] for b in part], first)
             for n, b in enumerate(part):
                 values[b], ends[b] = made[n], None if arrived is None else arrived[n]
@@ -260,16 +271,34 @@ class Rollouts(Worlds, ABC):
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """See `Predictor.step`."""
 
-    def _roll(self, r: int, group: list[int], part: list[int], worlds: list[World], local, memories, threads: int):
+    def _cuts(self, worlds: int, count: int) -> list[slice]:
+        """Of which worlds rollouts are made together: here of all."""
+        return [slice(0, worlds)]
+
+    def _pace(self, worlds: list[World]) -> float | None:
+        """The longest step of the solver [s] with which all worlds are stable."""
+        return None
+
+    def _roll(
+        self, r: int, group: list[int], part: list[int], every_world: list[World], local, memories, asked, threads: int
+    ):
         """Values [B, K, n, D] and ends [B, K, L] of worlds in blocks, and what `_keep` keeps of their rollouts.
 
         Batches run over worlds, then blocks. What is asked of all blocks of a group does not depend on its parts, so
         that bytes do not either.
+
+        Args:
+            asked: which worlds, the model of the first of all, and `_pace` of all.
         """
+        cut, lead, pace = asked
+        worlds = every_world[cut]
+        local = None if local is None else local[cut]
+        if memories is not None:
+            memories = {n: m[:, cut] for n, m in memories.items()}
         recording, every = self.recordings[r], [self.blocks[b] for b in group]
         blocks, mine = [self.blocks[b] for b in part], [group.index(b) for b in part]
         k, count = len(worlds), len(blocks)
-        model, times, lasting = worlds[0][0], every[0].times, every[0].lasting
+        model, times, lasting = lead, every[0].times, every[0].lasting
         step = film_step(recording.times)
         ends = round(lasting / step)
         if ends:
@@ -310,6 +339,8 @@ class Rollouts(Worlds, ABC):
             clocked,
             begun,
             threads,
+            lead,
+            pace,
         )
         simulated = self._filmed(shots)
         raw, arrived = simulated.raw, simulated.arrived
@@ -555,6 +586,16 @@ def film_step(times: np.ndarray) -> float:
     if np.all(np.abs(counts - np.round(counts)) < 0.1):
         return float(times[-1] - times[0]) / float(np.round(counts).sum())
     return max(float(steps.min()), float(times[-1] - times[0]) / (FINER * len(times)))
+
+
+def _joined(several: list[tuple]) -> tuple:
+    """What `_roll` returns for a part of the blocks, of all worlds, from what it returned for some of these each."""
+    if len(several) == 1:
+        return several[0]
+    made = np.concatenate([values for values, *_ in several], axis=1)
+    ends = [end for _, end, _ in several]
+    arrived = None if ends[0] is None else np.concatenate(ends, axis=1)
+    return made, arrived, several[0][2]
 
 
 def even(step: float, lasting: float, frames: int) -> float:

@@ -104,3 +104,19 @@ def test_what_is_predicted_from_rest_is_what_a_run_shows(settings):
     shown = observe(run, recording)["midspan"]
     assert np.ptp(shown) > 1 * MM
     np.testing.assert_allclose(found[0, :, 0], shown, atol=1e-3 * np.ptp(shown))
+
+
+def test_worlds_may_be_cut_into_parts_to_the_last_bit(settings):
+    """Also where one of them asks for shorter steps than the others, or is another shape."""
+    numbers = [Free("", n, "", settings[n].value, 1.0, spread=1.0) for n in ("shortening", "modulus")]
+
+    def build(values):
+        return arch.build(settings.replace(**values))
+
+    def predicted(threads):
+        subject = Subject(build, tuple(numbers))
+        forward = BarRollouts(subject, [measured()], start="rest", threads=threads)
+        thetas = [[0.47e-3, 4.2e6], [0.5e-3, 4.2e6], [0.47e-3, 8e6]]
+        return forward.predict(Hypothesis(), np.array(thetas))[0]
+
+    assert np.array_equal(predicted(1), predicted(2))
