@@ -137,7 +137,7 @@ class Touches(Masses):
         )  # fmt: skip
 
     def _joined(self) -> set[int]:
-        """Panels of which the patches are, as far as was stated, one piece: they have a border in common, or overlap."""
+        """Panels of which the patches may be one piece: they have a border in common, or overlap."""
         panels = [p for p, patch in enumerate(self._patches) if patch]
         if not panels:
             return set()

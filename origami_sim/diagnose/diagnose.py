@@ -28,11 +28,12 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.subject import Source, subject_of
 from origami_sim.fit.suspects import suspects
+from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.infer.held_out import held_out
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.infer.nominal import level, nominal_fits
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search
@@ -118,6 +119,8 @@ def _diagnosed(
         noted.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
+    base, rough = settled(forward, base)
+    weights = level(forward, base) if rough else weights
     lap("nominal")
     tell("screen", 0.0)
     every = forward.admitted(suspects(forward.model, recordings, forward.drive, forward.parameters))
@@ -128,11 +131,16 @@ def _diagnosed(
             noted.append(
                 f"Not suspected, as it cannot act on this device or show in these recordings: {', '.join(idle)}."
             )
-    signatures = screen(forward, every, base, weights, progress=lambda part: tell("screen", part))
+    told = lambda part: tell("screen", part)  # noqa: E731
+    calm = None if not rough else calmest(forward, every, given, base, told)
+    if calm is not None:
+        weights = calm.weights
+    signatures = calm.signatures if calm is not None else screen(forward, every, base, weights, progress=told)
     lap("screen")
     tell("search", 0.0)
     store, lead = keep is not None and keep.store, lambda part: tell("search", part)
-    posterior = search(forward, base, signatures, weights, given=given, progress=lead, most=o.fits // 2, store=store)
+    how = {"given": given, "calm": calm, "progress": lead, "most": o.fits // 2, "store": store}
+    posterior = search(forward, base, signatures, weights, **how)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
     if lost:

@@ -73,7 +73,7 @@ class Posterior:
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
             were better than they promised in the place of the best set. missed: by how much sets were better than their
-            estimates, by the fit that these are about.
+            estimates, by the fit that these are about. rough: whether fits end in many basins, see `basins`.
     """
 
     signatures: list[Signature]
@@ -96,6 +96,7 @@ class Posterior:
     reconsidered: bool = False
     swapped: list[float] = field(default_factory=list)
     missed: dict[Key, list[float]] = field(default_factory=dict)
+    rough: bool = False
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self, among: Iterable[Key] | None = None) -> dict[Key, float]:

@@ -41,6 +41,14 @@ Half and double change no word of four simulated swings, and no probability by m
 """
 
 
+NUMBERS, PRIOR = 41, 2.0
+"""Values of a number of the model that are tried, and within how many standard deviations of its prior.
+
+A hundredth of a modulus known to ten moves the snap of an arch on its ramp by a swing's sixth, so that the next value
+is within reach of derivatives.
+"""
+
+
 def strained(f: Fit) -> bool:
     """Whether numbers are further from what was known than chance would take them."""
     known = sum(np.isfinite(n.spread) for n in f.free)
@@ -148,6 +156,7 @@ def over_their_range(
     base: Fit,
     weights: Weights,
     progress: Callable[[float], None] | None = None,
+    grid: np.ndarray = GRID,
 ) -> Iterator[tuple[np.ndarray, float] | None]:
     """Of each suspect beside a fit, the best of a few strengths, and the log likelihood that it gains.
 
@@ -158,7 +167,7 @@ def over_their_range(
     for n, s in enumerate(suspects):
         if progress:
             progress(n / len(suspects))
-        thetas = [np.concatenate([base.theta, values]) for values in over_range(s)]
+        thetas = [np.concatenate([base.theta, values]) for values in over_range(s, grid)]
         best = _best_of(forward, base, about, base.hypothesis.plus(s), thetas)
         yield best[:2] if best else None
 
@@ -185,6 +194,35 @@ def over_shapes(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarra
     return found
 
 
+def over_numbers(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarray, float] | None:
+    """The numbers (P,) of a fit with another value of one of the model's, and the log likelihood that this gains.
+
+    Of each number that moves the model values over its prior are simulated; starts and other numbers follow linearly.
+    None where no other value gains any.
+    """
+    found: tuple[np.ndarray, float] | None = None
+    low, high = np.array([(n.lower, n.upper) for n in f.free]).T
+    for k, thetas in along_numbers(forward, f):
+        about = Cleared(f, weights, held=[k])
+        best = _best_of(forward, f, about, f.hypothesis, list(thetas))
+        if best and best[1] > (found[1] if found else 0.0):
+            theta, gain, left = best
+            theta[about.moved] += about.explaining(left) * about.scale[about.moved]
+            found = np.clip(theta, low, high), gain
+    return found
+
+
+def along_numbers(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]]:
+    """Each number of the model that moves it, and the numbers (NUMBERS, P) of a fit with its values over its prior."""
+    for k, n in enumerate(forward.subject.nominals):
+        if n.aligned or not np.isfinite(n.spread):
+            continue
+        values = n.start + PRIOR * n.spread * np.linspace(-1.0, 1.0, NUMBERS)
+        thetas = np.repeat(f.theta[None], NUMBERS, axis=0)
+        thetas[:, k] = np.clip(values, n.lower, n.upper)
+        yield k, thetas
+
+
 def _best_of(
     forward: Predictor, f: Fit, about: Cleared, hypothesis: Hypothesis, thetas: list[np.ndarray]
 ) -> tuple[np.ndarray, float, np.ndarray] | None:
@@ -206,13 +244,13 @@ def _best_of(
     return (thetas[best], gain, whole[:, best]) if gain > 0.0 else None
 
 
-def over_range(suspect: Suspect) -> list[np.ndarray]:
+def over_range(suspect: Suspect, grid: np.ndarray = GRID) -> list[np.ndarray]:
     """Numbers of an effect that are tried: each strength alone, of either sign where it may have both."""
     start, out = np.array([f.start for f in suspect.free]), []
     for n, f in enumerate(suspect.free):
         if f not in suspect.strengths:
             continue
-        for value in np.unique(np.clip(f.start + f.scale * np.concatenate([GRID, -GRID]), f.lower, f.upper)):
+        for value in np.unique(np.clip(f.start + f.scale * np.concatenate([grid, -grid]), f.lower, f.upper)):
             if value != f.start:
                 out.append(np.where(np.arange(len(start)) == n, value, start))
     return out

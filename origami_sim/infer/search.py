@@ -23,6 +23,7 @@ from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed, small
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.basins import OWED, Calm, elsewhere
 from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
@@ -30,7 +31,7 @@ from origami_sim.infer.implied import OwnColumns, with_own_noise
 from origami_sim.infer.judged import judged
 from origami_sim.infer.nominal import level
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
-from origami_sim.infer.scan import from_given_numbers, over_shapes, over_their_range, scanned, strained
+from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
 from origami_sim.threads import shared
@@ -46,9 +47,6 @@ LEADING = 12
 
 It bounds the time of a search.
 """
-
-OWED = 1.0
-"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
 CELLS = 8
 """Cells of the grid of discrepancies for which pairs are judged: those that hold nearly all of the posterior."""
@@ -72,6 +70,7 @@ def search(
     weights: Weights,
     *,
     given: Fit | None = None,
+    calm: Calm | None = None,
     progress: Callable[[float], None] | None = None,
     most: int = FITS,
     store: bool = False,
@@ -81,10 +80,13 @@ def search(
     Args:
         given: the model with its numbers as they were given, about which single effects are judged too if the refit
             took them further than chance would.
+        calm: what makes it linear if it has many basins, see `basins`.
     """
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
-    if given is not None and strained(base):
+    if calm is not None:
+        _begun(out, forward, calm)
+    elif given is not None and strained(base):
         _about_given(out, forward, base, given)
     extended(out, forward, progress=progress, most=most)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
@@ -104,6 +106,21 @@ def _about_given(out: Posterior, forward: Predictor, base: Fit, given: Fit) -> N
     alone = {k: of.get(out.suspect(n).form) for k in out.estimates if len(k) == 1 for n in k}
     known = {k: s for k, s in alone.items() if s is not None}
     _promised(out, list(known), from_given_numbers(forward, list(known.values()), given, base, by))
+
+
+def _begun(out: Posterior, forward: Predictor, calm: Calm) -> None:
+    """Enters the fits that calm a rough model; what it promises itself is forgotten, but for what was simulated."""
+    alone = {frozenset((n,)): one for n, one in enumerate(calm.found) if one is not None}
+    for key in list(out.estimates):
+        if key in alone:
+            out.total[key] = out.promise[key] = -np.inf
+        else:
+            out.drop(key)
+    known = [k for k in alone if k in out.estimates]
+    _promised(out, known, [alone[k] for k in known])
+    for n, f in calm.fits.items():
+        _add(out, forward, frozenset((n,)), f, log_priors(out.signatures))
+    out.reconsidered = out.rough = True
 
 
 def reconsidered(
@@ -535,19 +552,9 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
-        return _elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local))
+        return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), out.rough)
     # derivatives by the numbers of the model and by starts hardly change with an effect
     known = replace(line.reweighted(node.fit.weights, by), steps=np.concatenate(steps))
     near = {"known": known, "kept": count}
-    return _elsewhere(forward, fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near))
-
-
-def _elsewhere(forward: Predictor, f: Fit) -> Fit:
-    """A fit, or a better one from another value of a number beside a strength, which may lie beyond a ridge."""
-    if f.failed or f.weights is None:
-        return f
-    found = over_shapes(forward, f, f.weights)
-    if found is None or found[1] < OWED:
-        return f
-    other = fit(forward, f.hypothesis, f.weights, theta=found[0], local=f.local)
-    return other if not other.failed and other.cost < f.cost else f
+    found = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
+    return elsewhere(forward, found, out.rough)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -85,7 +86,7 @@ class BarRollouts(Rollouts):
         if self.calm:
             return super()._cuts(worlds, count)
         ends = np.linspace(0, worlds, min(worlds, count) + 1).round().astype(int)
-        return [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return [slice(a, b) for a, b in pairwise(ends.tolist())]
 
     def _pace(self, worlds) -> float | None:
         return stable_step(worlds[0][0], Parameters.join([p for _, p in worlds])).dt

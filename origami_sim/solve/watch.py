@@ -185,9 +185,7 @@ def _names(model: Model, sides: np.ndarray) -> str:
 
 
 def _acting() -> str:
-    return (
-        f"contact between panels acts in this run, with a friction of {FRICTION:g} ({STATED})."
-    )
+    return f"contact between panels acts in this run, with a friction of {FRICTION:g} ({STATED})."
 
 
 def watch_of(

@@ -242,7 +242,7 @@ def test_ten_thousand_steps_at_the_limit_stay_bounded(case):
 def test_default_step_is_a_fraction_of_the_limit_and_names_its_cause():
     model, parameters = sheet()
     step = stable_step(model, parameters)
-    assert step.dt == SAFETY * step.limit
+    assert step.dt == SAFETY * step.limit and 0.0 < step.dt < step.limit
     assert "(bars)" in step.cause
     assert str(step.node) in str(step) and step.cause in str(step)
     assert str(TimeStep(np.inf, np.inf, 0, "")) == "nothing limits the time step"

@@ -1,0 +1,154 @@
+"""Basins: where fits of a model end that amplifies what is small, and how better ones are found.
+
+What snaps, walks or rings, and is predicted from one start over all of a recording, has a likelihood with many maxima:
+a number that is a little off moves a snap out of reach of what derivatives tell. A fit then ends though other numbers,
+no stranger than its own, suit the recording better. There, effects are tried over their ranges and numbers over their
+priors, in batches; a loss that calms the model makes it linear, and what further effects do is told about the best such
+fit.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from origami_sim.effects import get
+from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
+from origami_sim.fit.least_squares import Fit, fit
+from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.weights import Weights
+from origami_sim.infer.budget import FAR
+from origami_sim.infer.nominal import level
+from origami_sim.infer.scan import GRID, Cleared, along_numbers, gained, over_numbers, over_shapes, over_their_range
+from origami_sim.infer.screen import Signature, screen
+from origami_sim.infer.words import pooled
+
+OWED = 1.0
+"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
+
+CALMING = 3
+"""Effects, the best over their ranges, of which the best fit tells more of a rough model. It bounds the time."""
+
+COARSE = GRID[2:9]
+"""Strengths that are tried, in the unit in which they are noticeable: a tenth to a hundred of it."""
+
+
+def settled(forward: Predictor, f: Fit) -> tuple[Fit, bool]:
+    """The fit, or a better one from other numbers of the model, and whether it is rough: has several basins.
+
+    Along each number that moves the model, over its prior, what is missed has several minima then, parted by more than
+    what decides anything. Starts of their own tie segments to the recording, so that predictions by these have one. It
+    is not asked where a fit leaves little more than noise.
+    """
+    # what rings faster than frames tell looks like a recorder's noise: that which was stated decides
+    if forward.local or forward.curve or pooled(f.rms() / forward.blocks[0].noise) < FAR:
+        return f, False
+    white = level(forward, f)
+    f = f.reweighted(white)
+    rough = any(several(missed(forward, f, thetas, white)) for _, thetas in along_numbers(forward, f))
+    if not rough:
+        return f, False
+    return moved_on(forward, f, over_numbers(forward, f, white)) or f, True
+
+
+def missed(forward: Predictor, f: Fit, thetas: np.ndarray, weights: Weights) -> np.ndarray:
+    """(n,) squares that numbers of a fit's hypothesis leave, in white noise; infinite where they are unstable."""
+    shot = forward.predict(f.hypothesis, thetas, np.repeat(f.local[None], len(thetas), axis=0), f.blocks)
+    out = np.zeros(len(thetas))
+    for b, values in zip(f.blocks, shot, strict=True):
+        block = forward.blocks[b]
+        gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
+        out += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
+    return out
+
+
+def several(squares: np.ndarray) -> bool:
+    """Whether squares along a number have several minima, with more between them than what decides anything."""
+    squares = np.minimum(squares, np.finfo(float).max)  # of what goes unstable
+    lowest = np.minimum.accumulate(squares), np.minimum.accumulate(squares[::-1])[::-1]
+    return bool(np.any(squares - np.maximum(*lowest) >= OWED))
+
+
+def moved_on(forward: Predictor, f: Fit, found: tuple[np.ndarray, float] | None) -> Fit | None:
+    """The fit from other numbers that were found to gain something, if it ends better than a fit does."""
+    if found is None or found[1] < OWED or f.weights is None:
+        return None
+    other = fit(forward, f.hypothesis, f.weights, theta=found[0], local=f.local)
+    return other if not other.failed and other.cost < f.cost else None
+
+
+def noticeable(s: Suspect) -> Suspect:
+    """The suspect with scales at which its strengths are noticeable in most devices.
+
+    A model that amplifies what is small shows far weaker ones, which tell nothing.
+    """
+    first = get(s.effect).parameter(s.free[0].name).typical
+    sizes = [abs(get(s.effect).parameter(f.name).typical or first or f.scale) for f in s.strengths]
+    return scaled(s, sizes)
+
+
+@dataclass(frozen=True, eq=False)
+class Calm:
+    """What makes a rough model linear: fits of one effect, and what others do beside the best of them.
+
+    Attributes:
+        signatures: of all suspects, about the best fit; without parts of those that cannot act beside its effect.
+        weights: of these. fits: by suspect, those that were fitted. found: of each suspect, the best numbers over its
+            range about the model as given, and what these gain over the refitted one; None if nothing.
+    """
+
+    signatures: list[Signature]
+    weights: Weights
+    fits: dict[int, Fit]
+    found: list[tuple[np.ndarray, float] | None]
+
+
+def calmest(
+    forward: Predictor,
+    suspects: Sequence[Suspect],
+    given: Fit,
+    base: Fit,
+    progress: Callable[[float], None] | None = None,
+) -> Calm | None:
+    """Tries each effect over its range about the model as given, and fits the best few from there; None if none helps.
+
+    Args:
+        given, base: the model with its numbers as they were given, and refitted.
+    """
+    by, none = level(forward, base), Hypothesis()
+    suspects, before = [noticeable(s) for s in suspects], Cleared(base, by).missed
+    about = fit(forward, none, by, local=given.local, most=0)  # with derivatives by its numbers
+    behind = gained(forward, about, Cleared(about, by).missed, before)
+    found = [
+        (one[0], one[1] - behind) if one and one[1] > behind else None
+        for one in over_their_range(forward, suspects, about, by, progress, COARSE)
+    ]
+    fits: dict[int, Fit] = {}
+    for n in sorted((n for n, one in enumerate(found) if one), key=lambda n: -found[n][1]):  # type: ignore[index]
+        if len(fits) == CALMING:
+            break
+        if suspects[n].effect not in {suspects[k].effect for k in fits}:
+            f = fit(forward, Hypothesis((suspects[n],)), by, theta=found[n][0], local=base.local)  # type: ignore[index]
+            f = elsewhere(forward, f, rough=True)
+            if not f.failed:
+                fits[n] = f
+    best = min((f for f in fits.values()), key=lambda f: f.cost, default=None)
+    if best is None or best.cost > base.reweighted(by).cost - OWED:
+        return None
+    white = level(forward, best)
+    (own,) = best.hypothesis.suspects
+    beside = [s for s in suspects if distinct_sites(own, s)]
+    told = {s.suspect.form: s for s in screen(forward, beside, best.reweighted(white), white)}
+    every = [told.get(s.form, Signature(s, [], np.ones(len(s.strengths)))) for s in suspects]
+    return Calm(every, white, fits, found)
+
+
+def elsewhere(forward: Predictor, f: Fit, rough: bool) -> Fit:
+    """A fit, or a better one from another value of a number beside a strength, which may lie beyond a ridge.
+
+    Where all is rough, also from another value of a number of the model.
+    """
+    if f.failed or f.weights is None:
+        return f
+    f = moved_on(forward, f, over_shapes(forward, f, f.weights)) or f
+    return (moved_on(forward, f, over_numbers(forward, f, f.weights)) or f) if rough and f.weights else f
