@@ -16,15 +16,13 @@ from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
 from origami_sim.fit.least_squares import Fit, fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.profile import OWED, along_numbers, missed, several
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import FAR
 from origami_sim.infer.nominal import level
-from origami_sim.infer.scan import GRID, Cleared, along_numbers, gained, over_numbers, over_shapes, over_their_range
+from origami_sim.infer.scan import GRID, Cleared, gained, over_numbers, over_shapes, over_their_range
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.words import pooled
-
-OWED = 1.0
-"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
 CALMING = 3
 """Effects, the best over their ranges, of which the best fit tells more of a rough model. It bounds the time."""
@@ -45,28 +43,12 @@ def settled(forward: Predictor, f: Fit) -> tuple[Fit, bool]:
         return f, False
     white = level(forward, f)
     f = f.reweighted(white)
-    rough = any(several(missed(forward, f, thetas, white)) for _, thetas in along_numbers(forward, f))
+    rough = any(
+        several(missed(forward, f.hypothesis, thetas, f.local, white)) for _, thetas in along_numbers(forward, f)
+    )
     if not rough:
         return f, False
     return moved_on(forward, f, over_numbers(forward, f, white)) or f, True
-
-
-def missed(forward: Predictor, f: Fit, thetas: np.ndarray, weights: Weights) -> np.ndarray:
-    """(n,) squares that numbers of a fit's hypothesis leave, in white noise; infinite where they are unstable."""
-    shot = forward.predict(f.hypothesis, thetas, np.repeat(f.local[None], len(thetas), axis=0), f.blocks)
-    out = np.zeros(len(thetas))
-    for b, values in zip(f.blocks, shot, strict=True):
-        block = forward.blocks[b]
-        gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
-        out += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
-    return out
-
-
-def several(squares: np.ndarray) -> bool:
-    """Whether squares along a number have several minima, with more between them than what decides anything."""
-    squares = np.minimum(squares, np.finfo(float).max)  # of what goes unstable
-    lowest = np.minimum.accumulate(squares), np.minimum.accumulate(squares[::-1])[::-1]
-    return bool(np.any(squares - np.maximum(*lowest) >= OWED))
 
 
 def moved_on(forward: Predictor, f: Fit, found: tuple[np.ndarray, float] | None) -> Fit | None:

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import UTMOST, Fit, changed, precision
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.profile import along_numbers, missed
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.screen import Signature
 
@@ -41,14 +42,6 @@ Half and double change no word of four simulated swings, and no probability by m
 """
 
 
-NUMBERS, PRIOR = 41, 2.0
-"""Values of a number of the model that are tried, and within how many standard deviations of its prior.
-
-A hundredth of a modulus known to ten moves the snap of an arch on its ramp by a swing's sixth, so that the next value
-is within reach of derivatives.
-"""
-
-
 def strained(f: Fit) -> bool:
     """Whether numbers are further from what was known than chance would take them."""
     known = sum(np.isfinite(n.spread) for n in f.free)
@@ -70,12 +63,8 @@ def scanned(
     thetas = np.array([[*given, *values] for values in over_range(suspect)])
     if also is not None:
         thetas = np.concatenate([thetas, also[None]])
-    shot = forward.predict(hypothesis, thetas, np.repeat(local[None], len(thetas), axis=0))
-    missed = np.zeros(len(thetas))
-    for block, values in zip(forward.blocks, shot, strict=True):
-        gap = np.where(block.seen(), (block.values - values) / weights.deviation, 0.0)
-        missed += np.sum(np.where(np.isfinite(gap), gap, np.inf) ** 2, axis=(1, 2))
-    return thetas[int(np.argmin(missed))] if np.any(np.isfinite(missed)) else None
+    squares = missed(forward, hypothesis, thetas, local, weights)
+    return thetas[int(np.argmin(squares))] if np.any(np.isfinite(squares)) else None
 
 
 class Cleared:
@@ -210,17 +199,6 @@ def over_numbers(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarr
             theta[about.moved] += about.explaining(left) * about.scale[about.moved]
             found = np.clip(theta, low, high), gain
     return found
-
-
-def along_numbers(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]]:
-    """Each number of the model that moves it, and the numbers (NUMBERS, P) of a fit with its values over its prior."""
-    for k, n in enumerate(forward.subject.nominals):
-        if n.aligned or not np.isfinite(n.spread):
-            continue
-        values = n.start + PRIOR * n.spread * np.linspace(-1.0, 1.0, NUMBERS)
-        thetas = np.repeat(f.theta[None], NUMBERS, axis=0)
-        thetas[:, k] = np.clip(values, n.lower, n.upper)
-        yield k, thetas
 
 
 def _best_of(

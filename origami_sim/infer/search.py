@@ -22,8 +22,9 @@ from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.fit.least_squares import Fit, carried_on, fit, promised, renewed, small
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.profile import OWED
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.basins import OWED, Calm, elsewhere
+from origami_sim.infer.basins import Calm, elsewhere
 from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight

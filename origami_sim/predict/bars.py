@@ -11,7 +11,8 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.channels import stacked
-from origami_sim.predict.rollouts import Rollouts, Shots, Simulated, film
+from origami_sim.predict.filming import film
+from origami_sim.predict.rollouts import Rollouts, Shots, Simulated
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import gradient_norms, stable_step
 

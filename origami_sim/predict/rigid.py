@@ -14,16 +14,13 @@ from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Pose
+from origami_sim.predict.filming import even, film, film_step, pictured
 from origami_sim.predict.rollouts import (
     Motion,
     Rollouts,
     Shots,
     Simulated,
-    even,
-    film,
-    film_step,
     joined_poses,
-    pictured,
 )
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
