@@ -122,6 +122,8 @@ def calmest(
     beside = [s for s in suspects if distinct_sites(own, s)]
     told = {s.suspect.form: s for s in screen(forward, beside, best.reweighted(white), white)}
     every = [told.get(s.form, Signature(s, [], np.ones(len(s.strengths)))) for s in suspects]
+    for n in fits:  # its numbers have the scales of the suspect that was fitted
+        every[n] = every[n].of(suspects[n])
     return Calm(every, white, fits, found)
 
 

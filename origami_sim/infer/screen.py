@@ -84,6 +84,13 @@ class Signature:
         k, size = len(self.size), usual(self.suspect, self.suspect.strengths)
         return Group(tuple(range(first, first + k)), k, np.zeros(k), self.side, np.full(k, np.inf), *self.bounds, size)
 
+    def of(self, suspect: Suspect) -> "Signature":
+        """The same of its suspect with other scales: of changes as large as those."""
+        size = np.array([f.scale for f in suspect.strengths])
+        ratio = size / self.size
+        parts, loud = [p * ratio for p in self.parts], np.abs(ratio)
+        return replace(self, suspect=suspect, parts=parts, size=size, norm=self.norm * loud, raw=self.raw * loud)
+
     def values(self, change: np.ndarray) -> np.ndarray:
         """Values of its suspect's numbers [SI] with the strengths (k,) changed, over `size`."""
         s = self.suspect
