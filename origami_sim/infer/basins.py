@@ -14,7 +14,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
-from origami_sim.fit.least_squares import Fit, fit
+from origami_sim.fit.least_squares import Fit, carried_on, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import OWED, along_numbers, missed, several
 from origami_sim.fit.weights import Weights
@@ -112,9 +112,10 @@ def calmest(
         if suspects[n].effect not in {suspects[k].effect for k in fits}:
             f = fit(forward, Hypothesis((suspects[n],)), by, theta=found[n][0], local=base.local)  # type: ignore[index]
             f = elsewhere(forward, f, rough=True)
-            if not f.failed:
-                fits[n] = f
-    best = min((f for f in fits.values()), key=lambda f: f.cost, default=None)
+            if not f.failed:  # what it misses is far less now, and decides where it ends
+                on = elsewhere(forward, carried_on(forward, f.reweighted(level(forward, f))), rough=False)
+                fits[n] = f if on.failed else on.reweighted(by)
+    best = min(fits.values(), key=lambda f: f.cost, default=None)
     if best is None or best.cost > base.reweighted(by).cost - OWED:
         return None
     white = level(forward, best)

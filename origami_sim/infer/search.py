@@ -549,13 +549,13 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
             steps.append(np.array([n.scale * part.get(n, forward.nudge) for n in suspect.free]))
         column += len(node.groups[g].columns)
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
-    given = out.begun.get(key)
+    given, rough = out.begun.get(key), out.rough and len(suspects) == 1  # several begin from a calm fit
     if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
-        return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), out.rough)
+        return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), rough)
     # derivatives by the numbers of the model and by starts hardly change with an effect
     known = replace(line.reweighted(node.fit.weights, by), steps=np.concatenate(steps))
     near = {"known": known, "kept": count}
     found = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
-    return elsewhere(forward, found, out.rough)
+    return elsewhere(forward, found, rough)
