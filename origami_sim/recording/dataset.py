@@ -106,10 +106,11 @@ def read_dataset(
     if not isinstance(source, (str, Path)):
         paths = [Path(one) for one in source]
         name = paths[0].parent.name if paths else "recordings"
-        alike = sidecar is None or isinstance(sidecar, (str, Path))
-        each = [sidecar] * len(paths) if alike else list(sidecar)
-        found = tuple(_read(p, s, None, alike and s is not None) for p, s in zip(paths, each, strict=True))
-        return DataSet(name or "recordings", found)
+        if sidecar is None or isinstance(sidecar, (str, Path)):
+            found = [_read(path, sidecar, None, sidecar is not None) for path in paths]
+        else:
+            found = [_read(path, own, None, False) for path, own in zip(paths, sidecar, strict=True)]
+        return DataSet(name or "recordings", tuple(found))
     if not (sidecar is None or isinstance(sidecar, (str, Path))):
         raise InputError("one sidecar each is for a list of tables", field="sidecar", value=len(sidecar))
     path = Path(source)
