@@ -14,11 +14,11 @@ from itertools import product
 
 import numpy as np
 
+from origami_sim.diagnose.held_out import steps_without
 from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Baseline
-from origami_sim.infer.held_out import steps_without
 from origami_sim.locate.locate import motion
 from origami_sim.threads import shared
 

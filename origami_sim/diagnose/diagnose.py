@@ -15,6 +15,7 @@ from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
+from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
 from origami_sim.diagnose.meeting import meetings
@@ -32,7 +33,6 @@ from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.discrepancy import of_recorder
-from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import level, nominal_fits
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen

@@ -11,13 +11,13 @@ from scipy.signal import savgol_filter
 
 from origami_sim.drive import Drive
 from origami_sim.effects import get
-from origami_sim.fit.begun import begins, with_begins
 from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.model.distort import distorted
+from origami_sim.predict.begun import begins, with_begins
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of, shifted
 from origami_sim.predict.filming import even, film_step
@@ -25,7 +25,7 @@ from origami_sim.predict.measured import continuous, lateness, measured, read_un
 from origami_sim.predict.starts import CAREFUL, NEAR, Reading, channel_tangent, read_start, seen_first, spans
 from origami_sim.predict.stated import stated
 from origami_sim.predict.track import coordinates
-from origami_sim.predict.worlds import World, Worlds, distinct_memories, distinct_motions
+from origami_sim.predict.worlds import World, Worlds, distinct_memories, distinct_motions, lasting
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import batch_of
@@ -523,12 +523,6 @@ class Rollouts(Worlds, ABC):
         arm = self.articulation
         pose = arm.moved(arm.reference(q.shape[1]), q - arm.reference().angles)
         return np.moveaxis(arm.positions(pose), 1, 0)
-
-
-def lasting(model: Model) -> np.ndarray:
-    """Rows of a model's memory that do not fade: those of laws in which no time passes, such as dry friction."""
-    fades = [np.full(size, "dt" in get(effect).arguments) for effect, _, size in model.memories]
-    return np.flatnonzero(~np.concatenate([np.zeros(0, bool), *fades]))
 
 
 def resting(model: Model, parameters: Parameters) -> np.ndarray:

@@ -10,12 +10,12 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.begun import within
 from origami_sim.fit.hypothesis import Hypothesis, Subject, apply
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.suspects import suspects
 from origami_sim.model import Model, Parameters
 from origami_sim.model.articulation import Articulation
+from origami_sim.predict.begun import within
 from origami_sim.predict.channels import component_names
 from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
@@ -140,6 +140,12 @@ def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
         for _, parameters in worlds
     ]
     return [of.index(n) for n in range(len(found))], np.array(of)
+
+
+def lasting(model: Model) -> np.ndarray:
+    """Rows of a model's memory that do not fade: those of laws in which no time passes, such as dry friction."""
+    fades = [np.full(size, "dt" in get(effect).arguments) for effect, _, size in model.memories]
+    return np.flatnonzero(~np.concatenate([np.zeros(0, bool), *fades]))
 
 
 def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:

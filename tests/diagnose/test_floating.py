@@ -11,11 +11,11 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines
+from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
 from origami_sim.fit.hypothesis import Hypothesis, apply
 from origami_sim.fit.suspects import suspects
-from origami_sim.infer.held_out import held_out
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.locate import locate, motion, motions_of, touching

@@ -10,6 +10,7 @@ from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.experiment import propose
+from origami_sim.diagnose.held_out import folds, held_out, steps_without
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
@@ -17,7 +18,6 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.suspects import suspects
-from origami_sim.infer.held_out import folds, held_out, steps_without
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
