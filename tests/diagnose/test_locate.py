@@ -10,7 +10,7 @@ from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.fit.hypothesis import Hypothesis
-from origami_sim.fit.least_squares import fit
+from origami_sim.fit.least_squares import carried_on, fit
 from origami_sim.fit.suspects import suspects
 from origami_sim.infer.diagnosis import REVERSAL
 from origami_sim.infer.nominal import nominal_fits
@@ -77,7 +77,7 @@ def test_each_of_two_effects_is_seen_through_what_is_missing_without_it():
     every = {s.label: s for s in suspects(forward.model, recordings, forward.drive, forward.parameters)}
     pair = [every["crease_friction at crease 1"], every["crease_stiffening at crease 0"]]
     start = np.array([*base.theta, 2e-5, *(f.start for f in pair[0].free[1:]), 3e-4])
-    f = fit(forward, Hypothesis(tuple(pair)), base.weights, theta=start, local=base.local)
+    f = carried_on(forward, fit(forward, Hypothesis(tuple(pair)), base.weights, theta=start, local=base.local))
     rubs, bends = partials(forward, [(s, f) for s in pair])
     assert (rubs.label, rubs.site, rubs.curve.against) == (pair[0].label, "crease 1", "rate")
     x, law = np.array(rubs.curve.x), np.array(rubs.law)
@@ -85,7 +85,7 @@ def test_each_of_two_effects_is_seen_through_what_is_missing_without_it():
     assert law[fast] == pytest.approx(-2e-5 * np.sign(x[fast]), rel=0.1)
     for p in (rubs, bends):
         seen, given = np.array(p.curve.mean), np.array(p.law)
-        assert np.sqrt(np.mean((seen - given) ** 2)) < 0.35 * np.sqrt(np.mean(given**2))  # 0.32 and 0.26: noise
+        assert np.sqrt(np.mean((seen - given) ** 2)) < 0.35 * np.sqrt(np.mean(given**2))  # 0.29 and 0.27: noise
     assert (bends.site, bends.curve.against) == ("crease 0", "angle")
 
 
