@@ -79,7 +79,6 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     )
     sheet.crease(stiffness=stiffness, rest_angle=0.0, loss_time=s.loss_time)
     sheet.name("crease", along_strip(sheet, "gap"))
-    sheet.touch(False)  # as in the reference: hinges with both patches inside close beyond where these meet, 52 deg
     sheet.on("crease_stop").set("mass_damping", decay_rate=s.decay_rate)
     model, parameters = sheet.build()
     model.position[:, 0] -= lengths.sum() / 2

@@ -29,10 +29,6 @@ most pairs that may touch at once.
 """
 
 
-SEAM = 1e-6
-"""Distance over their size up to which patches have a border in common: rounding."""
-
-
 @dataclass(frozen=True)
 class Touch:
     """How panels touch, as it was stated; see `Touches.touch`."""
@@ -66,7 +62,7 @@ class Touches(Masses):
 
         Without this statement they touch with these defaults: a run goes without contact, which is much faster, until
         panels come near each other in it, and is then made again with contact (see `solve.watch`). What is stated acts
-        from the start. Patches that have a border in common may be one piece, and touch only where it is stated; so do
+        from the start. Patches touch only where it is stated, as those of neighbouring panels may be one piece; so do
         thick panels (`hinge`, `mitre`, `panel(offset=...)`): contact rounds the edges that they cut.
 
         Their surfaces lie half of their thickness off their middle planes. Where two come nearer they are pushed apart
@@ -108,19 +104,12 @@ class Touches(Masses):
 
     # what follows from it ----------------------------------------------------------------------------------------
 
-    @property
-    def _contact(self) -> Touch:
-        """How panels touch: as stated, or as they do where nothing was."""
-        return self._between or Touch(not self._cut(), FRICTION, None, LANDING, None)
-
     def _padded(self, model: Model) -> Model:
         """The model with the patches that can touch: rectangles in their middle planes, with rounded borders."""
         found: list[tuple[int, np.ndarray, float]] = []
         thickness = []
-        stated = self._contact
-        joined = self._joined() if self._between is None else set()
-        for panel, patch in enumerate(self._patches if stated.on else []):
-            if not patch or panel in joined:
+        for panel, patch in enumerate(self._patches if self._between is not None and self._between.on else []):
+            if not patch:
                 continue
             height = patch["side"] * 0.5 * (float(self.thickness[panel]) + patch["thickness"])
             half = np.maximum(0.5 * patch["size"] - 0.5 * patch["thickness"], 0.05 * patch["size"])
@@ -136,22 +125,9 @@ class Touches(Masses):
             pad_thickness=np.array(thickness),
         )  # fmt: skip
 
-    def _joined(self) -> set[int]:
-        """Panels of which the patches may be one piece: they have a border in common, or overlap."""
-        panels = [p for p, patch in enumerate(self._patches) if patch]
-        if not panels:
-            return set()
-        each = [self._patches[p] for p in panels]
-        centre, size = (np.array([np.asarray(patch[n], float)[:2] for patch in each]) for n in ("centre", "size"))
-        side = np.array([patch["side"] for patch in each])
-        apart = np.abs(centre[:, None] - centre) - 0.5 * (size[:, None] + size)
-        near = np.all(apart <= SEAM * size.max(), axis=-1) & (side[:, None] == side)
-        np.fill_diagonal(near, False)
-        return {p for p, beside in zip(panels, near, strict=True) if beside.any()}
-
     def _touching(self, parameters: Parameters) -> None:
         """Sets how each triangle touches, or would as soon as something comes near it."""
-        stated = self._contact
+        stated = self._between or Touch(not self._cut(), FRICTION, None, LANDING, None)
         if not stated.on:
             return
         face = self.mesh.triangle_face

@@ -123,38 +123,6 @@ def test_equilibria_and_slow_motions_keep_panels_apart():
     assert any("panel 0 and panel 1 meet at t = 0.9" in n for n in run.notes)
 
 
-def inside(gap, states=None):
-    """Two panels with patches on their inner side, so far apart across the crease, which is turned shut."""
-    s = Sheet(strip([10 * MM, 10 * MM], 12 * MM), thickness=1 * MM, panels="rigid").fix(panels=[0])
-    for panel in (0, 1):
-        s.patch(panel, thickness=1.6 * MM, size=(10 * MM - gap, 10 * MM))
-    s.crease(stiffness=1e-5, loss_time=8e-3).gravity((0, 0, 0))
-    s.set("crease_drive", drive_stiffness=1e-5, target_angle=3.1)
-    return s if states is None else s.touch(states)
-
-
-def test_patches_that_are_apart_keep_each_other_off_by_their_own_thickness():
-    across, up = 0.5 * (1.2 + 1.6), 0.5 * (1.0 + 1.6)  # of their borders, which are rounded by half their thickness
-    shut = 2 * (math.acos(0.8 / math.hypot(across, up)) - math.atan2(up, across))
-
-    def slow(sheet):
-        return quasistatic(*sheet.build(), Drive(load=ramp(1.0, 1.0)), np.linspace(0, 1, 6))
-
-    found, stated, through = (slow(inside(1.2 * MM, s)) for s in (None, True, False))
-    assert found.creases[-1, 0, 0] == pytest.approx(shut, abs=0.01)
-    assert np.array_equal(found.x, stated.x) and "panel 0 and panel 1 meet" in " ".join(found.notes)
-    assert through.creases[-1, 0, 0] > 1.5 * shut
-
-
-def test_patches_with_a_border_in_common_may_be_one_piece():
-    one, parted, stated = (inside(*given).build()[0] for given in ((0.0,), (0.1 * MM,), (0.0, True)))
-    assert [len(m.pad_thickness) for m in (one, parted, stated)] == [0, 2, 2]
-    other = Sheet(strip([10 * MM, 10 * MM], 12 * MM), thickness=1 * MM)
-    for panel, side in ((0, 1), (1, -1)):
-        other.patch(panel, thickness=1.6 * MM, size=(10 * MM, 10 * MM), side=side)
-    assert len(other.build()[0].pad_thickness) == 2  # on different faces
-
-
 def test_what_lies_in_each_other_at_the_start_stays_so_and_is_told():
     corners = np.array([(x, y, z) for z in (0, 0.3) for x, y in ((0, 0), (9, 0), (9, 9), (0, 9))]) * MM
     s = Sheet(mesh(corners, [(0, 1, 2, 3), (4, 5, 6, 7)]), thickness=0.5 * MM).fix(panels=[0]).gravity()
