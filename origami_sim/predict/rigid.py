@@ -284,18 +284,16 @@ class RigidRollouts(Rollouts):
 
     def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
         """See `Rollouts._own_memories`: each world's segments begin where those of the first do."""
-        chained, motion = self._chained(r, local), self._motion(r, worlds[0], local)
-        if chained is None or motion is None:
+        chained = self._chained(r, local)
+        if chained is None:
             return {}
 
         def remembered(part: list[World]) -> np.ndarray:
             return self._anew(chained, part)[2]
 
-        others = worlds[1:]
-        parts = [others[k : k + FOLLOWED] for k in range(0, len(others), FOLLOWED)]
+        parts = [worlds[k : k + FOLLOWED] for k in range(0, len(worlds), FOLLOWED)]
         found = np.concatenate(shared([partial(remembered, part) for part in parts]), axis=2)
-        first = [motion.memory[b.first][:, None] for b in chained.blocks]
-        return {b.first: np.hstack(both) for b, *both in zip(chained.blocks, first, found, strict=True)}
+        return {b.first: memory for b, memory in zip(chained.blocks, found, strict=True)}
 
     def _anew(self, chained: Chained, worlds: list[World]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Worlds that go on from segment to segment, see `film_anew`."""

@@ -418,8 +418,8 @@ class Rollouts(Worlds, ABC):
         It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
         nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
         carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
-        What does not fade is that of each world's own motion, where that can be followed: an arm that has come to rest
-        against dry friction rests in another place if it yields elsewhere.
+        What does not fade is that of each world's own motion, where that can be followed and its laws differ from the
+        first one's: an arm that has come to rest against dry friction rests elsewhere if that yields elsewhere.
         """
         model = worlds[0][0]
         every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
@@ -436,10 +436,10 @@ class Rollouts(Worlds, ABC):
             return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
         worlds = [worlds[k] for k in some]
         out = self._carried_along(r, worlds, motion, every[every <= max(b.first for b in wanted)])
-        rows = lasting(model)
-        own = self._own_memories(r, worlds, local) if motion.memory and len(rows) and len(worlds) > 1 else {}
+        rows, others = lasting(worlds)
+        own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and len(others) else {}
         for first in out.keys() & own.keys():
-            out[first][rows] = own[first][rows]
+            out[first][np.ix_(rows, others)] = own[first][rows]
         return {first: memory[:, of] for first, memory in out.items()}
 
     def _carried_along(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:

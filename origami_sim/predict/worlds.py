@@ -142,10 +142,17 @@ def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
     return [of.index(n) for n in range(len(found))], np.array(of)
 
 
-def lasting(model: Model) -> np.ndarray:
-    """Rows of a model's memory that do not fade: those of laws in which no time passes, such as dry friction."""
-    fades = [np.full(size, "dt" in get(effect).arguments) for effect, _, size in model.memories]
-    return np.flatnonzero(~np.concatenate([np.zeros(0, bool), *fades]))
+def lasting(worlds: Sequence[World]) -> tuple[np.ndarray, list[int]]:
+    """Rows of memory that do not fade, and the worlds in which its laws are not those of the first.
+
+    Of laws in which no time passes, such as dry friction.
+    """
+    (model, first), *_ = worlds
+    stays = {e for e, *_ in model.memories if "dt" not in get(e).arguments}
+    rows = np.concatenate([np.zeros(0, bool), *(np.full(size, e in stays) for e, _, size in model.memories)])
+    mine = [p for p in first if p[0] in stays]
+    others = [k for k, (_, own) in enumerate(worlds) if any(not np.array_equal(own[p], first[p]) for p in mine)]
+    return np.flatnonzero(rows), others
 
 
 def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:
