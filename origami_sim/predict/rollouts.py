@@ -439,7 +439,7 @@ class Rollouts(Worlds, ABC):
         rows, others = lasting(worlds)
         own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and len(others) else {}
         for first in out.keys() & own.keys():
-            out[first][np.ix_(rows, others)] = own[first][rows]
+            out[first][rows[:, None], others] = own[first][rows]
         return {first: memory[:, of] for first, memory in out.items()}
 
     def _carried_along(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:
