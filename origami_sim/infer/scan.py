@@ -5,7 +5,7 @@ effect: dry friction that holds a crease back is as a weaker magnet. And a numbe
 at which friction yields, may have several values from which a fit goes no further.
 """
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -166,32 +166,31 @@ def over_shapes(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarra
 
     What a value changes is simulated; starts and other numbers follow linearly. None where no other value gains any.
     """
-    low, high = np.array([(n.lower, n.upper) for n in f.free]).T
-    found: tuple[np.ndarray, float] | None = None
-    every = [(s, n) for s in f.hypothesis.suspects for n in s.free]
-    for k, (s, n) in enumerate(every, start=len(forward.subject.nominals)):
-        if n in s.strengths:
-            continue
-        thetas = np.repeat(f.theta[None], len(values := over_shape(n)), axis=0)
-        thetas[:, k] = values
-        about = Cleared(f, weights, held=[k])
-        best = _best_of(forward, f, about, f.hypothesis, list(thetas))
-        if best and best[1] > (found[1] if found else 0.0):
-            theta, gain, left = best
-            theta[about.moved] += about.explaining(left) * about.scale[about.moved]
-            found = np.clip(theta, low, high), gain
-    return found
+    return _best_along(forward, f, weights, _along_shapes(forward, f))
 
 
 def over_numbers(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarray, float] | None:
-    """The numbers (P,) of a fit with another value of one of the model's, and the log likelihood that this gains.
+    """The same with another value of one of the model's numbers, over its prior."""
+    return _best_along(forward, f, weights, along_numbers(forward, f))
 
-    Of each number that moves the model values over its prior are simulated; starts and other numbers follow linearly.
-    None where no other value gains any.
-    """
-    found: tuple[np.ndarray, float] | None = None
+
+def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]]:
+    """Each number beside a strength, and the numbers (SHAPES, P) of a fit with its values over what is plausible."""
+    every = [(s, n) for s in f.hypothesis.suspects for n in s.free]
+    for k, (s, n) in enumerate(every, start=len(forward.subject.nominals)):
+        if n not in s.strengths:
+            thetas = np.repeat(f.theta[None], len(values := over_shape(n)), axis=0)
+            thetas[:, k] = values
+            yield k, thetas
+
+
+def _best_along(
+    forward: Predictor, f: Fit, weights: Weights, each: Iterable[tuple[int, np.ndarray]]
+) -> tuple[np.ndarray, float] | None:
+    """The best of values of single numbers of a fit, with all others that follow linearly, and what it gains."""
     low, high = np.array([(n.lower, n.upper) for n in f.free]).T
-    for k, thetas in along_numbers(forward, f):
+    found: tuple[np.ndarray, float] | None = None
+    for k, thetas in each:
         about = Cleared(f, weights, held=[k])
         best = _best_of(forward, f, about, f.hypothesis, list(thetas))
         if best and best[1] > (found[1] if found else 0.0):

@@ -32,6 +32,19 @@ def even(step: float, lasting: float, frames: int) -> float:
     return step if abs(frames * step - lasting) < 1e-9 * lasting else lasting / frames
 
 
+def interpolated(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:
+    """Shifts and rates [L, W] a time `longer` (W,) [s] after the second of three frames `ends` [3, L, W].
+
+    Rates are a parabola through the three, and shifts its integral through theirs.
+    """
+    m = ends.shape[1] // 2
+    (q0, q1, q2), (v0, v1, v2) = ends[:, :m], ends[:, m:]
+    a, j = (v2 - v0) / (2 * step), (v2 - 2 * v1 + v0) / step**2
+    v = (q2 - q0) / (2 * step) - j * step**2 / 6
+    shift = q1 + longer * (v + longer * (a / 2 + longer * j / 6))
+    return np.concatenate([shift, v1 + longer * (a + longer * j / 2)])
+
+
 def film(
     batch: Batch,
     recording: Recording,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,7 +25,6 @@ from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import RigidBatch, Topology, check_inertia
-from origami_sim.threads import shared
 
 FEWEST = 8
 """Frames of a segment, at least: as many as tell its start's rate."""
@@ -38,9 +36,6 @@ Ten times less costs 1.6 times the steps; ten times more begins to show in deriv
 where this would let them go over three: worlds that differ by a nudge then take the same steps, whose errors cancel in
 differences, where steps of their own made intervals fifty times too narrow.
 """
-
-FOLLOWED = 4
-"""Worlds that are followed together from segment to segment, while other cores follow others."""
 
 FINEST = 1e-4
 """Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
@@ -288,22 +283,20 @@ class RigidRollouts(Rollouts):
         if chained is None:
             return {}
 
-        def remembered(part: list[World]) -> np.ndarray:
-            return self._anew(chained, part)[2]
+        kept = self._in_parts(worlds, lambda part, threads: self._anew(chained, part, threads)[2])
+        return {b.first: memory for b, memory in zip(chained.blocks, kept, strict=True)}
 
-        parts = [worlds[k : k + FOLLOWED] for k in range(0, len(worlds), FOLLOWED)]
-        found = np.concatenate(shared([partial(remembered, part) for part in parts]), axis=2)
-        return {b.first: memory for b, memory in zip(chained.blocks, found, strict=True)}
-
-    def _anew(self, chained: Chained, worlds: list[World]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _anew(
+        self, chained: Chained, worlds: list[World], threads: int = 1
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Worlds that go on from segment to segment, see `film_anew`."""
         r, count = chained.recording, len(worlds)
         shots = chained.shots(worlds, len(self.recordings[r].times))
         (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
         begin = State.at_rest(model, count, position=self._state(shots).x, placed=True)
-        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1]).remembered()
+        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1], threads).remembered()
         drive = self._driven(shots, model, parameters)
-        batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE)
+        batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE, threads=threads)
         assert isinstance(batch, RigidBatch)
         batch.finest = FINEST
         starts = [np.repeat(a[:, :, None], count, axis=2) for a in (chained.angles, chained.rates)]

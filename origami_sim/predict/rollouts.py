@@ -1,7 +1,7 @@
 """Predictions by simulation: batches of rollouts that start where segments of recordings do."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -20,7 +20,7 @@ from origami_sim.model.distort import distorted
 from origami_sim.predict.begun import begins, with_begins
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of, shifted
-from origami_sim.predict.filming import even, film_step
+from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.predict.starts import CAREFUL, NEAR, Reading, channel_tangent, read_start, seen_first, spans
 from origami_sim.predict.stated import stated
@@ -358,7 +358,7 @@ class Rollouts(Worlds, ABC):
         tied = None
         if arrived is not None:
             near = arrived[..., columns]
-            tied = (carried(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
+            tied = (interpolated(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
         # as stored ones lie in memory: sums depend on it in their last digit
         ends = None if tied is None else np.ascontiguousarray(tied.T)
         return np.ascontiguousarray(values.transpose(3, 2, 0, 1)), ends, simulated.first
@@ -435,37 +435,53 @@ class Rollouts(Worlds, ABC):
         if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
             return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
         worlds = [worlds[k] for k in some]
-        out = self._carried_along(r, worlds, motion, every[every <= max(b.first for b in wanted)])
+        asked = every[every <= max(b.first for b in wanted)]
         rows, others = lasting(worlds)
-        own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and len(others) else {}
-        for first in out.keys() & own.keys():
-            out[first][rows[:, None], others] = own[first][rows]
-        return {first: memory[:, of] for first, memory in out.items()}
+        own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and others else {}
+        if not own.keys() >= set(asked.tolist()):
+            return {first: memory[:, of] for first, memory in self._carried(r, worlds, motion, asked).items()}
+        size = sum(size for *_, size in model.memories)
+        # of worlds that are followed only what fades is carried
+        along = [k for k in range(len(worlds)) if k not in others or len(rows) < size]
+        out: dict[int, np.ndarray] = {}
+        for first, carried in self._carried(r, [worlds[k] for k in along], motion, asked).items():
+            memory = np.empty((size, len(worlds)))
+            memory[:, along] = carried
+            memory[rows[:, None], others] = own[first][rows]
+            out[first] = memory[:, of]
+        return out
 
-    def _carried_along(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:
-        """Memory [M, K] by first frame of worlds that are carried along the motion of the first."""
+    def _carried(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:
+        """Memory [M, K] at frames that are asked for, of worlds that are carried along the motion of the first."""
         path = motion.positions[:, :, None]
+        step = float(np.median(np.diff(self.recordings[r].times)))
+
+        def carry(near: np.ndarray, part: list[World], threads: int) -> np.ndarray:
+            """[n, M, k] at frames that are near each other."""
+            begin = max(int(near[0]) - LEAD, 0)
+            batch = self._rested(r, part, begin, path[begin], threads)
+            rested = batch.remembered()[None]
+            if near[-1] <= begin:
+                return rested
+            later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
+            return np.concatenate([rested, later])[-len(near) :]
+
         out: dict[int, np.ndarray] = {}
         for near in np.split(asked, np.flatnonzero(np.diff(asked) > LEAD) + 1):  # carried from one to the next
-            parts = np.array_split(np.arange(len(worlds)), min(sharing(), len(worlds)))
-            cores = -(-(self.threads or default_threads()) // len(parts))
-            jobs = [partial(self._carried, r, [worlds[k] for k in part], near, path, cores) for part in parts]
-            for first, carried in zip(near.tolist(), np.concatenate(shared(jobs), axis=2), strict=True):
+            found = self._in_parts(worlds, partial(carry, near))
+            for first, carried in zip(near.tolist(), found, strict=True):
                 if first in motion.memory:
                     carried = carried + (motion.memory[first][:, None] - carried[:, :1])
                     carried[:, 0] = motion.memory[first]  # to the last digit, so that its film is known again
                 out[first] = carried
         return out
 
-    def _carried(self, r: int, worlds: list[World], near: np.ndarray, path: np.ndarray, threads: int) -> np.ndarray:
-        """Memory [n, M, K] at frames that are near each other, carried along positions [F, N, 1, 3] of all frames."""
-        begin, step = max(int(near[0]) - LEAD, 0), float(np.median(np.diff(self.recordings[r].times)))
-        batch = self._rested(r, worlds, begin, path[begin], threads)
-        rested = batch.remembered()[None]
-        if near[-1] <= begin:
-            return rested
-        later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
-        return np.concatenate([rested, later])[-len(near) :]
+    def _in_parts(self, worlds: list[World], make: Callable[[list[World], int], np.ndarray]) -> np.ndarray:
+        """What is made [n, M, K] of worlds, of some of them by each process, on so many cores."""
+        parts = np.array_split(np.arange(len(worlds)), min(sharing(), len(worlds)))
+        cores = -(-(self.threads or default_threads()) // len(parts))
+        jobs = [partial(make, [worlds[k] for k in part], cores) for part in parts]
+        return np.concatenate(shared(jobs), axis=2)
 
     def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
         """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; none: not known."""
@@ -550,19 +566,6 @@ def joined_poses(poses: Sequence[Pose]) -> Pose:
         np.concatenate([p.centre for p in poses]),
         np.concatenate([p.angles for p in poses], axis=1),
     )
-
-
-def carried(ends: np.ndarray, longer: np.ndarray, step: float) -> np.ndarray:
-    """Shifts and rates [L, W] a time `longer` (W,) [s] after the second of three frames `ends` [3, L, W].
-
-    Rates are a parabola through the three, and shifts its integral through theirs.
-    """
-    m = ends.shape[1] // 2
-    (q0, q1, q2), (v0, v1, v2) = ends[:, :m], ends[:, m:]
-    a, j = (v2 - v0) / (2 * step), (v2 - 2 * v1 + v0) / step**2
-    v = (q2 - q0) / (2 * step) - j * step**2 / 6
-    shift = q1 + longer * (v + longer * (a / 2 + longer * j / 6))
-    return np.concatenate([shift, v1 + longer * (a + longer * j / 2)])
 
 
 def _joined(several: list[tuple]) -> tuple:
