@@ -28,7 +28,7 @@ EFFECT = Effect(
             "gravity_z", "gz", "m/s^2", -9.80665, (-10.0, 10.0), "acceleration of gravity along z", typical=-9.80665
         ),
     ),
-    fitted=("gravity_z",),
+    fitted=("gravity_z", "gravity_x", "gravity_y"),
     formula="f = m g",
     source="-",
     matters="1 % of the torque on a box flap at 0.2 T, 20 % at 10 mT; 1.5 times the stiffness of the cantilever",

@@ -106,9 +106,9 @@ def _several_magnets(model: Model, parameters: Parameters) -> bool:
 
 
 def _off(parameters: Parameters, name: str) -> bool:
-    """Whether an effect of the model has no strength anywhere."""
-    strength = get(name).fitted[0]
-    return bool(np.all(parameters[name, strength] == get(name).parameter(strength).default))
+    """Whether an effect of the model has no strength anywhere, in no component."""
+    fitted = [get(name).parameter(p) for p in get(name).fitted]
+    return not any(np.any(parameters[name, p.name]) for p in fitted if p.unit == fitted[0].unit)
 
 
 def _driven(recordings: Sequence[Recording], drive: Drive) -> set[str]:

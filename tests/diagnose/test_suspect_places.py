@@ -5,6 +5,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from origami_sim import Drive, Sheet, strip
 from origami_sim.device.scene import scene_settings
 from origami_sim.effects import CATALOGUE
 from origami_sim.fit.hypothesis import Hypothesis, along_each_axis, apply
@@ -151,3 +152,14 @@ def test_what_a_model_has_at_no_strength_is_a_suspect_and_sheets_may_lose_energy
         np.testing.assert_array_equal(out["shell_membrane_relaxation", name], parameters["shell_membrane", name])
     assert np.all(out["shell_membrane_relaxation", "share_1"] == 0.3)
     assert np.all(out["mass_damping", "decay_rate"] == 7.0)
+
+
+def test_gravity_is_no_suspect_where_a_model_has_it_in_any_direction():
+    def named(acceleration):
+        sheet = Sheet(strip([0.02, 0.02], width=0.02), thickness="1 mm", material="pdms")
+        model, parameters = sheet.crease(stiffness="1 mN m/rad").gravity(acceleration).fix(panels=[0]).build()
+        return [s for s in asked(model, parameters, Drive()) if s.effect == "gravity"]
+
+    assert not named((0.0, 0.0, -9.80665)) and not named((0.0, 9.81, 0.0))
+    (lying,) = named((0.0, 0.0, 0.0))
+    assert [f.start for f in lying.strengths] == [0.0, 0.0, 0.0]
