@@ -1,6 +1,6 @@
 """The posterior over sets of effects: those that were fitted, and what was estimated about them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,13 +47,15 @@ class Node:
 class Estimate:
     """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
 
-    `near`: how many effects that one has more or less, and its evidence, the better the smaller.
+    `near`: how many effects that one has more or less, and its evidence, the better the smaller. `gain`: log Bayes
+    factor of the set over that one.
     """
 
     parent: Key
     groups: tuple[int, ...]
     values: np.ndarray
     near: tuple[int, float]
+    gain: float
 
 
 @dataclass(eq=False)
@@ -72,8 +74,9 @@ class Posterior:
         renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
-            were better than they promised in the place of the best set. missed: by how much sets were better than their
-            estimates, by the fit that these are about. rough: whether fits end in many basins, see `basins`.
+            were better than they promised in the place of the best set. realised: log Bayes factors of sets over the
+            fit that their estimates are about, as estimated and as fitted, by that fit. rough: whether fits end in many
+            basins, see `basins`.
     """
 
     signatures: list[Signature]
@@ -95,18 +98,21 @@ class Posterior:
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
     swapped: list[float] = field(default_factory=list)
-    missed: dict[Key, list[float]] = field(default_factory=dict)
+    realised: dict[Key, list[tuple[float, float]]] = field(default_factory=dict)
     rough: bool = False
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self, among: Iterable[Key] | None = None) -> dict[Key, float]:
         """Of each set (or of some), over all sizes of discrepancy; of those whose shapes begin elsewhere, the best.
 
-        A set that was not fitted is as probable as its estimate, less what estimates by that fit were too high.
+        A set that was not fitted is as probable as its estimate, of whose gain that part counts which others realised
+        that were estimated by the same fit: what is linear errs in proportion to how far it goes.
         """
-        wrong = {k: min(0.0, float(np.mean(m))) for k, m in self.missed.items()}
+        part = {k: realised_part(pairs) for k, pairs in self.realised.items()}
         log = {k: self.total[k] for k in (self.total if among is None else among)}
-        log |= {k: log[k] + wrong.get(e.parent, 0.0) for k, e in self.estimates.items() if k in log}
+        for k, e in self.estimates.items():
+            if k in log:
+                log[k] -= (1.0 - part.get(e.parent, 1.0)) * max(e.gain, 0.0)
         best: dict[tuple[str, ...], Key] = {}
         for key in sorted(log, key=lambda k: (k in self.nodes, log[k])):
             best[self.labels(key)] = key
@@ -153,6 +159,13 @@ class Posterior:
 
     def label(self, key: Key) -> str:
         return " + ".join(self.labels(key)) or "nominal"
+
+
+def realised_part(pairs: Sequence[tuple[float, float]]) -> float:
+    """Part of estimated gains that fits realised, all of it at most: a regression through the origin."""
+    estimated, fitted = np.maximum(np.array(pairs).T, 0.0)
+    square = float(estimated @ estimated)
+    return min(float(estimated @ fitted) / square, 1.0) if square else 1.0
 
 
 def marginals(p: Posterior) -> dict[str, float]:

@@ -209,8 +209,7 @@ def extended(
 
 def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     """Fits a set, and keeps by how much it is better than was thought."""
-    labels, parent, promise = out.labels(key), out.estimates[key].parent, _promise(out, key)
-    estimate = out.total[key]
+    labels, promise, estimate, estimated = out.labels(key), _promise(out, key), out.estimates[key], out.total[key]
     out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
     swapped = _in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
     fitted = _fitted(out, forward, key)
@@ -219,8 +218,9 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
         out.drop(key)
         return
     _add(out, forward, key, fitted, log_priors(out.signatures))
-    out.gains.setdefault(parent, []).append(out.total[key] - promise)
-    out.missed.setdefault(parent, []).append(out.total[key] - estimate)
+    out.gains.setdefault(estimate.parent, []).append(out.total[key] - promise)
+    realised = estimate.gain, estimate.gain + out.total[key] - estimated
+    out.realised.setdefault(estimate.parent, []).append(realised)
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
 
@@ -239,8 +239,9 @@ def _likely(out: Posterior) -> Key | None:
     fitted = _named(out)
     others = out.estimates if len(fitted) == len(out.nodes) else [k for k in out.estimates if not out.imitates(k)]
     least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
+    off = {k: [fitted - estimated for estimated, fitted in pairs] for k, pairs in out.realised.items()}
     promised, estimated = (
-        {k: min(0.0, _most(off)) for k, off in each.items() if len(off) > 1} for each in (out.gains, out.missed)
+        {k: min(0.0, _most(off)) for k, off in each.items() if len(off) > 1} for each in (out.gains, off)
     )
     unfitted = {
         k: max(out.promise[k] + promised.get(parent, 0.0), out.total[k] + estimated.get(parent, 0.0))
@@ -477,6 +478,7 @@ def _judge(
         values.update((n, value[peak[k], k]) for k, n in enumerate(mine) if log[peak[k], k] > -np.inf)
     rank = promise = logsumexp(found, axis=1)
     totals: list[float] = rank.tolist()
+    gains = rank - log_prior - logsumexp(node.evidence + cells)
     if foresee and node.foresight is not None:
         # what is missing explains some of the colour, and all that flaws and discrepancy would
         bare = np.array([smooth == 0.0 and flaws == out.hyper.flaws[0] for _, smooth, flaws in out.hyper.cells])
@@ -485,8 +487,8 @@ def _judge(
             rank[mine] = log + log_prior[mine]
             values.update(zip(mine, value, strict=True))
         leading = np.argsort(-rank)[:LEADING].tolist()
-        gains = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
-        promise[leading] = total + log_prior[leading] + gains
+        ahead = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
+        promise[leading] = total + log_prior[leading] + ahead
     for n, key in enumerate(keys):
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
@@ -500,7 +502,7 @@ def _judge(
         before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
         if before is None or near <= before.near:
             out.log[key], out.total[key], out.promise[key] = found[n], totals[n], float(promise[n])
-            out.estimates[key] = Estimate(node.key, sets[n], values[n], near)
+            out.estimates[key] = Estimate(node.key, sets[n], values[n], near, float(gains[n]))
     return rank
 
 

@@ -13,7 +13,7 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
-from origami_sim.infer.posterior import Posterior
+from origami_sim.infer.posterior import Estimate, Posterior, realised_part
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.verdict import credible, decide, in_all, undecided
 from origami_sim.infer.words import joined, said, say, title
@@ -128,12 +128,28 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
     """Three laws are 1500 more probable (in the logarithm) than two of them; those are named if they explain most."""
     three = ("air_drag", "crease_friction", "crease_softness")
     p = posterior({three: 0.0, three[:2]: -1500.0, three[1:]: -1520.0, three[:1]: -1600.0, (): -2000.0})
-    p.missed = {frozenset(): [-3.0]}
+    p.realised = {frozenset(): [(5.0, 2.0)]}
     shares = [Share("", "effect", 1.0 - left), Share("", "rest", left)]
     decided = decide(p, lambda key: Budget(shares, 1.0 + 10.0 * left))
     assert decided.word == word and decided.lead == set(three[:2])
     if word == "SEVERAL":
         assert decided.probability == pytest.approx(1.0 / 1.28)
+
+
+def test_weak_estimates_stay_as_probable_though_a_strong_one_was_too_high():
+    """What is linear errs in proportion to how far it goes: of what promised nothing there is nothing to take."""
+    p = posterior({(): 0.0, ("air_drag",): -1.0, ("clock_rate",): -1.0})
+    for key, gain in zip([k for k in p.total if k], (4.0, -0.5), strict=True):
+        del p.nodes[key]
+        p.estimates[key] = Estimate(frozenset(), (), np.zeros(0), (1, 0.0), gain)
+    drag, clock = p.estimates
+    before = p.probabilities()
+    p.realised = {frozenset(): [(20.0, 5.0), (4.0, -9.0)]}
+    assert realised_part(p.realised[frozenset()]) == pytest.approx(100.0 / 416.0)
+    after = p.probabilities()
+    assert after[clock] / after[frozenset()] == pytest.approx(before[clock] / before[frozenset()])
+    lost = np.log(before[drag] / before[frozenset()]) - np.log(after[drag] / after[frozenset()])
+    assert lost == pytest.approx(4.0 * (1.0 - 100.0 / 416.0))
 
 
 def test_what_acts_in_every_explanation_is_said_once():
