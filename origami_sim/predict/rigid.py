@@ -233,8 +233,8 @@ class RigidRollouts(Rollouts):
         return out, ends
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
-        tree = self._tree if np.array_equal(model.position, self.model.position) else None
-        return super()._batch(model, parameters, drive, state, tree=tree, **options)
+        # lengths do not change how panels hang together
+        return super()._batch(model, parameters, drive, state, tree=self._tree, **options)
 
     def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
         """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other.
