@@ -294,7 +294,7 @@ class RigidRollouts(Rollouts):
         shots = chained.shots(worlds, len(self.recordings[r].times))
         (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
         begin = State.at_rest(model, count, position=self._state(shots).x, placed=True)
-        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1], threads).remembered()
+        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1], threads)[-1].memory
         drive = self._driven(shots, model, parameters)
         batch = self._batch(model, parameters, drive, begin, tolerance=TOLERANCE, threads=threads)
         assert isinstance(batch, RigidBatch)

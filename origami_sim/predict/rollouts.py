@@ -422,9 +422,9 @@ class Rollouts(Worlds, ABC):
         first one's: an arm that has come to rest against dry friction rests elsewhere if that yields elsewhere.
         """
         model = worlds[0][0]
-        every = np.unique([b.first for b in self.blocks if b.recording == r])  # also of segments not asked for
-        every = np.union1d(every, [b.first for b in wanted])
-        if not len(State.at_rest(model).memory):
+        # also of segments not asked for
+        every = np.unique([b.first for b in (*self.blocks, *wanted) if b.recording == r])
+        if not (size := len(State.at_rest(model).memory)):
             return None
         if not np.any(every) and not begins(model, Parameters.join([p for _, p in worlds])):
             return None
@@ -432,15 +432,12 @@ class Rollouts(Worlds, ABC):
         if motion is None:
             return None
         some, of = distinct_memories(worlds)
-        if len(some) == 1 and all(n in motion.memory for n in every.tolist()):
-            return {n: np.repeat(motion.memory[n][:, None], len(of), axis=1) for n in every.tolist()}
         worlds = [worlds[k] for k in some]
         asked = every[every <= max(b.first for b in wanted)]
         rows, others = lasting(worlds)
         own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and others else {}
         if not own.keys() >= set(asked.tolist()):
             return {first: memory[:, of] for first, memory in self._carried(r, worlds, motion, asked).items()}
-        size = sum(size for *_, size in model.memories)
         # of worlds that are followed only what fades is carried
         along = [k for k in range(len(worlds)) if k not in others or len(rows) < size]
         out: dict[int, np.ndarray] = {}
@@ -453,16 +450,19 @@ class Rollouts(Worlds, ABC):
 
     def _carried(self, r: int, worlds: list[World], motion: Motion, asked: np.ndarray) -> dict[int, np.ndarray]:
         """Memory [M, K] at frames that are asked for, of worlds that are carried along the motion of the first."""
+        if len(worlds) == 1 and motion.memory.keys() >= set(asked.tolist()):
+            return {n: motion.memory[n][:, None] for n in asked.tolist()}
         path = motion.positions[:, :, None]
         step = float(np.median(np.diff(self.recordings[r].times)))
 
         def carry(near: np.ndarray, part: list[World], threads: int) -> np.ndarray:
             """[n, M, k] at frames that are near each other."""
             begin = max(int(near[0]) - LEAD, 0)
-            batch = self._rested(r, part, begin, path[begin], threads)
-            rested = batch.remembered()[None]
+            held = self._rested(r, part, begin, path[begin], threads)
+            rested = held[-1].memory[None]
             if near[-1] <= begin:
                 return rested
+            batch = self._batch(*held, supports=part[0][0], threads=threads)
             later = batch.carry(path[begin : near[-1] + 1], step, (near[near > begin] - begin).tolist())
             return np.concatenate([rested, later])[-len(near) :]
 
@@ -487,7 +487,9 @@ class Rollouts(Worlds, ABC):
         """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; none: not known."""
         return {}
 
-    def _rested(self, r: int, worlds: list[World], frame: int, x: np.ndarray, threads: int = 1) -> Batch:
+    def _rested(
+        self, r: int, worlds: list[World], frame: int, x: np.ndarray, threads: int = 1
+    ) -> tuple[Model, Parameters, Drive, State]:
         """Worlds held at positions [N, 1, 3], where they have rested, driven as from a frame of a recording on.
 
         At the first frame with what `begins` says beside.
@@ -511,7 +513,7 @@ class Rollouts(Worlds, ABC):
             usual = batch.carry(path, step, range(1, len(path)))
             for rows, given in moved:
                 rested[rows] += given * np.abs(usual[:, rows]).max(axis=0)
-        return self._batch(held, parameters, drive, replace(state, memory=rested), **one)
+        return held, parameters, drive, replace(state, memory=rested)
 
     def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         return batch_of(model, parameters, drive, state, among=self.shared, **{"threads": self.threads, **options})
