@@ -1,6 +1,7 @@
 """Rollouts of rigid panels: recordings cut into short segments that are tied to each other."""
 
-from collections.abc import Sequence
+from collections import ChainMap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -21,7 +22,7 @@ from origami_sim.predict.rollouts import (
     Simulated,
     joined_poses,
 )
-from origami_sim.predict.worlds import World
+from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import RigidBatch, Topology, check_inertia
@@ -48,6 +49,13 @@ POINTS = 8
 """Motions that are kept: those of the last points that a fit tried."""
 
 
+Films = dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]]
+"""Films of segments [frames, D + k] and where they arrive [1 or 3, L], by all that they depend on.
+
+Blocks and drives are kept, so that no other gets their number.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class Chained:
     """Segments of a recording, each tied to the next.
@@ -67,10 +75,26 @@ class Chained:
     step: float
     dt: float
 
-    def shots(self, worlds: list[World], frames: int) -> Shots:
-        """Rollouts of worlds that begin with the first block."""
-        local = None if self.local is None else np.repeat(self.local[:, :1], len(worlds), axis=0)
-        return Shots(self.recording, self.blocks[:1], worlds, None, local, None, self.step, frames, 0)
+    def shots(self, worlds: list[World], some: Sequence[int] = (0,), **also) -> Shots:
+        """Rollouts of worlds that begin with some blocks."""
+        local = None if self.local is None else np.repeat(self.local[:, some], len(worlds), axis=0)
+        blocks = [self.blocks[n] for n in some]
+        given = {"late": None, "memory": None, "frames": 0, "ends": 0} | also
+        return Shots(self.recording, blocks, worlds, local=local, step=self.step, **given)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What channels see of worlds that go on from segment to segment.
+
+    Attributes:
+        first: [D + k, W, B] where segments begin. later: [F, D + k, W] from frame to frame.
+        arrived: [B - 1, L, W] where those end that are tied to the next.
+    """
+
+    first: np.ndarray
+    later: np.ndarray
+    arrived: np.ndarray
 
 
 class RigidRollouts(Rollouts):
@@ -103,7 +127,8 @@ class RigidRollouts(Rollouts):
             self.readings = probe.readings
         self._tree = Topology(self.model)
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
-        self._films: dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]] = {}
+        self._films: Films = {}
+        self._beside: dict[int, Films] = {}  # of what was followed last beside the first world, by recording
         check_tree(self._tree, self.articulation.floating)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
@@ -146,36 +171,36 @@ class RigidRollouts(Rollouts):
         return float(np.median(np.diff(self.recordings[0].times)))
 
     def _filmed(self, shots: Shots) -> Simulated:
-        """See `Rollouts._filmed`; not again of the first world, if it was filmed a short while ago.
+        """See `Rollouts._filmed`; not again of worlds of which films are known.
 
-        It is the point about which derivatives are taken, where a fit has just been. Worlds are the same to the last
-        digit whatever others run beside them, unless some are late, which has them all driven in another way.
+        These are the point about which derivatives are taken, where a fit has just been, and what was followed. Worlds
+        are the same to the last digit whatever others run beside them, unless some are late, which has them all driven
+        in another way.
         """
-        keys = [] if shots.late is not None else self._film_keys(shots)
-        known = [self._films[k] for k in keys if k in self._films]
-        count = len(shots.blocks)
-        some = bool(keys) and len(known) == len(keys)
-        if not some:
-            raw, arrived = self._simulated(shots)
-        else:
-            raw = np.stack([film for *_, film, _ in known], axis=2)
-            ends = [end for *_, end in known if end is not None]
-            arrived = np.stack(ends, axis=2) if ends else None
-        if some and len(shots.worlds) > 1:
-            others = replace(
-                shots,
-                worlds=shots.worlds[1:],
-                local=None if shots.local is None else shots.local[1:],
-                memory=None if shots.memory is None else shots.memory[:, count:],
-            )
-            more, beyond = self._simulated(others)
-            raw = np.concatenate([raw, more], axis=2)
-            arrived = None if arrived is None or beyond is None else np.concatenate([arrived, beyond], axis=2)
-        if some:
-            return Simulated(raw, arrived)
-        ends = [None if arrived is None else arrived[:, :, n].copy() for n in range(count)]
-        first = [(key, raw[:, :, n].copy(), end) for n, (key, end) in enumerate(zip(keys, ends, strict=False))]
-        return Simulated(raw, arrived, first)
+        if shots.late is not None:
+            return Simulated(*self._simulated(shots))
+        films, every = ChainMap(self._films, self._beside.get(shots.recording, {})), range(len(shots.worlds))
+        known = [k for k in every if all(key in films for key in self._film_keys(shots, k))]
+        new = [k for k in every if k not in known]
+        made: dict[int, tuple[np.ndarray, np.ndarray | None]] = {}
+        for k in known:
+            found = [films[key] for key in self._film_keys(shots, k)]
+            ends = [end for *_, end in found if end is not None]
+            made[k] = np.stack([film for *_, film, _ in found], axis=2), np.stack(ends, axis=2) if ends else None
+        if new:
+            raw, arrived = self._simulated(of_worlds(shots, new) if known else shots)
+            ends = [None] * len(new) if arrived is None else np.split(arrived, len(new), axis=2)
+            made |= zip(new, zip(np.split(raw, len(new), axis=2), ends, strict=True), strict=True)
+        raw = np.concatenate([made[k][0] for k in every], axis=2)
+        ends = [end for k in every if (end := made[k][1]) is not None]
+        first = []
+        if new and not new[0]:
+            raw_first, end = made[0]
+            first = [
+                (key, raw_first[:, :, n].copy(), None if end is None else end[:, :, n].copy())
+                for n, key in enumerate(self._film_keys(shots, 0))
+            ]
+        return Simulated(raw, np.concatenate(ends, axis=2) if ends else None, first)
 
     def _keep(self, r: int, blocks: Sequence[Block], first: list[tuple[tuple, np.ndarray, np.ndarray | None]]) -> None:
         """See `Rollouts._keep`."""
@@ -184,10 +209,10 @@ class RigidRollouts(Rollouts):
         while len(self._films) > POINTS * len(self.blocks):
             del self._films[next(iter(self._films))]
 
-    def _film_keys(self, shots: Shots) -> list[tuple]:
-        """For each block, all that a film of the first world depends on."""
-        (model, parameters), local, memory = shots.worlds[0], shots.local, shots.memory
-        drive = id(self.drives[shots.recording])  # kept with the film, as blocks are, so that no other gets its number
+    def _film_keys(self, shots: Shots, k: int) -> Iterator[tuple]:
+        """For each block, all that a film of a world depends on."""
+        (model, parameters), local, memory = shots.worlds[k], shots.local, shots.memory
+        drive = id(self.drives[shots.recording])
         world = (
             drive,
             shots.recording,
@@ -198,15 +223,9 @@ class RigidRollouts(Rollouts):
             model.hash,
             parameters.hash,
         )
-        return [
-            (
-                *world,
-                id(b),
-                b"" if local is None else local[0, n].tobytes(),
-                b"" if memory is None else memory[:, n].tobytes(),
-            )
-            for n, b in enumerate(shots.blocks)
-        ]
+        for n, b in enumerate(shots.blocks):
+            start = b"" if local is None else local[k, n].tobytes()
+            yield *world, id(b), start, b"" if memory is None else memory[:, k * len(shots.blocks) + n].tobytes()
 
     def _simulated(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
@@ -278,20 +297,31 @@ class RigidRollouts(Rollouts):
         return Chained(r, blocks, None if local is None else shifts[None], angles, rates, begins, step, dt)
 
     def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
-        """See `Rollouts._own_memories`: each world's segments begin where those of the first do."""
+        """See `Rollouts._own_memories`: each world's segments begin where those of the first do.
+
+        Their films are known then, too, where nothing is remembered that fades.
+        """
         chained = self._chained(r, local)
         if chained is None:
             return {}
+        lasts = len(lasting(worlds)[0]) == sum(size for *_, size in worlds[0][0].memories)
 
-        kept = self._in_parts(worlds, lambda part, threads: self._anew(chained, part, threads)[2])
-        return {b.first: memory for b, memory in zip(chained.blocks, kept, strict=True)}
+        def followed(part: list[World], threads: int) -> tuple[np.ndarray, Seen | None]:
+            x, turned, kept, ended = self._anew(chained, part, threads)
+            return kept, self._seen(chained, part, x, turned, ended) if lasts else None
+
+        self._beside[r], each = {}, []
+        for part, (kept, seen) in self._in_parts(worlds, followed):
+            self._beside[r] |= self._films_of(chained, part, kept, seen)
+            each.append(kept)
+        return {b.first: memory for b, memory in zip(chained.blocks, np.concatenate(each, axis=2), strict=True)}
 
     def _anew(
         self, chained: Chained, worlds: list[World], threads: int = 1
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Worlds that go on from segment to segment, see `film_anew`."""
         r, count = chained.recording, len(worlds)
-        shots = chained.shots(worlds, len(self.recordings[r].times))
+        shots = chained.shots(worlds, frames=len(self.recordings[r].times))
         (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
         begin = State.at_rest(model, count, position=self._state(shots).x, placed=True)
         begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1], threads)[-1].memory
@@ -303,41 +333,52 @@ class RigidRollouts(Rollouts):
         return batch.film_anew(chained.begins[-1], chained.dt, chained.begins[:-1], *starts)
 
     def _followed(self, chained: Chained, world: World) -> Motion | None:
-        """The motion of a world from segment to segment; None: unstable.
-
-        With films of the segments, which are those of segments alone but for rounding.
-        """
-        r, blocks, begins = chained.recording, chained.blocks, chained.begins
-        (model, _), recording = world, self.recordings[r]
+        """The motion of a world from segment to segment, with films of the segments; None: unstable."""
         x, turned, kept, ended = self._anew(chained, [world])
         if not np.all(np.isfinite(x)):
             return None
-        memory = {b.first: then[:, 0] for b, then in zip(blocks, kept, strict=True)}
-        first = chained.shots([world], len(recording.times))
-        starts = self._state(replace(first, blocks=blocks, local=chained.local))
-        path = np.concatenate([starts.x[None, :, 0], x[:, :, 0]])
-        steady = all(s.constant for s in self.drives[r].signals.values())
+        memory = {b.first: then[:, 0] for b, then in zip(chained.blocks, kept, strict=True)}
+        path = np.concatenate([self._state(chained.shots([world])).x[None, :, 0], x[:, :, 0]])
+        seen = self._seen(chained, [world], x, turned, ended)
+        return Motion(path, memory, self._films_of(chained, [world], kept, seen))
+
+    def _seen(
+        self, chained: Chained, worlds: list[World], x: np.ndarray, turned: np.ndarray, ended: np.ndarray
+    ) -> Seen | None:
+        """What channels see of worlds that were followed: what they do of segments alone, but for rounding.
+
+        None where these take steps, and see the drive at instants, of their own.
+        """
+        recording, blocks, (model, _) = self.recordings[chained.recording], chained.blocks, worlds[0]
+        steady = all(s.constant for s in self.drives[chained.recording].signals.values())
         if chained.dt != chained.step or not steady or any(get(e).family == "drive" for e in model.effects):
-            return Motion(path, memory)  # segments alone take steps, and see the drive at instants, of their own
-        at_first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
-        later = pictured(model, recording, x, turned)[:, :, 0]
-        kinds: dict[tuple[int, int], list[int]] = {}
-        for n, (block, frames) in enumerate(zip(blocks, np.diff(begins).tolist(), strict=True)):
-            ends = frames if block.reach is not None else 0
-            kinds.setdefault((frames + 1, ends), []).append(n)
-        films = {}
-        for (frames, ends), mine in kinds.items():
-            shifts, then = None if chained.local is None else chained.local[:, mine], kept[mine, :, 0].T
-            each = [blocks[n] for n in mine]
-            own = replace(first, blocks=each, local=shifts, memory=then, frames=frames, ends=ends)
-            for n, key in zip(mine, self._film_keys(own), strict=True):
-                arrived, end = None, begins[n + 1]
-                if ends:
-                    after, q = blocks[n + 1], turned[end - 1, self.articulation.creases, 0]
-                    arrived = np.append(turned_by(q - after.pose.angles[:, 0]), ended[n + 1, :, 0] - after.rates)[None]
-                raw = np.concatenate([at_first[None, :, n], later[begins[n] : end]])
-                films[key] = blocks[n], self.drives[r], raw, arrived
-        return Motion(path, memory, films)
+            return None
+        starts = self._state(chained.shots(worlds, range(len(blocks))))
+        first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
+        angles = turned[np.array(chained.begins[1:-1], int) - 1][:, self.articulation.creases]
+        shift = turned_by(angles - np.stack([b.pose.angles for b in blocks])[1:])
+        rates = ended[1:] - np.stack([b.rates for b in blocks])[1:, :, None]
+        later = pictured(model, recording, x, turned)
+        return Seen(first.reshape(-1, len(worlds), len(blocks)), later, np.concatenate([shift, rates], axis=1))
+
+    def _films_of(self, chained: Chained, worlds: list[World], kept: np.ndarray, seen: Seen | None) -> Films:
+        """Films of the segments of worlds that were followed; none of those that are unstable."""
+        if seen is None:
+            return {}
+        begins, drive = chained.begins, self.drives[chained.recording]
+        stable = np.flatnonzero(np.isfinite(seen.later).all(axis=(0, 1))).tolist()
+        kinds: dict[tuple[int, bool], list[int]] = {}
+        for n, (block, frames) in enumerate(zip(chained.blocks, np.diff(begins).tolist(), strict=True)):
+            kinds.setdefault((frames, block.reach is not None), []).append(n)
+        films: Films = {}
+        for (frames, tied), mine in kinds.items():
+            memory = kept[mine].transpose(1, 2, 0).reshape(kept.shape[1], -1)
+            shots = chained.shots(worlds, mine, memory=memory, frames=frames + 1, ends=frames * tied)
+            for k in stable:
+                for n, key in zip(mine, self._film_keys(shots, k), strict=True):
+                    raw = np.concatenate([seen.first[None, :, k, n], seen.later[begins[n] : begins[n + 1], :, k]])
+                    films[key] = chained.blocks[n], drive, raw, seen.arrived[None, n, :, k] if tied else None
+        return films
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""
@@ -358,6 +399,15 @@ class RigidRollouts(Rollouts):
             out[: arm.size, at] = shift_between(base.select(b), pose, arm.floating)
             out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
         return out
+
+
+def of_worlds(shots: Shots, some: list[int]) -> Shots:
+    """Rollouts of some worlds, none of which is late."""
+    memory = shots.memory
+    if memory is not None:
+        memory = memory.reshape(len(memory), len(shots.worlds), -1)[:, some].reshape(len(memory), -1)
+    local = None if shots.local is None else shots.local[some]
+    return replace(shots, worlds=[shots.worlds[k] for k in some], local=local, memory=memory)
 
 
 def shift_between(base: Pose, pose: Pose, floating: bool) -> np.ndarray:

@@ -30,7 +30,7 @@ from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import batch_of
 from origami_sim.solve.statics.equilibria import equilibrium
-from origami_sim.threads import default_threads, shared, sharing, side_by_side
+from origami_sim.threads import T, default_threads, shared, sharing, side_by_side
 
 LEAD = 1500
 """Frames between two segments along which laws with memory are carried, at most; the motion there is as recorded."""
@@ -468,7 +468,7 @@ class Rollouts(Worlds, ABC):
 
         out: dict[int, np.ndarray] = {}
         for near in np.split(asked, np.flatnonzero(np.diff(asked) > LEAD) + 1):  # carried from one to the next
-            found = self._in_parts(worlds, partial(carry, near))
+            found = np.concatenate([part for _, part in self._in_parts(worlds, partial(carry, near))], axis=2)
             for first, carried in zip(near.tolist(), found, strict=True):
                 if first in motion.memory:
                     carried = carried + (motion.memory[first][:, None] - carried[:, :1])
@@ -476,12 +476,12 @@ class Rollouts(Worlds, ABC):
                 out[first] = carried
         return out
 
-    def _in_parts(self, worlds: list[World], make: Callable[[list[World], int], np.ndarray]) -> np.ndarray:
-        """What is made [n, M, K] of worlds, of some of them by each process, on so many cores."""
-        parts = np.array_split(np.arange(len(worlds)), min(sharing(), len(worlds)))
+    def _in_parts(self, worlds: list[World], make: Callable[[list[World], int], T]) -> list[tuple[list[World], T]]:
+        """What is made of worlds, of some of them by each process, on so many cores."""
+        cuts = np.array_split(np.arange(len(worlds)), min(sharing(), len(worlds)))
+        parts = [[worlds[k] for k in cut] for cut in cuts]
         cores = -(-(self.threads or default_threads()) // len(parts))
-        jobs = [partial(make, [worlds[k] for k in part], cores) for part in parts]
-        return np.concatenate(shared(jobs), axis=2)
+        return list(zip(parts, shared([partial(make, part, cores) for part in parts]), strict=True))
 
     def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
         """Memory [M, K] by first frame of worlds that move by themselves from segment to segment; none: not known."""

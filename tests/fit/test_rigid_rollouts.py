@@ -87,8 +87,8 @@ def test_predictions_are_the_same_bytes_on_any_number_of_threads(tied, monkeypat
     for threads, processes in ((1, 1), (2, 1), (5, 1), (1, 2), (1, 4)):
         monkeypatch.setattr(tied, "threads", threads)
         monkeypatch.setattr(rollouts, "sharing", lambda processes=processes: processes)
-        tied._moved.clear()
-        tied._films.clear()
+        for known in (tied._moved, tied._films, tied._beside):
+            known.clear()
         made.append(tied.shoot(h, thetas, np.zeros((3, len(tied.blocks), tied.local))))
     assert bool(effect) == bool(len(h.suspects)) and len(made[0].values) == len(tied.blocks)
     for other in made[1:]:
@@ -114,6 +114,30 @@ def test_a_point_that_was_just_simulated_is_the_same_bytes_among_other_worlds(ti
     for a, b, c in zip(together.values, again.values, alone.values, strict=True):
         assert np.array_equal(a, b) and np.array_equal(b[0], c[0])
     assert all(a is b or np.array_equal(a, b) for a, b in zip(together.ends, again.ends, strict=True))
+
+
+def test_worlds_that_were_followed_are_not_simulated_again(tied, monkeypatch):
+    """Their films are those of segments alone, but for rounding."""
+    friction = next(s for s in suspects(tied.model, tied.recordings, tied.drive) if s.effect == "crease_friction")
+    theta = np.array([f.start for f in (*tied.subject.nominals, *friction.free)])
+    worlds = np.repeat(theta[None], 3, axis=0)
+    worlds[:, len(tied.subject.nominals)] += friction.free[0].scale * np.array([1.0, 2.0, 1.0])
+    worlds[2, 0] *= 1.01
+    local = np.zeros((3, len(tied.blocks), tied.local))
+    simulated, made = [], tied._simulated
+    monkeypatch.setattr(tied, "_simulated", lambda shots: simulated.append(len(shots.worlds)) or made(shots))
+
+    def shot():
+        for known in (tied._moved, tied._films, tied._beside, simulated):
+            known.clear()
+        return tied.shoot(Hypothesis((friction,)), worlds, local)
+
+    found, once = shot(), set(simulated)
+    monkeypatch.setattr(tied, "_seen", lambda *_: None)
+    anew, every = shot(), set(simulated)
+    assert once == {1} and every == {3}
+    for a, b in zip((*found.values, *found.ends[:-1]), (*anew.values, *anew.ends[:-1]), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
 
 
 def test_a_fit_of_what_is_exact_leaves_rounding(tied):
