@@ -408,7 +408,7 @@ class Sheet(Grounds, Electrodes, Thick):
         """The model and its parameters."""
         mesh = self.mesh
         missing = np.flatnonzero(np.isnan(self._crease_stiffness))
-        if len(missing) and "crease" in self._effects:
+        if len(missing) and not {"crease", "crease_yield"}.isdisjoint(self._effects):
             raise InputError(
                 "a crease has no stiffness", field=f"crease {missing[0]}", allowed="Sheet.crease(stiffness=...)"
             )

@@ -192,13 +192,33 @@ class Thick(Touches):
         return one
 
     def stops(self, crease: int) -> tuple[float, float]:
-        """Fold angles at which the edges of a crease's panels meet, as valley and as mountain [rad], both >= 0."""
+        """Fold angles at which the edges of a crease's panels meet, as valley and as mountain [rad], both >= 0.
+
+        Raises:
+            InputError: an edge that recedes beyond the far side of its panel.
+        """
         hinge, z = self._hinges.get(crease, Hinge()), self._height(crease)
         sides = [self._faces(panel) for panel in self._beside[crease]]
         half = 0.5 * hinge.gap
-        valley = meeting([Edge(high - z, low - z, half, hinge.top, hinge.bottom) for low, high in sides])
-        mountain = meeting([Edge(z - low, z - high, half, hinge.bottom, hinge.top) for low, high in sides])
-        return valley, mountain
+        valley = [Edge(high - z, low - z, half, hinge.top, hinge.bottom) for low, high in sides]
+        mountain = [Edge(z - low, z - high, half, hinge.bottom, hinge.top) for low, high in sides]
+        for panel, edge in zip(self._beside[crease].tolist(), valley, strict=True):
+            self._check_left(crease, panel, max(edge.receded(edge.top), edge.receded(edge.bottom)))
+        return meeting(valley), meeting(mountain)
+
+    def _check_left(self, crease: int, panel: int, receded: float) -> None:
+        x, mesh = self.mesh.vertices, self.mesh
+        start, end = x[mesh.creases[crease, 1:3]]
+        along = (end - start) / np.linalg.norm(end - start)
+        arms = x[np.unique(mesh.triangles[mesh.triangle_face == panel])] - start
+        width = float(np.linalg.norm(arms - np.outer(arms @ along, along), axis=1).max())
+        if not receded < width:
+            raise InputError(
+                f"nothing is left of panel {panel}, which is {width * 1e3:.4g} mm wide there: its edge recedes by "
+                f"{receded * 1e3:.4g} mm",
+                field=f"hinge of crease {crease}",
+                allowed="a smaller gap or mitre",
+            )
 
     def _stop(self, parameters: Parameters) -> None:
         """Stops creases where the edges of their panels meet."""

@@ -320,5 +320,8 @@ def test_what_cannot_be_is_refused():
     for wrong in ({"thickness": 0.0}, {"offset": np.nan}, {"rigidity": -1.0}):
         with pytest.raises(InputError):
             pair().panel([0], **wrong)
+    for wrong in (pair().hinge(gap=90 * MM), pair(lengths=(0.04, 0.02)).mitre(angle=np.radians(88))):
+        with pytest.raises(InputError, match=r"nothing is left of panel [01], which is [24]0 mm wide there"):
+            wrong.build()
     with pytest.raises(InputError, match="there is no such crease"):
         pair().hinge([1], at="top")

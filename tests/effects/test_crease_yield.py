@@ -163,6 +163,8 @@ def test_what_is_refused_says_so_and_designs_remember():
         sheet.yields(moment=-1.0).build()
     with pytest.raises(InputError, match=r"no yield stress: state the moment.*pdms.*paper, pet"):
         sheet.yields()
+    with pytest.raises(InputError, match=r"a crease has no stiffness.*crease 0.*Sheet\.crease"):
+        Sheet(strip([0.01, 0.02], 0.02), thickness=1e-3, material="pet").yields().build()
     assert sheet.statements[-1] == ("yields", {"moment": -1.0})
     assert get("crease_yield").fitted[0] == "softening"
 
