@@ -34,6 +34,15 @@ def mesh(kind, nx, ny=None, size=(1.0, 1.0), seed=0):
     return np.column_stack([p * size, np.zeros(len(p))]), triangles
 
 
+def disc(rings):
+    """Vertices and triangles of the unit disc: rings of 6, 12, 18 ... nodes around one."""
+    turns = [2 * np.pi * np.arange(6 * k) / (6 * k) for k in range(1, rings + 1)]
+    radius = np.repeat(np.arange(1, rings + 1) / rings, [len(t) for t in turns])
+    a = np.concatenate(turns)
+    x = np.vstack([np.zeros((1, 3)), np.column_stack([radius * np.cos(a), radius * np.sin(a), 0 * a])])
+    return x, Delaunay(x[:, :2]).simplices
+
+
 def joined(*parts):
     """Meshes joined at nodes in the same place."""
     x = np.concatenate([p for p, _ in parts])

@@ -6,7 +6,7 @@ import scipy.sparse.linalg as spla
 from effects.kit import random_rotation
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from solve.sheets import KINDS, at, border, joined, mesh, plate, rimmed, rimmed_end, tributary
+from solve.sheets import KINDS, at, border, disc, joined, mesh, plate, rimmed, rimmed_end, tributary
 
 from origami_sim import (
     Drive,
@@ -71,6 +71,28 @@ def test_plates_converge(kind, case):
     """Largest error over Poisson's ratios, so that no zero between two meshes is taken for convergence."""
     coarse, fine = (max(abs(plate_error(kind, n, case, nu)) for nu in (0.0, 0.3, 0.49)) for n in (16, 32))
     assert np.log2(coarse / fine) > 1.5
+
+
+@pytest.mark.parametrize(("case", "limit"), [("supported", 0.006), ("clamped", 0.03)])
+def test_a_round_plate_bends_as_its_closed_form_says(case, limit):
+    """Middle of a disc under a pressure (Timoshenko & Woinowsky-Krieger 1959, art. 16), on rings of triangles.
+
+    Its border is a polygon whose nodes alone are held, so that no paradox of polygons stiffens it (Babuska).
+    """
+    for poisson in (0.0, 0.49):
+        errors = []
+        for rings in (4, 8):
+            x, triangles = disc(rings + (case == "clamped"))
+            x *= (rings + (case == "clamped")) / rings
+            held = np.flatnonzero(np.linalg.norm(x, axis=1) > 1 - 1e-9)
+            model, parameters = plate(
+                x, triangles, held=held, axes="z" if case == "supported" else "xyz", poisson=poisson
+            )
+            w = deflections(model, parameters, tributary(x, triangles))[0]
+            softer = (5 + poisson) / (1 + poisson) if case == "supported" else 1.0
+            errors.append(w * 64 * E * THICKNESS**3 / (12 * (1 - poisson**2)) / softer - 1)
+        assert abs(errors[1]) < limit
+        assert abs(errors[1]) < max(0.36 * abs(errors[0]), 0.005)
 
 
 @pytest.mark.parametrize("kind", KINDS)
