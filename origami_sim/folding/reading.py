@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.pattern import DRAWN, Pattern, read_pattern
+from origami_sim.pattern import DRAWN, Pattern, read_pattern, triangulate
+from origami_sim.pattern.intersections import overlapping_pairs
 
 from .consistency import vertices
 from .elastic import Elastic
@@ -45,7 +46,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
         The pattern, with a note if points were merged.
 
     Raises:
-        InputError: as `read_pattern`; `merge` for a file that is no drawing.
+        InputError: as `read_pattern`; `merge` for a file that is no drawing; panels of a flat pattern that overlap.
     """
     drawing = DRAWN.get(Path(path).suffix.lower())
     if merge is not None:
@@ -57,6 +58,7 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
         return drawing(path, size=size, scale=scale, merge_tolerance=merge)
     pattern = read_pattern(path, size=size, scale=scale)
     if drawing is None:
+        _refuse_overlap(pattern, path)
         return pattern
     gap, split = _gaps(pattern)
     if not split:
@@ -77,6 +79,22 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
             f"{pattern.vertex_count} vertices became {best.vertex_count} (merge=)."
         )
     return best
+
+
+def _refuse_overlap(pattern: Pattern, path):
+    """A crease pattern in a plane lies beside itself; layers belong to a folded form."""
+    if np.ptp(pattern.vertices[:, 2]) > 0 or "foldedForm" in (pattern.extra.get("frame_classes") or ()):
+        return
+    mesh = triangulate(pattern)
+    found = overlapping_pairs(mesh.vertices, mesh.triangles)
+    if len(found):
+        one, other = sorted(mesh.triangle_face[found[0]].tolist())
+        raise InputError(
+            f"panel {one} and panel {other} overlap",
+            file=path,
+            field="vertices_coords",
+            allowed="panels beside each other, or frame_classes with foldedForm",
+        )
 
 
 def _gaps(pattern: Pattern) -> tuple[float, bool]:

@@ -1,5 +1,6 @@
 """Folding to target angles: what is possible is reached, what is not is said, with where and why."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
@@ -265,3 +266,24 @@ def test_a_cut_edge_of_fold_without_a_middle_is_a_free_hinge():
         "edges_foldAngle": [None] * 8 + [60, 60, -60, -60, None],
     }  # fmt: skip
     assert fold(fold_pattern(document)).reached
+
+
+def test_only_a_folded_form_may_lie_in_itself(tmp_path):
+    """The corner at (0.8, 0.3) lies beyond the diagonal, so that the second triangle covers a part of the first."""
+    document = {
+        "vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1], [0.8, 0.3]],
+        "faces_vertices": [[0, 1, 2], [0, 2, 4], [0, 4, 3]],
+        "edges_vertices": [[0, 1], [1, 2], [2, 0], [2, 4], [4, 0], [4, 3], [3, 0]],
+        "edges_assignment": list("BBVBMBB"),
+        "edges_foldAngle": [0, 0, 60, 0, -60, 0, 0],
+    }
+    file = tmp_path / "over.fold"
+    file.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"over\.fold: panel 0 and panel 1 overlap.*foldedForm"):
+        read(file)
+    for change in (
+        {"frame_classes": ["foldedForm"]},
+        {"vertices_coords": [*document["vertices_coords"][:4], [0.2, 0.6]]},
+    ):
+        file.write_text(json.dumps(document | change))
+        assert read(file).face_count == 3
