@@ -377,6 +377,9 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
                         allowed="supported nodes",
                     )
             continue
+        if channel.kind == "moment":
+            _index(model, channel, "crease", len(model.creases))
+            continue
         read_channel(Poses(model, Parameters(model), rest, zero.angles.T, np.zeros(1)), channel)
         _check_point(model, channel)
         columns = channel.values.reshape(recording.frame_count, -1)

@@ -260,6 +260,10 @@ def test_a_recording_is_held_against_the_model(motion):
         check_scene(recording(motion.times, channel("panel_angle", fold, panel=1)), model)  # an arm may go round
     with pytest.raises(InputError, match=r"nothing of that name.*crease.*5.*hinge1, hinge2"):
         check_scene(recording(motion.times, channel("crease_angle", np.zeros(len(marker)), crease=5)), model)
+    moments = channel("moment", np.zeros(len(marker)), unit="N m", crease=0)
+    assert check_scene(recording(motion.times, moments), model) == []  # of a test with prescribed angles
+    with pytest.raises(InputError, match=r"a moment needs a crease .*channels\.c\.crease"):
+        check_scene(recording(motion.times, replace(moments, attachment={})), model)
     same = replace(model, names={"panel": ("mount", "arm", "arm")})
     with pytest.raises(InputError, match=r"several have that name.*channels\.c\.panel.*arm.*mount"):
         check_scene(recording(motion.times, channel("marker", marker, unit="m", panel="arm")), same)
