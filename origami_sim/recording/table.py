@@ -1,7 +1,6 @@
 """The table of a recording, CSV or Parquet: the needed columns as numbers, and where each row stands in the file."""
 
 import csv
-import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,12 @@ from origami_sim.errors import InputError
 
 LARGEST_NUMBER = 1e100
 """A cell beyond this magnitude is damaged, not measured."""
+
+SEPARATORS = (",", ";", "\t")
+"""What may stand between the cells of a CSV file; decimal commas are understood beside the other two."""
+
+PREAMBLE = 100
+"""Lines in which the header is sought: instruments and laboratories write notes above it."""
 
 MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL"]
 """Cells that mean that a value is missing."""
@@ -174,23 +179,26 @@ def _read_parquet(path: Path, data: bytes, columns: list[str], labels: list[str]
 
 
 def _read_csv(path: Path, data: bytes, columns: list[str], labels: list[str]) -> Table:
-    header, header_line, body = _split_header(path, data)
+    header, header_line, separator, body = _split_header(path, data, [*columns, *labels])
     _check_columns(path, columns + labels, header)
+    decimal = "," if separator != "," and b"." not in body[:10_000] else "."
     try:
         parsed = pa_csv.read_csv(
             pa.BufferReader(body if body.strip() else b"\n"),
             read_options=pa_csv.ReadOptions(column_names=[str(k) for k in range(len(header))], use_threads=False),
+            parse_options=pa_csv.ParseOptions(delimiter=separator),
             convert_options=pa_csv.ConvertOptions(
                 include_columns=[str(header.index(name)) for name in dict.fromkeys(columns + labels)],
                 column_types={str(header.index(name)): pa.string() for name in labels}
                 | {str(header.index(name)): pa.float64() for name in columns},
                 null_values=MISSING,
+                decimal_point=decimal,
             ),
         )
         numbers = {name: np.array(parsed[str(header.index(name))].to_numpy(), dtype=float) for name in columns}
         texts = {name: np.array(parsed[str(header.index(name))].to_pylist(), dtype=object) for name in labels}
     except (pa.ArrowException, UnicodeDecodeError, OSError):
-        numbers, texts = _parse_cells(path, body, header, header_line, columns, labels)
+        numbers, texts = _parse_cells(path, body, header, header_line, columns, labels, separator, decimal)
     return Table(
         file=path,
         numbers=numbers,
@@ -200,18 +208,36 @@ def _read_csv(path: Path, data: bytes, columns: list[str], labels: list[str]) ->
     )
 
 
-def _split_header(path: Path, data: bytes) -> tuple[list[str], int, bytes]:
-    """Column names, the line number of the header, and the bytes after it."""
-    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0
-    lines = io.BytesIO(data[start:].replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
-    number, line = next(((k, line) for k, line in enumerate(lines, start=1) if line.strip()), (0, b""))
-    if not number:
+def _split_header(path: Path, data: bytes, wanted: Sequence[str]) -> tuple[list[str], int, str, bytes]:
+    """Column names, the line number of the header, its separator, and the bytes after it.
+
+    The header is the first line that names all wanted columns, with or without a '#' before them; what stands above it
+    is skipped. Where no line does, it is the first one that is no comment.
+    """
+    parts = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n", PREAMBLE)
+    lines = [(k, line) for k, line in enumerate(parts[:PREAMBLE], start=1) if line.strip()]
+    if not lines:
         raise InputError("the file is empty", file=path)
+    for comment in (b"", b"# "):
+        for number, line in lines:
+            for separator in SEPARATORS:
+                names = _names(line.lstrip(comment), separator)
+                if set(wanted) <= set(names):
+                    return names, number, separator, b"\n".join(parts[number:])
+    number, line = next((one for one in lines if not one[1].startswith(b"#")), lines[0])
+    separator = max(SEPARATORS, key=lambda mark: line.count(mark.encode()))
+    names = _names(line, separator)
+    if not names:
+        raise InputError(f"the header in line {number} is not UTF-8 text with commas", file=path)
+    return names, number, separator, b"\n".join(parts[number:])
+
+
+def _names(line: bytes, separator: str) -> list[str]:
+    """Cells of a line; none of one that is no text."""
     try:
-        names = next(csv.reader([line.decode("utf-8")]))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"the header in line {number} is not UTF-8 text with commas", file=path) from error
-    return [name.strip() for name in names], number, lines.read()
+        return [name.strip() for name in next(csv.reader([line.decode("utf-8")], delimiter=separator), [])]
+    except (UnicodeDecodeError, csv.Error):
+        return []
 
 
 def data_lines(body: bytes, header_line: int) -> list[int]:
@@ -220,14 +246,21 @@ def data_lines(body: bytes, header_line: int) -> list[int]:
 
 
 def _parse_cells(
-    path: Path, body: bytes, header: list[str], header_line: int, columns: list[str], labels: list[str]
+    path: Path,
+    body: bytes,
+    header: list[str],
+    header_line: int,
+    columns: list[str],
+    labels: list[str],
+    separator: str,
+    decimal: str,
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Parse cell by cell what the fast reader refused: names the line of the first fault, or returns the numbers."""
     numbers: dict[str, list[float]] = {name: [] for name in columns}
     texts: dict[str, list[str]] = {name: [] for name in labels}
     for number, line in zip(data_lines(body, header_line), filter(None, body.split(b"\n")), strict=True):
         try:
-            cells = next(csv.reader([line.decode("utf-8")]), [])
+            cells = next(csv.reader([line.decode("utf-8")], delimiter=separator), [])
         except (UnicodeDecodeError, csv.Error) as error:
             raise InputError(f"line {number} is not UTF-8 text with commas", file=path) from error
         if len(cells) != len(header):
@@ -237,7 +270,7 @@ def _parse_cells(
             try:
                 if "_" in cell:
                     raise ValueError
-                numbers[name].append(np.nan if cell in MISSING else float(cell))
+                numbers[name].append(np.nan if cell in MISSING else float(cell.replace(decimal, ".")))
             except ValueError:
                 raise InputError(f"line {number} holds no number", file=path, field=name, value=cell) from None
         for name in labels:

@@ -49,6 +49,19 @@ def swing() -> str:
     return "\n".join(["t,a,b", *rows]) + "\n"
 
 
+@pytest.mark.parametrize("above", ["# rig B, run 12\n# encoder\n", "Instrument;PS2000\n\nt [ms],other\n", "# "])
+@pytest.mark.parametrize("separator", [",", ";", "\t", "decimal commas"])
+def test_tables_as_laboratories_write_them(write, swing, above, separator):
+    """Notes above the header (or the '#' of numpy.savetxt), and the separators that a spreadsheet exports."""
+    plain = read_recording(write(swing))
+    text = swing.replace(",", separator) if len(separator) == 1 else swing.replace(",", ";").replace(".", ",")
+    found = read_recording(write(above + text))
+    assert np.array_equal(found.times, plain.times)
+    assert np.array_equal(found.channels["theta"].values, plain.channels["theta"].values)
+    with pytest.raises(InputError, match=f"line {above.count(chr(10)) + 2} holds no number"):
+        read_recording(write(above + text.replace("\n", "\nbad", 1)))
+
+
 def test_values_arrive_in_si_with_sign_offset_and_attachment(write):
     sidecar = """
 name = "turn"
