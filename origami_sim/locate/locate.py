@@ -185,7 +185,8 @@ def smooth_of(q: np.ndarray, half: int) -> np.ndarray:
 
 
 def _at(signal: Signal, times: np.ndarray) -> np.ndarray:
-    return np.broadcast_to(np.squeeze(signal(times)), times.shape)
+    """What a signal of one world gives at some times (n,)."""
+    return np.broadcast_to(signal(times[:, None]), (len(times), 1))[:, 0]
 
 
 def _half_window(q: np.ndarray, noise: np.ndarray) -> int:

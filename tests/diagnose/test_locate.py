@@ -9,13 +9,15 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
+from origami_sim.drive import Drive, sine
+from origami_sim.effects import get
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import carried_on, fit
 from origami_sim.fit.suspects import suspects
 from origami_sim.infer.diagnosis import REVERSAL
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.acting import _actions, acting
-from origami_sim.locate.locate import locate, motions_of, phase, reversals, since
+from origami_sim.locate.locate import frozen, locate, motions_of, phase, reversals, since
 from origami_sim.locate.partial import partials
 from origami_sim.model import dihedral_angles
 from origami_sim.model.articulation import Articulation
@@ -48,6 +50,17 @@ def test_articulation_moves_panels_rigidly_and_knows_its_jacobian(which):
         moved = arm.jacobian(pose)[:, nodes]
         assert moved - moved[:, :1] == pytest.approx(np.cross(turning[:, None], apart), abs=1e-12)
         assert np.linalg.norm(turning[hinge], axis=-1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("effect", ["field_lag", "drive_delay"])
+def test_a_distorted_drive_is_held_at_each_time(effect):
+    """Each world of `frozen` has what the drive gives at its time, also after effects that make it a series."""
+    times = np.linspace(0.0, 1.0, 9)
+    drive = get(effect).apply(Drive(field=(0, 1e-3, sine(5e-3, 2.0))), 1.0, np.array([0.1]))
+    held = frozen(drive, times)
+    for name, signal in held.signals.items():
+        each = [np.ravel(drive.signals[name](t))[0] for t in times.tolist()]
+        assert np.broadcast_to(signal(0.0), times.shape) == pytest.approx(each, abs=1e-15)
 
 
 @pytest.fixture(scope="module")
