@@ -379,6 +379,13 @@ def _compare(args) -> int:
     settings = scene_settings(module).override(args.set, "--set")
     recording = recording or read_recording(args.recording, sidecar)  # what is wrong with names is told before
     check_recorded_scene(recording, scene, "origami-sim diagnose --model")
+    if recording.by_step:
+        raise InputError(
+            "load steps without times cannot be laid over a run",
+            file=args.recording,
+            field="time",
+            allowed="a clock in the table or the sidecar ([time]); origami-sim diagnose compares curves",
+        )
     duration = _duration(args, recording)
     folder = Path(args.out or "runs/compare")
     check_writable(folder)

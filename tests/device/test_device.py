@@ -212,6 +212,11 @@ def test_compare_with_a_file(flap, call, tmp_path):
     record(tmp_path, "other.py")
     code, _, err = call("compare", "swing.csv", "--model", "my_flap.py")
     assert code == 2 and "of another scene" in err
+    sidecar = (tmp_path / "swing.toml").read_text()
+    steps = sidecar[: sidecar.index("[time]")] + sidecar[sidecar.index("[channels") :]
+    (tmp_path / "swing.toml").write_text(steps.replace("other.py", "my_flap.py"))
+    code, _, err = call("compare", "swing.csv", "--model", "my_flap.py")
+    assert code == 2 and "load steps without times" in err and "origami-sim diagnose compares curves" in err
 
 
 def test_diagnose_takes_a_file(flap, tmp_path):
