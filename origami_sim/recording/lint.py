@@ -236,8 +236,8 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
         bursts = _burst_ratio(times, columns)
         if bursts > 1.5:
             notes.append(
-                f"The noise of channel '{name}' comes in bursts: its root mean square is {bursts:.1f} times its median "
-                "level, which is the noise stated."
+                f"Channel '{name}' is now and then {bursts:.1f} times as rough (root mean square) as in most frames, "
+                "whose level is the noise stated: bursts of noise, impacts, or steps that are faster than the frames."
             )
     return notes
 

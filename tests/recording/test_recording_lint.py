@@ -41,6 +41,13 @@ def test_sound_markers_give_no_note():
         assert lint(TIMES, markers(*(track(k, seed=seed) for k in range(6)))) == []
 
 
+def test_a_step_of_the_motion_is_not_said_to_be_noise():
+    """A device that follows a switched field jumps between frames, as noise in bursts does."""
+    steps = 0.2 * (TIMES > 1.0) + np.random.default_rng(2).normal(scale=1e-3, size=COUNT)
+    (note,) = lint(TIMES, angle(steps))
+    assert note.startswith("Channel 'fold' is now and then") and "steps that are faster than the frames" in note
+
+
 @pytest.mark.parametrize(("first", "last", "count"), [(100, COUNT, 1), (100, 250, 2), (100, 104, 2)])
 def test_swapped_markers_are_found_at_the_frame(first, last, count):
     a, b = exchanged(first, last)
