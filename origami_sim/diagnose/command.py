@@ -28,7 +28,7 @@ from origami_sim.device.scene import (
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import attempt
-from origami_sim.diagnose.observed import assumed, check_recording
+from origami_sim.diagnose.observed import assumed, check_recording, switched
 from origami_sim.diagnose.options import Options
 from origami_sim.effects import get
 from origami_sim.errors import InputError
@@ -79,7 +79,7 @@ def run(args: Namespace) -> int:
     recordings = []
     for recording in data:
         with _naming(recording.metadata.get("sidecar")):
-            notes = [*assumed(recording, drive), *check_scene(recording, model)]
+            notes = [*assumed(recording, drive), *switched(recording), *check_scene(recording, model)]
         with _naming(recording.metadata.get("file")):
             notes += check_recording(recording, model, step)
         for note in notes:

@@ -32,6 +32,9 @@ SLOW = 1e5
 OFF = 20.0
 """How many times a distance on a panel may be off before its unit is refused; a length scale of 50 % is a suspect."""
 
+SWITCH = 0.05
+"""Share of a drive's range by which it changes between two rows where it is said to be switched."""
+
 TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""
 
@@ -186,3 +189,30 @@ def assumed(recording: Recording, drive: Drive) -> list[str]:
     if not own:
         return []
     return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]
+
+
+def switched(recording: Recording) -> list[str]:
+    """A note on drives that were switched between two of their rows, so that it is not known when.
+
+    Switched is what changes between two rows by more than `SWITCH` of its range, by ten times as much as it usually
+    does, and by twice as much as before and after together.
+    """
+    if recording.by_step:
+        return []
+    notes = []
+    for name, drive in recording.drive.items():
+        if drive.constant or name == PATH:
+            continue
+        values = np.reshape(drive.values, (len(drive.values), -1))
+        change = np.pad(np.abs(np.diff(values, axis=0)), ((1, 1), (0, 0)))
+        least = np.maximum(SWITCH * np.ptp(values, axis=0), 10.0 * np.median(change[1:-1], axis=0))
+        rows = np.flatnonzero((change[1:-1] > np.maximum(least, 2.0 * (change[:-2] + change[2:]))).any(axis=1))
+        if len(rows):
+            times = recording.times if drive.times is None else drive.times
+            wide = float(np.max(times[rows + 1] - times[rows]))
+            notes.append(
+                f"The drive '{name}' of '{recording.name}' is switched between two rows, first after "
+                f"{times[rows[0]]:.6g} s, and taken as a ramp of {quantity(wide, 's')} from one to the other: what is "
+                "found as a lag or a delay of that size may be this. A log at a higher rate (file = ...) tells when."
+            )
+    return notes

@@ -14,7 +14,7 @@ import origami_sim
 from origami_sim import threads
 from origami_sim.device.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
-from origami_sim.diagnose.observed import assumed
+from origami_sim.diagnose.observed import assumed, switched
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
@@ -319,6 +319,20 @@ def test_what_the_scene_drives_by_itself_is_told():
     assert "field" not in note and "temperature" in note
     silent.metadata["time_base"] = "step"
     assert assumed(silent, own) == []
+
+
+def test_a_drive_that_is_switched_between_two_rows_is_noted():
+    """Then when is known to a row only; a wave, a slow ramp and a noisy level are not switched."""
+    k = np.arange(20)
+    steps = np.zeros((20, 3))
+    steps[8:, 2] = 0.01
+    (note,) = switched(recorded_drive("field", steps))
+    assert "after 0.7 s, and taken as a ramp of 100 ms" in note
+    noise = 1e-4 * np.random.default_rng(0).normal(size=(20, 3))
+    assert switched(recorded_drive("field", steps + noise)) == [note]
+    for calm in (np.sin(k), np.clip(0.2 * k - 1, 0, 1), 0.01 + noise[:, 0]):
+        assert switched(recorded_drive("field_z", calm)) == []
+    assert switched(recorded_drive("load", 0.0, "1", constant=True)) == []
 
 
 FLAP = """\
