@@ -519,7 +519,8 @@ def _of_values(drive: Drive, values: dict[str, np.ndarray]) -> Drive:
 def _normals(corners: np.ndarray) -> np.ndarray:
     """Unit normals (F, 3) of triangles (F, 3, 3)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):  # of a world that failed
+        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _on_panel(model: Model, panel: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

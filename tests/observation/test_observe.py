@@ -132,6 +132,13 @@ def test_a_marker_above_the_surface(motion):
     np.testing.assert_allclose(np.linalg.norm(lifted - flat, axis=1), 0.01, rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_marker_of_a_world_that_failed_is_no_number(motion):
+    """Such a world may leave all nodes in one place, where no panel has a normal; nothing is printed of it."""
+    marker = channel("marker", motion.x[:, 4, 0], unit="m", panel="arm1", height=0.001)
+    assert np.isnan(body_point(motion.model, np.zeros_like(motion.x[:, :, 0]), marker)).all()
+
+
 def test_a_marker_in_a_picture(motion):
     """A camera that is tilted by 30 degrees about y, against rotating by hand."""
     tilt = np.deg2rad(30.0)
