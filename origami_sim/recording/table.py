@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,9 @@ LARGEST_NUMBER = 1e100
 
 SEPARATORS = (",", ";", "\t")
 """What may stand between the cells of a CSV file; decimal commas are understood beside the other two."""
+
+ENCODINGS = ("utf-8", "cp1252")
+"""Of headers: a spreadsheet on Windows writes the degree sign in the second."""
 
 PREAMBLE = 100
 """Lines in which the header is sought: instruments and laboratories write notes above it."""
@@ -220,8 +224,8 @@ def _split_header(path: Path, data: bytes, wanted: Sequence[str]) -> tuple[list[
         raise InputError("the file is empty", file=path)
     for comment in (b"", b"# "):
         for number, line in lines:
-            for separator in SEPARATORS:
-                names = _names(line.lstrip(comment), separator)
+            for separator, encoding in product(SEPARATORS, ENCODINGS):
+                names = _names(line.lstrip(comment), separator, encoding)
                 if set(wanted) <= set(names):
                     return names, number, separator, b"\n".join(parts[number:])
     number, line = next((one for one in lines if not one[1].startswith(b"#")), lines[0])
@@ -232,10 +236,10 @@ def _split_header(path: Path, data: bytes, wanted: Sequence[str]) -> tuple[list[
     return names, number, separator, b"\n".join(parts[number:])
 
 
-def _names(line: bytes, separator: str) -> list[str]:
+def _names(line: bytes, separator: str, encoding: str = ENCODINGS[0]) -> list[str]:
     """Cells of a line; none of one that is no text."""
     try:
-        return [name.strip() for name in next(csv.reader([line.decode("utf-8")], delimiter=separator), [])]
+        return [name.strip() for name in next(csv.reader([line.decode(encoding)], delimiter=separator), [])]
     except (UnicodeDecodeError, csv.Error):
         return []
 

@@ -62,6 +62,13 @@ def test_tables_as_laboratories_write_them(write, swing, above, separator):
         read_recording(write(above + text.replace("\n", "\nbad", 1)))
 
 
+def test_a_header_with_a_degree_sign_of_windows(write, swing):
+    sidecar = SIDECAR.replace('column = "a"', 'column = "a [°]"')
+    for encoding in ("utf-8", "utf-8-sig", "cp1252"):
+        found = read_recording(write(swing.replace("t,a", "t,a [°]", 1).encode(encoding), sidecar))
+        assert found.channels["theta"].values[0] == 1.5
+
+
 def test_values_arrive_in_si_with_sign_offset_and_attachment(write):
     sidecar = """
 name = "turn"
