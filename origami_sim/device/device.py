@@ -26,6 +26,7 @@ import numpy as np
 
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import Design, is_design, read_design
+from origami_sim.device.begun import begun
 from origami_sim.device.scene import (
     NAMES,
     Outcome,
@@ -195,13 +196,14 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
         return outcome_of(timed(s, model, parameters, drive, progress=progress))
 
     def replicate(s: Settings, recording: Recording, progress: Progress | None = None) -> tuple[Trajectory, Settings]:
-        """What was recorded, from the reference state at rest, in the drive that was recorded over the device's own."""
+        """What was recorded, from where it begins, in the drive that was recorded over the device's own."""
         model, parameters, drive, *_ = out.build(s)
         rate = round(1.0 / float(np.median(np.diff(recording.times))))
         duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
         stated = {n: v for n, v in applied_drive(recording).signals.items() if not v.is_zero}
         drive = surrounded(drive, recording).replace(**stated)
-        return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress), s
+        state = None if s.motion == "quasistatic" else begun(model, recording)
+        return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state), s
 
     out.raw, out.build = raw, extended(whole)
     out.run = own.get("run", run)

@@ -18,6 +18,7 @@ from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
 from origami_sim.pattern import kresling, miura, strip, uncreased
 from origami_sim.quantities import parsed, si
+from origami_sim.recording import read_recording
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.results.run_folder import load_run
 from origami_sim.solve.motion.dynamics import simulate
@@ -217,6 +218,21 @@ def test_compare_with_a_file(flap, call, tmp_path):
     (tmp_path / "swing.toml").write_text(steps.replace("other.py", "my_flap.py"))
     code, _, err = call("compare", "swing.csv", "--model", "my_flap.py")
     assert code == 2 and "load steps without times" in err and "origami-sim diagnose compares curves" in err
+
+
+@pytest.mark.parametrize(("phase", "stated"), [(0.0, ""), (1.0, ""), (1.0, "[start]\nstate = 'released'\n")])
+def test_a_comparison_begins_where_the_recording_does(flap, tmp_path, phase, stated):
+    """A free swing is not laid over a device at rest: it begins at the recorded angle and rate, or as is stated."""
+    record(tmp_path)
+    times = np.arange(100) / 200
+    rows = [f"{t:.6f},{0.4 * np.cos(20 * t + phase):.9f}" for t in times]
+    (tmp_path / "swing.csv").write_text("\n".join(["t,angle", *rows]))
+    (tmp_path / "swing.toml").write_text((tmp_path / "swing.toml").read_text() + stated)
+    module = device_module(str(tmp_path / "my_flap.py"))
+    motion, _ = module.replicate(scene_settings(module), read_recording(tmp_path / "swing.csv"))
+    assert motion.creases[0, 0, 0] == pytest.approx(0.4 * np.cos(phase), abs=1e-3)
+    tip = np.linalg.norm(motion.v[0, :, 0], axis=1).max() / 0.02  # of the flap's length
+    assert tip == pytest.approx(0.0 if stated else 8 * np.sin(phase), abs=0.1)
 
 
 def test_diagnose_takes_a_file(flap, tmp_path):
