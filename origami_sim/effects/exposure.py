@@ -10,11 +10,11 @@ NODES = np.polynomial.legendre.leggauss(6)
 
 
 def apply(read: Read, times: np.ndarray, exposure: np.ndarray) -> np.ndarray:
-    """Before the first time the motion is taken to have rested."""
+    """What was before the first time is told by who reads: rest, or the motion that went on."""
     if not np.any(exposure):
         return read(times)
     x, weight = NODES
-    past = np.maximum(times - (0.5 * (1 + x))[:, None, None] * exposure, times[0])
+    past = times - (0.5 * (1 + x))[:, None, None] * exposure
     values = read(past.reshape(-1, past.shape[-1]))
     values = values.reshape(len(x), len(times), *values.shape[1:])
     return np.einsum("k,kndw->ndw", weight / 2, values)

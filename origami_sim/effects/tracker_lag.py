@@ -10,11 +10,11 @@ NODES = np.polynomial.laguerre.laggauss(12)
 
 
 def apply(read: Read, times: np.ndarray, tracker_lag: np.ndarray) -> np.ndarray:
-    """Before the first time the motion is taken to have rested."""
+    """What was before the first time is told by who reads: rest, or the motion that went on."""
     if not np.any(tracker_lag):
         return read(times)
     x, weight = NODES
-    past = np.maximum(times - x[:, None, None] * tracker_lag, times[0])
+    past = times - x[:, None, None] * tracker_lag
     values = read(past.reshape(-1, past.shape[-1]))
     values = values.reshape(len(x), len(times), *values.shape[1:])
     return np.einsum("k,kndw->ndw", weight, values)

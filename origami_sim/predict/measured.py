@@ -131,7 +131,8 @@ def _wrapped(effect, inner, given):
 def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: bool | None):
     """values [F, d, W] as a function of times [n, W], of which `shown` (W,) is the grid's start.
 
-    Before it the motion rested, or went on as it began; many worlds may share a column. Of None, see `measured`.
+    Before it the motion rested, or went on as it began, with its rate and acceleration there; many worlds may share a
+    column. Of None, see `measured`.
     """
     if rested is None:
         return lambda times: values[: len(times)]
@@ -150,8 +151,8 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
             out[:, :, mine] = part(inside)
             outside = columns[:, c] - inside
             for n in np.flatnonzero(outside if not rested else outside > 0):
-                rate = part(inside[n : n + 1], 1)[0]
-                out[n][:, mine] += outside[n] * rate
+                rate, bend = (part(inside[n : n + 1], order)[0] for order in (1, 2))
+                out[n][:, mine] += outside[n] * rate + 0.5 * outside[n] ** 2 * bend
         return out
 
     return at

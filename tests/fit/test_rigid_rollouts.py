@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from origami_sim.design.build import Sheet
 from origami_sim.device.scene import scene_module, scene_settings
@@ -319,3 +320,16 @@ def test_a_stored_prediction_is_of_the_numbers_that_were_asked_for(tied, tmp_pat
     for _ in range(2):
         assert all(np.array_equal(predicted(s), f) for s, f in zip((one, other), fresh, strict=True))
     assert not np.allclose(*fresh, atol=1e-9) and forward.cache.found == 2
+
+
+@pytest.mark.parametrize(("effect", "spread"), [("exposure", 12**-0.5), ("tracker_lag", 1.0)])
+def test_a_filter_of_the_recorder_goes_on_from_segment_to_segment(effect, spread):
+    """Each first frame is smoothed as all others: by half of its variance times the acceleration, after the delay."""
+    forward = RigidRollouts(subject(3), [swung(*hanging(3))])
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    (one,) = (s for s in every if s.effect == effect and s.site == "the measurement")
+    plain = forward.predict(Hypothesis(), np.ones((1, 3)))
+    smooth = forward.predict(Hypothesis((one,)), np.array([[1.0, 1.0, 1.0, 0.003]]))
+    for block, a, b in zip(forward.blocks, plain, smooth, strict=True):
+        expected = 0.5 * (spread * 0.003) ** 2 * CubicSpline(block.times, a[0])(block.times, 2)
+        assert np.abs((b - a)[0] - expected)[:5].max() < 0.3 * np.abs(expected).max()

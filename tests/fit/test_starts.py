@@ -53,7 +53,8 @@ def test_a_clock_that_runs_fast_is_off_by_more_in_every_segment_and_a_delay_is_n
     worlds = [forward.world(h, t, (effect,)) for h, t in zip(each, theta, strict=True)]
     late, _ = lateness(worlds[0][0], Parameters.join([p for _, p in worlds]), 2, begins, True)
     assert np.array_equal(late[0], [0.0] * 3)
-    expected = {"clock_rate": 0.01 * begins, "clock_delay": np.full(3, -0.02)}.get(effect, np.zeros(3))
+    behind = {"clock_delay": 0.02, "tracker_lag": 0.02, "exposure": 0.01}.get(effect, 0.0)  # its mean
+    expected = 0.01 * begins if effect == "clock_rate" else np.full(3, -behind)
     assert late[1] == pytest.approx(expected, abs=1e-12)
 
 
