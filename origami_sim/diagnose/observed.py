@@ -11,8 +11,8 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
 from origami_sim.observation.observe import _index, body_point
 from origami_sim.predict.channels import stacked
-from origami_sim.predict.prescribed import PATH
 from origami_sim.predict.starts import channel_tangent, seen_first
+from origami_sim.predict.track import PATH
 from origami_sim.recording import Channel, Recording, by_component
 from origami_sim.recording.drives import UNITS
 from origami_sim.recording.units import quantity

@@ -79,6 +79,7 @@ class Parameter:
             the first (arguments `buffer` and `<name>`).
         typical: a value at which the effect is noticeable on a device of some grams and centimetres; the diagnosis
             starts there, and sets those parameters to it that it does not fit.
+        threshold: of what it is one, "fold", "field" or "voltage"; the diagnosis starts within what was recorded of it.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Parameter:
     meaning: str
     knots: int = 1
     typical: float | None = None
+    threshold: str = ""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "contact_angle", "theta_c", "rad", 1.0, (-math.pi, math.pi), "fold where they touch; its sign is the side",
-            typical=1.0,
+            typical=1.0, threshold="fold",
         ),
     ),
     fitted=("contact_stiffness", "contact_angle"),

@@ -67,6 +67,7 @@ EFFECT = Effect(
             (0.0, 3.13),
             "fold from the middle, either way, where it begins",
             typical=1.5,
+            threshold="fold",
         ),
         Parameter("stop_middle", "theta_m", "rad", 0.0, (-math.pi, math.pi), "fold angle half way between both stops"),
         Parameter("stop_room", "s0", "rad", 0.0, (0.0, math.pi), "within which it gets steep; 0: what is left to pi"),

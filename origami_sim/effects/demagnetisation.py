@@ -35,7 +35,9 @@ EFFECT = Effect(
     parameters=(
         *MAGNET,
         Parameter("loss", "c", "1/T", 0.0, (0.0, 100.0), "share lost per field beyond the threshold", typical=1.0),
-        Parameter("threshold", "B0", "T", 0.0, (0.0, 5.0), "opposing field that does no harm", typical=0.1),
+        Parameter(
+            "threshold", "B0", "T", 0.0, (0.0, 5.0), "opposing field that does no harm", typical=0.1, threshold="field"
+        ),
     ),
     fitted=("loss", "threshold"),
     formula="m = (1 - q) Br V / mu0,  q = max over the past of c (-u . B - B0), between 0 and 1",

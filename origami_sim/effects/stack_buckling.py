@@ -56,7 +56,16 @@ EFFECT = Effect(
     parameters=(
         *STACK,
         Parameter("lost_share", "f", "-", 0.0, (0.0, 1.0), "share of the thrust beyond buckling lost", typical=0.5),
-        Parameter("buckling_voltage", "Vc", "V", 4550.0, (1.0, 1e5), "voltage at which it buckles", typical=3000.0),
+        Parameter(
+            "buckling_voltage",
+            "Vc",
+            "V",
+            4550.0,
+            (1.0, 1e5),
+            "voltage at which it buckles",
+            typical=3000.0,
+            threshold="voltage",
+        ),
     ),
     fitted=("lost_share", "buckling_voltage"),
     formula="M = -f (1 - Vc^2 / V^2) M_Maxwell for |V| > Vc: a buckled strip carries its buckling thrust and no more",

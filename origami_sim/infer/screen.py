@@ -192,6 +192,7 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
         and s.entities is None
         and any(t.effect == s.effect and t.entities is not None for t in suspects)
         and not get(s.effect).memory
+        and not any(p.threshold for p in get(s.effect).parameters)  # single ones begin at angles of their own
     )
 
 

@@ -20,6 +20,7 @@ from origami_sim.observation.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous
+from origami_sim.predict.thresholds import within_reach
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions
 from origami_sim.recording import Recording
@@ -134,6 +135,7 @@ class Curves(Worlds, ABC):
         several at once. See also `told_apart`.
         """
         every = [s for s in told_apart(every, len(self.components)) if self.turning or not get(s.effect).on_body]
+        every = within_reach(self, every)
         if all(r.by_step for r in self.recordings):
             return [s for s in every if not clocked(s.effect)]
         spans = [r.times - r.times[0] for r in self.recordings]

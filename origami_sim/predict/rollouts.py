@@ -24,6 +24,7 @@ from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.predict.starts import CAREFUL, NEAR, Reading, channel_tangent, read_start, seen_first, spans
 from origami_sim.predict.stated import stated
+from origami_sim.predict.thresholds import within_reach
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_memories, distinct_motions, lasting
 from origami_sim.recording import Recording
@@ -241,10 +242,9 @@ class Rollouts(Worlds, ABC):
 
     def admitted(self, every: Sequence[Suspect]) -> list[Suspect]:
         """See `Predictor.admitted`: those with a time constant with several. See also `told_apart`."""
-        frame = min(film_step(r.times) for r in self.recordings)
+        shortest = FASTEST * min(film_step(r.times) for r in self.recordings)
         longest = max(float(r.times[-1] - r.times[0]) for r in self.recordings)
-        every = told_apart(every, len(self.components))
-        every = at_several_times(every, FASTEST * frame, longest)
+        every = at_several_times(within_reach(self, told_apart(every, len(self.components))), shortest, longest)
         return with_begins(every, self._unsettled(), self.articulation.creases.tolist())
 
     def _unsettled(self) -> dict[int, float]:

@@ -11,6 +11,9 @@ from origami_sim.observation.observe import body_point
 from origami_sim.predict.channels import angle_mask, channel_values, stacked
 from origami_sim.recording import Recording
 
+PATH = "crease_angle"
+"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
+
 ROUNDS = 25
 """Newton steps from the pose that markers give to that which fits all channels."""
 
@@ -93,6 +96,22 @@ def followed(forward, index: int) -> Track | None:
     if index not in forward.tracked:
         forward.tracked[index] = track(forward, forward.recordings[index])
     return forward.tracked[index]
+
+
+def recorded_folds(forward) -> dict[int, np.ndarray]:
+    """All recorded angles (n,) of each crease of the tree that the channels tell, or that a drive prescribes."""
+    creases = forward.articulation.creases
+    if forward.prescribed:
+        each = [(r.drive[PATH].at(r.times).reshape(len(r.times), -1).T, creases) for r in forward.recordings]
+    else:
+        tracks = [t for r in range(len(forward.recordings)) if (t := followed(forward, r)) is not None]
+        first = forward.articulation.size - len(creases)
+        each = [(t.q[first:][t.told[first:]], creases[t.told[first:]]) for t in tracks]
+    out: dict[int, list[np.ndarray]] = {}
+    for folds, mine in each:
+        for c, angles in zip(mine.tolist(), folds, strict=True):
+            out.setdefault(c, []).append(angles)
+    return {c: np.concatenate(angles) for c, angles in out.items()}
 
 
 def coordinates(forward, index: int) -> tuple[np.ndarray, np.ndarray] | None:
