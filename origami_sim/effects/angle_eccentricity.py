@@ -18,8 +18,8 @@ EFFECT = Effect(
     apply=apply,
     channels=("panel_angle", "crease_angle"),
     parameters=(
-        Parameter("sine", "a", "rad", 0.0, (-0.5, 0.5), "part of the error that goes with the sine", typical=5e-3),
-        Parameter("cosine", "b", "rad", 0.0, (-0.5, 0.5), "part that goes with the cosine", typical=0.0),
+        Parameter("sine", "a", "rad", 0.0, (-0.1, 0.1), "part of the error that goes with the sine", typical=5e-3),
+        Parameter("cosine", "b", "rad", 0.0, (-0.1, 0.1), "part that goes with the cosine", typical=0.0),
     ),
     fitted=("sine", "cosine"),
     formula="y = x + a sin x + b (cos x - 1): amplitude sqrt(a^2 + b^2), phase atan2(b, a); none at the angle zero",
@@ -27,7 +27,7 @@ EFFECT = Effect(
         "first order in the eccentricity e over the disc's radius r, amplitude e / r (Ernst 1998, Digital Linear and "
         "Angular Metrology)"
     ),
-    matters="a disc of 20 mm that is 0.1 mm off its axis: 5 mrad; potentiometers and magnets before Hall sensors alike",
+    matters="a disc of 20 mm that is 0.1 mm off its axis: 5 mrad; magnets before Hall sensors alike; bound: 2 mm",
     confused_with="scale and zero of the angle for small swings, weight on a side, stiffness that goes with the angle",
     separated_by="turn the joint by hand once around against a protractor; two reading heads opposite to each other",
 )

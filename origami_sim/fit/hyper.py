@@ -17,7 +17,10 @@ class Hyper:
     """Hyperparameters of the diagnosis.
 
     Attributes:
-        slabs: standard deviations of strengths on the scale of detectability d'.
+        slabs: standard deviations of strengths on the scale of detectability d', up to what the finest recordings show:
+            10^5 frames tell a ten-thousandth of their range. Beyond the largest, a strength would be drawn to nothing.
+            Half and double of all are within the error of the log score; without those above 1200, no probability of
+            an effect below that changes by more than 2 %, their share.
         steep: probability of each of them, as a power of one over it: large effects are rarer than small ones.
         effects: probability of one more effect, given those that are there.
         most: effects in a set, at most.
@@ -37,7 +40,7 @@ class Hyper:
             half of it two laws that are sure have 0.78 in place of 0.64, with double they are not named.
     """
 
-    slabs: tuple[float, ...] = (1.3, 4.0, 12.0, 40.0, 120.0, 400.0, 1200.0)
+    slabs: tuple[float, ...] = (1.3, 4.0, 12.0, 40.0, 120.0, 400.0, 1.2e3, 4.0e3, 1.2e4, 4.0e4, 1.2e5)
     steep: float = 0.5
     effects: float = 0.3
     most: int = 5
