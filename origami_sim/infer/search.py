@@ -35,6 +35,7 @@ from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
+from origami_sim.predict.spectra import without_idle
 from origami_sim.threads import shared
 
 UNFITTED = 0.05
@@ -223,6 +224,24 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     out.realised.setdefault(estimate.parent, []).append(realised)
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
+    _without_idle_branches(out, forward, key)
+
+
+def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None:
+    """Fits a set with shorter spectra as well, where its fit leaves branches of a Prony series at nothing."""
+    f, place, every = out.nodes[key].fit, len(forward.subject.nominals), [s.suspect for s in out.signatures]
+    suspects, theta = [], [f.theta[:place]]
+    for s in f.hypothesis.suspects:
+        shorter, kept = without_idle(s, f.theta[place : place + len(s.free)], every)
+        suspects.append(shorter)
+        theta.append(kept)
+        place += len(s.free)
+    hypothesis = Hypothesis(tuple(suspects))
+    fewer = frozenset(_members(hypothesis, out))
+    if fewer not in out.nodes:
+        found = fit(forward, hypothesis, level(forward, f), theta=np.concatenate(theta), local=f.local)
+        if not found.failed:
+            _add(out, forward, fewer, found, log_priors(out.signatures))
 
 
 def _named(out: Posterior) -> list[Key]:

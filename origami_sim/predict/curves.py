@@ -11,7 +11,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import PLAUSIBLE, Hypothesis, Subject, Suspect
+from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
@@ -20,6 +20,7 @@ from origami_sim.observation.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous
+from origami_sim.predict.spectra import with_spectra
 from origami_sim.predict.thresholds import within_reach
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions
@@ -302,35 +303,6 @@ class Static(Curves):
 def clocked(effect: str) -> bool:
     """Whether an effect depends on how fast things happen: a parameter's unit has seconds in it (but for s^2)."""
     return effect in TIMED or any(re.search(r"(?<![A-Za-z])s(?![A-Za-z^])", p.unit) for p in get(effect).parameters)
-
-
-def with_spectra(every: Sequence[Suspect], shortest: float, longest: float) -> list[Suspect]:
-    """The suspects, and those that relax with a Prony series of two and more branches, which is one law.
-
-    Args:
-        shortest, longest: between which the time constants of a series begin, evenly in their logarithm [s].
-    """
-    out, done = list(every), set()
-    for s in every:
-        place = s.effect, s.entities, s.more
-        branches = [n for n in (1, 2, 3) if _has_branch(s.effect, n)]
-        if place in done or s.more or len(branches) < 2:
-            continue
-        done.add(place)
-        stiffness, time = s.free
-        for count in branches[1:]:
-            times = np.geomspace(shortest, longest, count + 2)[1:-1]
-            free = []
-            for n, t in enumerate(times, 1):
-                free.append(replace(stiffness, name=f"stiffness_{n}"))
-                given = {"start": float(t), "scale": float(t), "spread": PLAUSIBLE * float(t)}
-                free.append(replace(time, name=f"time_{n}", **given))
-            out.append(replace(s, free=tuple(free)))
-    return out
-
-
-def _has_branch(effect: str, n: int) -> bool:
-    return {f"stiffness_{n}", f"time_{n}"} <= {p.name for p in get(effect).parameters}
 
 
 def measures_force(recording: Recording) -> bool:

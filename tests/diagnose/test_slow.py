@@ -13,8 +13,8 @@ from origami_sim.diagnose.inertia import inertia
 from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.suspects import suspects
-from origami_sim.predict.curves import with_spectra
 from origami_sim.predict.slow import Slow
+from origami_sim.predict.spectra import with_spectra, without_idle
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.recording.stated import Start
@@ -144,6 +144,21 @@ def test_a_prony_series_is_one_suspect():
     numbers = [x for n in range(3) for x in (0.2 * K, (3.0, 30.0, 300.0)[n])]
     one = Hypothesis((three,))
     assert np.abs(predicted(forward, one, *numbers) - predicted(forward)).max() > 10 * NOISE
+
+
+def test_branches_that_a_fit_leaves_at_nothing_are_left_out():
+    forward = Slow(flap(), [recording(angles(times()))], panels="rigid", threads=1)
+    once = suspect(forward, "crease_relaxation")
+    late = replace(once, free=(once.free[0], replace(once.free[1], start=40.0)))
+    every = with_spectra([once, late], 1.0, 100.0)
+    three = every[-1]
+    assert len(three.free) == 6
+    scale = three.free[0].scale
+    assert without_idle(three, np.array([0.0, 1.0, scale, 30.0, 1e-9 * scale, 9.0]), every)[0] is late
+    shorter, kept = without_idle(three, np.array([scale, 1.0, 0.0, 10.0, 2 * scale, 50.0]), every)
+    assert len(shorter.free) == 4 and kept.tolist() == [scale, 1.0, 2 * scale, 50.0]
+    whole = np.array([scale, 1.0, scale, 10.0, scale, 50.0])
+    assert without_idle(three, whole, every) == (three, whole)
 
 
 # --- which motion
