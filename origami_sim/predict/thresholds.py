@@ -16,7 +16,8 @@ from origami_sim.predict.worlds import Worlds
 REACHED = (0.6, 0.9)
 """Parts of the largest recorded value at which thresholds begin: what acts for long, and what acts at the ends alone.
 
-A fit moves the threshold from there.
+A fit moves the threshold from there: half of both, and one of 0.75 alone, lead to the same verdict on a strip that
+meets a stop, and to its angle within 3 mrad.
 """
 
 
