@@ -50,10 +50,15 @@ def recorded(forward: Worlds, s: Suspect, quantity: str, folds: dict[int, np.nda
     if quantity == "fold":
         mine = folds if s.entities is None else [c for c in s.entities if c in folds]
         return np.concatenate([np.zeros(0), *(folds[c] for c in mine)])
-    signals = [c for r in forward.recordings for name, c in r.drive.items() if quantity and name.startswith(quantity)]
-    return np.concatenate([np.zeros(0), *(size(c.values) for c in signals)])
+    signals = [
+        c.at(r.times)
+        for r in forward.recordings
+        for name, c in r.drive.items()
+        if quantity and name.startswith(quantity)
+    ]
+    return np.concatenate([np.zeros(0), *(size(values) for values in signals)])
 
 
 def size(values: np.ndarray) -> np.ndarray:
-    """Sizes (n,) of the values of a drive, of vectors their lengths."""
+    """Sizes (n,) of the values of a drive in time, of vectors their lengths."""
     return np.abs(values) if values.ndim == 1 else np.linalg.norm(values, axis=-1)
