@@ -33,7 +33,11 @@ OFF = 20.0
 """How many times a distance on a panel may be off before its unit is refused; a length scale of 50 % is a suspect."""
 
 SWITCH = 0.05
-"""Share of a drive's range by which it changes between two rows where it is said to be switched."""
+"""Share of a drive's range by which it changes between two rows where it is said to be switched.
+
+It decides on a note alone. Of thirteen drives (sines to 30 Hz, ramps, steps and stairs, with noise and without) half
+of it adds stairs of 4 %, double leaves out those of 8 %.
+"""
 
 TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""

@@ -51,6 +51,7 @@ def without_idle(s: Suspect, values: np.ndarray, every: Sequence[Suspect]) -> tu
         every: suspects, of which the one with as many branches as are left stands for it whose time constants begin
             nearest.
     """
+    # a branch's numbers end in its number: stiffness_2, time_2
     idle = {f.name[-2:] for f, v in zip(s.free, values, strict=True) if f in s.strengths and abs(v) < IDLE * f.scale}
     kept = np.array([v for f, v in zip(s.free, values, strict=True) if f.name[-2:] not in idle])
     shorter = [t for t in every if t.label == s.label and len(t.free) == len(kept) < len(values)]
