@@ -3,7 +3,6 @@
 Every hypothesis is judged by its own (empirical Bayes), so that what one of them leaves is no noise to another.
 """
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,60 +13,80 @@ from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.hypothesis import usual
 from origami_sim.fit.least_squares import Fit, precision, smoothed
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.residual_process import residual_process
-from origami_sim.fit.weights import Weights
+from origami_sim.fit.residual_process import level_prior, residual_process
+from origami_sim.fit.weights import Weights, log_volume
 from origami_sim.threads import shared
 
-ROUNDS = 4
-"""Times that gaps and levels follow each other, at most."""
-
-SETTLED = 1e-3
-"""Relative change of levels and colours that ends it. Half, double and zero change no word of four swings, and no
-probability by more than 0.004."""
+ROUNDS, SETTLED = 4, 0.1
+"""Times that levels, and then colours, follow what is left under them, and gain of log evidence that is worth it."""
 
 
 def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
-    """A fit judged by what it leaves itself: no simulation, all that is fitted moves linearly."""
-    for _ in range(ROUNDS):
-        assert f.weights is not None
-        before, gap = f.weights, best_gap(f, hyper)
-        f = f.reweighted(left_by(forward, smoothed(forward, f, replace(before, gap=gap)), gap))
-        if _settled(before, f.weights):
-            break
-    return f
+    """A fit in the most probable of the noises that it implies: no simulation, all that is fitted moves linearly.
+
+    Each size of the gaps has a noise of its own, as gaps take up what would else be coloured. Beginning with the size
+    that suits the present noise, those beside it are tried until none is more probable.
+    """
+    assert f.linear is not None and f.weights is not None
+    sizes = hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
+    place = int(np.argmax(shared([partial(log_evidence, f, gap) for gap in sizes])))
+    fits: dict[int, tuple[float, Fit]] = {}
+    while True:
+        for n in range(max(place - 1, 0), min(place + 2, len(sizes))):
+            if n not in fits:
+                fits[n] = at_gap(forward, f, sizes[n])
+        best = max(fits, key=lambda n: fits[n][0])
+        if best == place:
+            return fits[place][1]
+        place = best
 
 
-def _settled(a: Weights, b: Weights | None) -> bool:
-    assert b is not None
-    if a.gap != b.gap or [len(c) for c in a.colour] != [len(c) for c in b.colour]:
-        return False
-    pairs = zip((a.deviation, *a.colour), (b.deviation, *b.colour), strict=True)
-    return all(np.allclose(x, y, rtol=SETTLED, atol=SETTLED * np.abs(y).max()) for x, y in pairs)
+def at_gap(forward: Predictor, f: Fit, gap: float) -> tuple[float, Fit]:
+    """Log evidence of a fit with gaps of a size and the most probable noise, and the fit in it.
+
+    What a fit leaves is less than the noise, and coloured where that is white, as segments and numbers follow the
+    data. So levels and colours that are read from it are taken only while the evidence grows, white ones first.
+    """
+    assert f.weights is not None
+    best = f.reweighted(_white(forward, f.weights.deviation, gap))
+    log = log_evidence(best)
+    for coloured in (False, True):
+        for _ in range(ROUNDS):
+            assert best.weights is not None
+            new = best.reweighted(left_by(forward, smoothed(forward, best, best.weights), gap, coloured=coloured))
+            if (found := log_evidence(new)) < log + SETTLED:
+                break
+            best, log = new, found
+    return log, best
 
 
-def left_by(forward: Predictor, residuals: list[np.ndarray], gap: float) -> Weights:
-    """Weights of residuals (n, D) [SI], no smaller than the measurement noise."""
-    found = [residual_process([r[:, d] for r in residuals], float(n)) for d, n in enumerate(forward.blocks[0].noise)]
-    colour = tuple(c for _, c, _ in found)
-    coloured = any(len(c) > 1 for c in colour)
-    return Weights(np.array([d for d, *_ in found]), colour if coloured else (), gap, sum(p for *_, p in found))
-
-
-def best_gap(f: Fit, hyper: Hyper) -> float:
-    """The size of the gaps between segments under which a fit is most probable."""
-    line = f.linear
+def log_evidence(f: Fit, gap: float | None = None) -> float:
+    """Log evidence of a fit in its noise, with gaps of its size or another one, without flaws and discrepancy."""
+    line, own = f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
-    if not any(t is not None for t in line.tie):
-        return f.weights.gap
-    own = OwnColumns(f)
-    laid = own.sets(len(own.columns))
-    chain, now = line.chain.columns(np.array([*own.nominal, *own.columns, -1])), f.weights.gap
+    size = gap or f.weights.gap
+    chain = line.chain.columns(np.array([*own.nominal, *own.columns, -1])).regapped(f.weights.gap / size)
+    cell, count = summed(own.problem(chain, len(own.columns)), 0.0, 0.0), len(own.columns)
+    volume = f.weights.log_prior - log_volume(f.weights, line.rows)
+    return float(cell.of(own.sets(count))[0][0]) + volume - float(np.log(size))
 
-    def log_evidence(gap: float) -> float:
-        cell = summed(own.problem(chain.regapped(now / gap), len(own.columns)), 0.0, 0.0)
-        return float(cell.of(laid, hyper)[0][0] - np.log(gap))
 
-    return hyper.gaps[int(np.argmax(shared([partial(log_evidence, gap) for gap in hyper.gaps])))]
+def left_by(forward: Predictor, residuals: list[np.ndarray], gap: float, *, coloured: bool = True) -> Weights:
+    """Weights of residuals (n, D) [SI], no smaller than the measurement noise."""
+    noise = forward.blocks[0].noise
+    if not coloured:
+        return _white(forward, np.sqrt(np.nanmean(np.concatenate(residuals) ** 2, axis=0)), gap)
+    found = [residual_process([r[:, d] for r in residuals], float(n)) for d, n in enumerate(noise)]
+    colour = tuple(c for _, c, _ in found)
+    some = any(len(c) > 1 for c in colour)
+    return Weights(np.array([d for d, *_ in found]), colour if some else (), gap, sum(p for *_, p in found))
+
+
+def _white(forward: Predictor, level: np.ndarray, gap: float) -> Weights:
+    """White weights of a level (D,) [SI], no smaller than the measurement noise."""
+    noise = forward.blocks[0].noise
+    deviation = np.maximum(np.nan_to_num(level), noise)
+    return Weights(deviation, (), gap, sum(level_prior(d, n) for d, n in zip(deviation, noise, strict=True)))
 
 
 class OwnColumns:

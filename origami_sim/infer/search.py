@@ -61,9 +61,6 @@ TOGETHER = 768
 
 It decides on time alone: with twice as many eight cores take 1.4 times as long, and one core 0.95 times."""
 
-TIGHT = 1e-4
-"""Gaps between segments, as a part of usual rates, that fits allow at least: the smallest that are judged."""
-
 
 def search(
     forward: Predictor,
@@ -347,19 +344,13 @@ def polished(out: Posterior, forward: Predictor) -> bool:
         key, some = max(leaders, key=lambda k: out.total[k]), True
         out.polished[key] = 0.0
         before, f = out.total[key], out.nodes[key].fit
-        f = renewed(forward, f.reweighted(tight(f)))
+        f = renewed(forward, f)
         if f.cost - promised(forward, f) >= OWED:
             f = carried_on(forward, f)
             f = f if f.failed or f.exact else renewed(forward, f)
         if not f.failed:
             _add(out, forward, key, f, prior)
             out.polished[key] = out.total[key] - before
-
-
-def tight(f: Fit) -> Weights:
-    """The noise that a fit implies, with gaps that leave its steps linear."""
-    assert f.weights is not None
-    return replace(f.weights, gap=max(f.weights.gap, TIGHT))
 
 
 def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:

@@ -15,9 +15,12 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
+from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.suspects import suspects
+from origami_sim.fit.weights import Weights
+from origami_sim.infer.implied import at_gap, log_evidence, with_own_noise
 from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
@@ -101,6 +104,21 @@ def test_a_set_that_is_fitted_again_is_polished_again(found):
     other = replace(other, **{n: dict(getattr(found, n)) for n in ("log", "total", "promise")})
     forget(other, key)
     assert key not in other.nodes and key not in other.polished and key in found.polished
+
+
+def test_gaps_and_noise_of_a_fit_are_more_probable_than_those_beside_them(rubbing):
+    """From white noise and from coloured noise, with wide gaps and narrow ones, they are the same."""
+    forward, _, base, _, _ = rubbing
+    deviation = forward.blocks[0].noise
+    colour = tuple(np.array([1.0, 0.6, 0.3]) for _ in deviation)
+    starts = [Weights(deviation, gap=1e-1), Weights(deviation, gap=1e-5), Weights(2 * deviation, colour, gap=1e-2)]
+    found = [with_own_noise(forward, base.reweighted(w), HYPER) for w in starts]
+    logs = [log_evidence(f) for f in found]
+    assert np.ptp(logs) < 1.0
+    for f, log in zip(found, logs, strict=True):
+        place = HYPER.gaps.index(f.weights.gap)
+        for n in {max(place - 1, 0), min(place + 1, len(HYPER.gaps) - 1)} - {place}:
+            assert at_gap(forward, f, HYPER.gaps[n])[0] <= log + 1e-6
 
 
 def test_what_is_held_out_is_judged_in_one_noise_for_all(found, rubbing):
