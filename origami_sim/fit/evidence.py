@@ -36,6 +36,9 @@ still move it, where it ends. The log evidence is then off by the square of that
 rounding does.
 """
 
+NEAR = 1e-9
+"""Part of a number's scale within which it lies on its bound: rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -249,12 +252,16 @@ class Summed:
         return out + np.sum(inside - far, axis=-1), value
 
 
-def summed(p: Problem, smooth: float, flaws: float) -> Summed:
-    """Sums out flaws and a discrepancy of the channels whose sizes are standard deviations of noise, see `Hyper`."""
+def summed(p: Problem, smooth: float, flaws: float, held: Sequence[int] = ()) -> Summed:
+    """Sums out flaws and a discrepancy of the channels whose sizes are standard deviations of noise, see `Hyper`.
+
+    Columns that a fit holds at a bound (`held`) have no flaw, which would take them beyond.
+    """
     c, k = p.columns, len(p.gram) - 1 - p.columns
     norms = np.sqrt(np.maximum(np.diag(p.gram)[:c], 1e-12))
     share = flaws / np.sqrt(max(c, 1))
     scale = np.concatenate([np.where(norms > 1e-5, share / norms, 0.0), np.full(k, smooth)])
+    scale[list(held)] = 0.0
     u = p.gram[: c + k, : c + k] * scale[:, None] * scale
     rows = [*range(c), len(p.gram) - 1]
     cross = p.gram[: c + k][:, rows] * scale[:, None]
@@ -263,6 +270,16 @@ def summed(p: Problem, smooth: float, flaws: float) -> Summed:
     by = solve_triangular(root, cross, lower=True, check_finite=False)
     gram = p.gram[np.ix_(rows, rows)] - by.T @ by
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
+
+
+def at_bounds(groups: Sequence[Group]) -> list[int]:
+    """Columns of groups that are linearised at one of their bounds."""
+    held = []
+    for g in groups:
+        low, high = g.bounds()
+        near = (g.at <= low + NEAR) | (g.at >= high - NEAR)
+        held += [c for c, at_bound in zip(g.columns, near, strict=True) if at_bound]
+    return held
 
 
 def log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:

@@ -24,8 +24,7 @@ ROUNDS, SETTLED = 4, 0.1
 def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
     """A fit in the most probable of the noises that it implies: no simulation, all that is fitted moves linearly.
 
-    Each size of the gaps has a noise of its own, as gaps take up what would else be coloured. Beginning with the size
-    that suits the present noise, those beside it are tried until none is more probable.
+    Each size of the gaps has its own, as gaps take up what would else be coloured: none beside it is more probable.
     """
     assert f.linear is not None and f.weights is not None
     sizes = hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
@@ -48,8 +47,7 @@ def at_gap(forward: Predictor, f: Fit, gap: float) -> tuple[float, Fit]:
     data. So levels and colours that are read from it are taken only while the evidence grows, white ones first.
     """
     assert f.weights is not None
-    best = f.reweighted(_white(forward, f.weights.deviation, gap))
-    log = log_evidence(best)
+    log = log_evidence(best := f.reweighted(_white(forward, f.weights.deviation, gap)))
     for coloured in (False, True):
         for _ in range(ROUNDS):
             assert best.weights is not None

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from origami_sim.fit.chain import Chain
-from origami_sim.fit.evidence import Problem, Summed, beside_numbers, summed
+from origami_sim.fit.evidence import Problem, Summed, at_bounds, beside_numbers, summed
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import log_volume
@@ -32,6 +32,7 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
         width += len(one.size)
     weights = f.weights
     effects = Columns(line, weights, own.columns, known, out.weights)
+    held = at_bounds(own.groups)
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
     out.smooth = smooth = out.smooth or cosines(forward, f, line)
 
@@ -44,7 +45,7 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     def of_gap(gap: float) -> tuple[Problem, list[Summed]]:
         made = own.problem(chain.regapped(weights.gap / gap), width)
         made = replace(made, constant=made.constant + volume)
-        return made, [summed(made, size, flaws) for size, flaws in product(hyper.smooth, hyper.flaws)]
+        return made, [summed(made, size, flaws, held) for size, flaws in product(hyper.smooth, hyper.flaws)]
 
     gaps = hyper.gaps if any(t is not None for t in line.tie) else hyper.gaps[:1]
     found = dict(zip(gaps, shared([partial(of_gap, gap) for gap in gaps]), strict=True))

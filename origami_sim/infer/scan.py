@@ -175,11 +175,11 @@ def over_numbers(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarr
 
 
 def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]]:
-    """Each number beside a strength, and the numbers (SHAPES, P) of a fit with its values over what is plausible."""
+    """Each number beside a strength, and the numbers (n, P) of a fit with its values over what is plausible."""
     every = [(s, n) for s in f.hypothesis.suspects for n in s.free]
     for k, (s, n) in enumerate(every, start=len(forward.subject.nominals)):
         if n not in s.strengths:
-            thetas = np.repeat(f.theta[None], len(values := over_shape(n)), axis=0)
+            thetas = np.repeat(f.theta[None], len(values := over_shape(n, f.theta[k])), axis=0)
             thetas[:, k] = values
             yield k, thetas
 
@@ -233,10 +233,12 @@ def over_range(suspect: Suspect, grid: np.ndarray = GRID) -> list[np.ndarray]:
     return out
 
 
-def over_shape(shape: Free) -> np.ndarray:
-    """(SHAPES,) values of a number beside a strength, within what is plausible; of one sign if it has one."""
+def over_shape(shape: Free, at: float) -> np.ndarray:
+    """Values of a number beside a strength: SHAPES of what is plausible, and as evenly up to where it is beyond."""
     if shape.lower >= 0.0 and shape.start > 0.0:
         ends = max(shape.lower, shape.start / PLAUSIBLE), min(shape.upper, shape.start * PLAUSIBLE)
-        return np.geomspace(*ends, SHAPES)
+        whole = min(ends[0], max(at, 1e-9 * ends[0])), max(ends[1], at)
+        share = np.log(whole[1] / whole[0]) / np.log(ends[1] / ends[0])
+        return np.geomspace(*whole, round(SHAPES * share))
     far = PLAUSIBLE * shape.scale
     return np.linspace(max(shape.lower, shape.start - far), min(shape.upper, shape.start + far), SHAPES)

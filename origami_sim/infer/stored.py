@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from origami_sim.errors import InputError
-from origami_sim.fit.evidence import Group, Problem, Sets, Summed
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, at_bounds
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
@@ -58,11 +58,12 @@ class Reduced:
         rows = [*range(c), last]
         return cls(p.gram[np.ix_(rows, rows)], p.gram[rows, c:last] @ axes[:, kept], size[kept], p.constant)
 
-    def summed(self, smooth: float, flaws: float) -> Summed:
+    def summed(self, smooth: float, flaws: float, held: Sequence[int] = ()) -> Summed:
         """As `evidence.summed`, of what that does in one step: the discrepancy is summed out first, then the flaws."""
         c = len(self.gram) - 1
         norms = np.sqrt(np.maximum(np.diag(self.gram)[:c], 1e-12))
         scale = np.where(norms > 1e-5, flaws / np.sqrt(max(c, 1)) / norms, 0.0)
+        scale[list(held)] = 0.0
         by = smooth**2 / (1.0 + smooth**2 * self.size)
         gram = self.gram - (self.cross * by) @ self.cross.T
         log = self.constant - 0.5 * float(np.sum(np.log1p(smooth**2 * self.size)))
@@ -141,13 +142,12 @@ class Stored:
         fit = Fit(hypothesis, hypothesis.free, np.zeros(0), np.zeros((0, 0)), (), 0.0, 0.0, [], np.zeros(0))
         own = [tuple(range(len(members)))]
         laid = Sets.of(own, groups, len(members), len(next(iter(problems.values())).gram) - 1)
-        grid, evidence = [], np.full(len(hyper.cells), -np.inf)
+        grid, evidence, held = [], np.full(len(hyper.cells), -np.inf), at_bounds(groups[: len(members)])
         for c, (gap, size, flaws) in enumerate(hyper.cells):
             # segments that are not tied have one problem; the cells of other gaps then say the same and are left out
-            known = (
-                problems.get(gap) if len(problems) > 1 else problems[min(problems)] if gap == hyper.gaps[0] else None
-            )
-            grid.append(known.summed(size, flaws) if known is not None else None)
+            one = problems[min(problems)] if gap == hyper.gaps[0] else None
+            known = problems.get(gap) if len(problems) > 1 else one
+            grid.append(known.summed(size, flaws, held) if known is not None else None)
             if known is not None:
                 evidence[c] = grid[-1].of(laid, hyper)[0][0]
         return Node(key, fit, evidence, groups, others, grid)

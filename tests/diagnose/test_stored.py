@@ -85,8 +85,8 @@ def test_summed_in_axes_of_its_own_is_what_the_evidence_sums():
     none = [np.zeros((rows, 0))]
     line = Linearisation([Rows(rows)], [rng.normal(size=rows)], [rng.normal(size=(rows, 2))], none, [None])
     whole = problem(line, np.arange(2), np.ones(2), np.zeros(2), [effects], [smooth])
-    for size, flaws in ((0.0, 2.0), (3.0, 8.0), (100.0, 0.0)):
-        one, other = summed(whole, size, flaws), Reduced.of(whole).summed(size, flaws)
+    for size, flaws, held in ((0.0, 2.0, []), (3.0, 8.0, []), (3.0, 8.0, [1, 3]), (100.0, 0.0, [])):
+        one, other = summed(whole, size, flaws, held), Reduced.of(whole).summed(size, flaws, held)
         np.testing.assert_allclose(other.gram, one.gram, rtol=1e-9, atol=1e-9)
         assert other.log == pytest.approx(one.log, abs=1e-8)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed
+from origami_sim.fit.evidence import Group, Sets, Summed, at_bounds, problem, summed
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows
@@ -233,6 +233,21 @@ def test_larger_flaws_excuse_more():
     sets = [Sets.of([k], groups([0, 0]), 0, 2) for k in [(), (0,)]]
     odds = [np.diff([summed(p, SMOOTH, f).of(s, HYPER)[0][0] for s in sets])[0] for f in (2.0, 8.0, 32.0)]
     assert odds[0] > odds[1] > odds[2] and odds[0] > 10.0 and odds[2] < 2.0
+
+
+def test_no_flaw_takes_an_effect_beyond_its_bound():
+    """A loss cannot be negative: where data ask for that, a fit that holds it at zero is no better than one without."""
+    toy = Toy([1.0, 5.0])
+    residual = toy.drawn(np.random.default_rng(6), np.array([-30.0, 0.0]) / toy.norms)
+    line = Linearisation([Rows(COUNT)], [residual], [toy.numbers], [np.zeros((COUNT, 0))], [None])
+    p = problem(line, np.arange(2), PRECISION, AWAY, [toy.effects], [toy.smooth])
+    loss = Group((0,), 1, np.zeros(1), 1, np.full(1, np.inf), low=np.zeros(1), high=np.full(1, 1e3))
+    held = at_bounds([loss, replace(loss, columns=(1,), at=np.ones(1))])
+    assert held == [0]
+    none, with_loss = (Sets.of([k], [loss], 0, 2) for k in [(), (0,)])
+    free, bound = summed(p, SMOOTH, 16.0), summed(p, SMOOTH, 16.0, held)
+    assert free.of(none)[0][0] > bound.of(none)[0][0] + 100.0
+    assert bound.of(with_loss)[0][0] < bound.of(none)[0][0]
 
 
 def test_stated_probabilities_are_frequencies():
