@@ -237,7 +237,7 @@ def over_shape(shape: Free, at: float) -> np.ndarray:
     """Values of a number beside a strength: SHAPES of what is plausible, and as evenly up to where it is beyond."""
     if shape.lower >= 0.0 and shape.start > 0.0:
         ends = max(shape.lower, shape.start / PLAUSIBLE), min(shape.upper, shape.start * PLAUSIBLE)
-        whole = min(ends[0], max(at, 1e-9 * ends[0])), max(ends[1], at)
+        whole = min(ends[0], at or ends[0]), max(ends[1], at)
         share = np.log(whole[1] / whole[0]) / np.log(ends[1] / ends[0])
         return np.geomspace(*whole, round(SHAPES * share))
     far = PLAUSIBLE * shape.scale
