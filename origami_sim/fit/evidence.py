@@ -36,9 +36,6 @@ still move it, where it ends. The log evidence is then off by the square of that
 rounding does.
 """
 
-NEAR = 1e-9
-"""Part of a number's scale within which it lies on its bound: rounding."""
-
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -272,14 +269,14 @@ def summed(p: Problem, smooth: float, flaws: float, held: Sequence[int] = ()) ->
     return Summed(gram, p.constant - float(np.sum(np.log(np.diag(root)))))
 
 
+def on_bound(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Whether numbers over their scales lie on a bound, but for rounding."""
+    return (values <= low + 1e-9) | (values >= high - 1e-9)
+
+
 def at_bounds(groups: Sequence[Group]) -> list[int]:
     """Columns of groups that are linearised at one of their bounds."""
-    held = []
-    for g in groups:
-        low, high = g.bounds()
-        near = (g.at <= low + NEAR) | (g.at >= high - NEAR)
-        held += [c for c, at_bound in zip(g.columns, near, strict=True) if at_bound]
-    return held
+    return [c for g in groups for c, on in zip(g.columns, on_bound(g.at, *g.bounds()), strict=True) if on]
 
 
 def log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from origami_sim.fit.evidence import on_bound
 from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Prediction, Predictor
@@ -475,8 +476,7 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) ->
     misfit = float(sum(r @ r for r in line.residual))
     scale = np.array([f.scale for f in free])
     lower, upper = np.array([f.lower for f in free]), np.array([f.upper for f in free])
-    near = 1e-9 * np.maximum(scale, 1e-300)
-    at_bound = (theta <= lower + near) | (theta >= upper - near)
+    at_bound = on_bound(theta / scale, lower / scale, upper / scale)
     return Fit(
         hypothesis,
         free,

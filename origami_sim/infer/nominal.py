@@ -6,6 +6,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import Fit, carried_on, fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.residual_process import level_prior
 from origami_sim.fit.weights import Weights
 
 GAP = 0.03
@@ -24,7 +25,14 @@ SAME = 0.1
 
 def level(forward: Predictor, f: Fit) -> Weights:
     """White weights as large as what a fit leaves, and no smaller than the noise: to fit numbers with."""
-    return Weights(np.maximum(np.nan_to_num(f.rms()), forward.blocks[0].noise), gap=GAP)
+    return white(forward, f.rms(), GAP)
+
+
+def white(forward: Predictor, rms: np.ndarray, gap: float) -> Weights:
+    """White weights of residuals with root mean squares (D,) [SI], no smaller than the noise."""
+    noise = forward.blocks[0].noise
+    deviation = np.maximum(np.nan_to_num(rms), noise)
+    return Weights(deviation, (), gap, sum(level_prior(d, n) for d, n in zip(deviation, noise, strict=True)))
 
 
 def nominal_fits(forward: Predictor) -> tuple[Fit, Fit, Weights]:

@@ -114,7 +114,7 @@ def test_gaps_and_noise_of_a_fit_are_more_probable_than_those_beside_them(rubbin
     starts = [Weights(deviation, gap=1e-1), Weights(deviation, gap=1e-5), Weights(2 * deviation, colour, gap=1e-2)]
     found = [with_own_noise(forward, base.reweighted(w), HYPER) for w in starts]
     logs = [log_evidence(f) for f in found]
-    assert np.ptp(logs) < 1.0
+    assert np.ptp(logs) < 1e-3
     for f, log in zip(found, logs, strict=True):
         place = HYPER.gaps.index(f.weights.gap)
         for n in {max(place - 1, 0), min(place + 1, len(HYPER.gaps) - 1)} - {place}:
