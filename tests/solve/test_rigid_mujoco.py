@@ -106,7 +106,7 @@ def sheets():
     for name, free in (("box", False), ("tumbling box", True)):
         box = Sheet(cross(0.06, 0.05), thickness=1e-3, panels="rigid")
         box.crease(stiffness=np.array([2e-3, 3e-3, 4e-3, 5e-3]), rest_angle=np.pi / 2)
-        box.set("crease_viscosity", viscosity=3e-6)
+        box.set("crease_viscosity", viscosity=3e-6).touch(False)  # nor do MuJoCo's bodies touch
         yield name, box if free else box.fix(panels=[0]), [0.3, 0.9, -0.2, 1.4], (0, 0, -9.80665), free
 
 
