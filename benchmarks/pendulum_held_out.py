@@ -18,10 +18,10 @@ from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.command import read_recordings
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.suspects import suspects
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.predict.starts import local_line
 from origami_sim.recording.rigid_pendulum import PUBLISHED_DOUBLE as P
 

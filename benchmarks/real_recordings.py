@@ -19,10 +19,10 @@ import numpy as np
 from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.least_squares import Fit, fit
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.recording import Recording, read_recording
 from origami_sim.scenes import cube_toss, falling_ball
 

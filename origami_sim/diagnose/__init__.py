@@ -9,8 +9,8 @@ from types import ModuleType
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.options import Options
-from origami_sim.fit.hypothesis import Free, Subject, factor
-from origami_sim.fit.subject import subject_of
+from origami_sim.hypotheses.hypothesis import Free, Subject, factor
+from origami_sim.hypotheses.subject import subject_of
 from origami_sim.infer.diagnosis import EXIT, VERDICTS, Diagnosis
 
 __all__ = ["EXIT", "VERDICTS", "Diagnosis", "Free", "Keep", "Options", "Subject", "diagnose", "factor", "subject_of"]

@@ -7,12 +7,13 @@ import numpy as np
 from origami_sim.diagnose.inertia import calmer, inertia
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject
-from origami_sim.fit.least_squares import linearise, precision
+from origami_sim.fit.least_squares import linearise
+from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.hypotheses.coordinates import Coordinates
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.channels import stacked, units_of
@@ -226,7 +227,7 @@ def _absorbed(bars: Predictor, rigid: Predictor, local: np.ndarray) -> float:
         gaps.append(line.padded(n, change))
     if not all(np.all(np.isfinite(g)) for g in gaps):
         return np.inf
-    prior = np.diag(precision(free))
+    prior = np.diag(Coordinates(free).precision)
     a = np.concatenate([*line.cleared(line.tangent), prior])
     y = np.concatenate([*line.cleared(gaps), np.zeros(len(free))])
     x, *_ = np.linalg.lstsq(a, y, rcond=1e-10)

@@ -15,9 +15,9 @@ from itertools import product
 import numpy as np
 
 from origami_sim.diagnose.held_out import steps_without
-from origami_sim.fit.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.hypotheses.hypothesis import NOMINAL, Free, Hypothesis, Subject
 from origami_sim.infer.diagnosis import Baseline
 from origami_sim.locate.locate import motion
 from origami_sim.threads import shared
@@ -62,8 +62,9 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
     halves = _halves(forward)
     if any(not h for h in halves):
         return without("needs segments in two halves, and frames outside of each")
-    scale = np.array([n.scale for n in base.free])
-    told = [replace(base, theta=base.theta + scale * step) for step in steps_without(base, halves)]
+    numbers = base.coordinates
+    at = numbers.of(base.theta)
+    told = [replace(base, theta=numbers.values(at + step)) for step in steps_without(base, halves)]
     each = range(len(forward.recordings))
     found = shared([partial(motion, forward, f, r) for f in told for r in each])  # type: ignore[arg-type]
     moved = [found[k : k + len(each)] for k in range(0, len(found), len(each))]

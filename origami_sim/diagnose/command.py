@@ -32,8 +32,8 @@ from origami_sim.diagnose.observed import assumed, check_recording, switched
 from origami_sim.diagnose.options import Options
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Free, Subject
-from origami_sim.fit.subject import alignments, divided, numbers, split, spreads
+from origami_sim.hypotheses.hypothesis import Free, Subject
+from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
@@ -448,6 +448,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
             continue
         mark = f"   {c.distrust}" if c.distrust else ""
         lines.append(f"{c.label:48s} {c.probability:11.3f} {c.odds:9.1f}{mark}")
+    if d.candidates and round(d.unfitted, 3) > 0.0:
+        lines.append(f"{'others, estimated and not fitted':48s} {d.unfitted:11.3f}")
     best = patched(d)
     for n in best.numbers if best is not None else []:
         bound = ", at its bound" if n.at_bound else ""

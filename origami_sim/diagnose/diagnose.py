@@ -24,16 +24,16 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import SEPARATOR, Suspect
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.subject import Source, subject_of
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
+from origami_sim.hypotheses.subject import Source, subject_of
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.discrepancy import of_recorder
-from origami_sim.infer.nominal import level, nominal_fits
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search

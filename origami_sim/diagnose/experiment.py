@@ -24,8 +24,8 @@ from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.diagnosis import Experiment
+from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
-from origami_sim.infer.verdict import widened
 from origami_sim.recording.possible import Possible
 
 LEADING, LEAST = 5, 0.01
@@ -177,11 +177,13 @@ def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Pr
     for h, f in enumerate(leading):
         rows.append(len(each))
         moved = [k for k in range(len(f.free)) if k >= count or h == 0]
-        steps.append(first_steps(forward, f.free, f.theta)[moved])
-        for k, step in zip([None, *moved], [0.0, *steps[-1]], strict=True):
+        change = first_steps(forward, f.coordinates, f.theta)
+        further = f.coordinates.values(f.coordinates.of(f.theta) + change)
+        steps.append(change[moved])
+        for k in (None, *moved):
             theta = f.theta.copy()
             if k is not None:
-                theta[k] += step
+                theta[k] = further[k]
             each.append(f.hypothesis)
             thetas.append(theta)
     worlds = len(each)
@@ -199,14 +201,13 @@ def prospect(forward: Predictor, leading: Sequence[Fit], weights: Weights) -> Pr
     means = moves[:, rows].T
     shared, spreads = np.zeros((len(moves), 0)), []
     for h, f in enumerate(leading):
-        scale = np.array([n.scale for n in f.free])
         own = moves[:, rows[h] + 1 : rows[h] + 1 + len(steps[h])] - means[h][:, None]
-        own = own / steps[h] * scale[len(scale) - len(steps[h]) :]
+        own = own / steps[h]
         if not h:
             shared = own[:, :count]
         every = own if not h else np.concatenate([shared, own], axis=1)
-        deviation = f.deviations() / np.sqrt(np.maximum(np.diag(f.covariance), 1e-300))
-        cover = f.covariance * np.outer(deviation, deviation) / np.outer(scale, scale)
+        deviation = f.spread / np.sqrt(np.maximum(np.diag(f.covariance), 1e-300))
+        cover = f.covariance * np.outer(deviation, deviation)
         value, vector = np.linalg.eigh(0.5 * (cover + cover.T))
         spreads.append(every @ (vector * np.sqrt(np.maximum(value, 0.0))))
     return Prospect.of(means, spreads)

@@ -7,10 +7,10 @@ import numpy as np
 
 from origami_sim.fit.evidence import ROUNDS, least_within, sharpness
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.least_squares import Fit, precision
+from origami_sim.fit.implied import OwnColumns
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, restored
-from origami_sim.infer.implied import OwnColumns
 from origami_sim.recording import Recording
 
 FOLDS = 5
@@ -59,18 +59,17 @@ def held_out(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
 
 
 def steps_without(f: Fit, parts: Sequence[Sequence[int]], hyper: Hyper = HYPER) -> Iterator[np.ndarray]:
-    """Changes of the numbers (P,) of a fit, over their scales, without each of some parts of its segments.
+    """Changes of the coordinates (P,) of a fit's numbers without each of some parts of its segments.
 
     The mode of the normal model that the evidence is of, within the bounds: what all other segments do not tell of a
     strength, its prior does. Nothing if the fit left the numbers as they were.
     """
-    line, own, known = f.linear, OwnColumns(f), precision(f.free)
+    line, own, numbers = f.linear, OwnColumns(f), f.coordinates
     assert line is not None
     width, nominal = line.tangent[0].shape[1], own.nominal
     cleared = line.cleared([np.column_stack([t, r]) for t, r in zip(line.tangent, line.residual, strict=True)])
-    scale = np.array([n.scale for n in f.free])
-    value = (f.theta - np.array([n.start for n in f.free])) / scale
-    low, high = ((np.array([getattr(n, end) for n in f.free]) - f.theta) / scale for end in ("lower", "upper"))
+    known, value = numbers.precision, numbers.of(f.theta)
+    low, high = numbers.low - value, numbers.high - value
     strong = np.array([own.columns[c] for g in own.groups for c in g.columns[: g.strengths]], int)
     usual = np.concatenate([np.zeros(0), *(g.sizes()[: g.strengths] for g in own.groups)])
     none = np.zeros(width)

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from origami_sim.diagnose.prepare import FRAMES, thinned
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Subject
+from origami_sim.hypotheses.hypothesis import Subject
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.channels import stacked

@@ -9,9 +9,9 @@ import numpy as np
 
 from origami_sim.diagnose.keep import Keep
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Block, Predictor
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, dihedral_angles
 from origami_sim.predict.channels import stacked

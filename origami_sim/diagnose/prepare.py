@@ -8,7 +8,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Suspect
+from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.recording import Channel, Recording, estimate_noise
 from origami_sim.recording.wild import wild_frames
 from origami_sim.threads import shared

@@ -5,9 +5,10 @@ import numpy as np
 from origami_sim.fit.least_squares import LITTLE, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Candidate, Correlation, Number, Suspected, Trace
+from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import Judgement, log_odds, widened
+from origami_sim.infer.verdict import Judgement, log_odds
 from origami_sim.infer.words import kind
 from origami_sim.predict.channels import units_of
 
@@ -71,13 +72,14 @@ def _squares(forward: Predictor, f: Fit) -> float:
 def _distrust(f: Fit) -> str:
     """When not to trust a row."""
     out, own = [], len(f.free) - len(f.hypothesis.free)
-    for n, t, b in zip(f.free, f.theta, f.at_bound, strict=True):
+    for n, t, b, strain in zip(f.free, f.theta, f.at_bound, f.strain, strict=True):
         if b:
             out.append(f"{n.label} lies on its bound ({t:.3g} {n.unit})")
-        elif np.isfinite(n.spread) and abs(t - n.start) > 3 * n.spread:
-            out.append(f"{n.label} left its prior by {abs(t - n.start) / n.spread:.1f} sd")
+        elif strain > 3.0:
+            out.append(f"{n.label} left its prior by {strain:.1f} sd")
+    strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
     for n, t, d in zip(f.free[own:], f.theta[own:], f.deviations()[own:], strict=True):
-        if abs(t) < 2 * d:
+        if id(n) in strong and abs(t) < 2 * d:
             out.append(f"{n.label} is not told from zero")
     return "; ".join(out)
 
@@ -85,8 +87,8 @@ def _distrust(f: Fit) -> str:
 def numbers(f: Fit) -> list[Number]:
     """Fitted numbers with 95 % intervals."""
     return [
-        Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b))
-        for n, t, low, high, b in zip(f.free, f.theta, *f.intervals(), f.at_bound, strict=True)
+        Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away))
+        for n, t, low, high, away, b in zip(f.free, f.theta, *f.intervals(), f.strain, f.at_bound, strict=True)
     ]
 
 

@@ -1,1 +1,1 @@
-"""The estimator: numbers with priors, suspects, noise, least squares of any `Predictor`, and evidence."""
+"""The estimator: least squares of any `Predictor`, noise, and evidence."""

@@ -10,13 +10,13 @@ import numpy as np
 from origami_sim.fit.chain import Chain
 from origami_sim.fit.evidence import Group, Problem, Sets, reduced, summed
 from origami_sim.fit.hyper import Hyper
-from origami_sim.fit.hypothesis import usual
-from origami_sim.fit.least_squares import Fit, precision, smoothed
+from origami_sim.fit.least_squares import Fit, smoothed
+from origami_sim.fit.nominal import white
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import OWED
 from origami_sim.fit.residual_process import residual_process
 from origami_sim.fit.weights import Weights, log_volume
-from origami_sim.infer.nominal import white
+from origami_sim.hypotheses.hypothesis import usual
 from origami_sim.threads import shared
 
 ROUNDS = 4
@@ -89,9 +89,8 @@ class OwnColumns:
 
     def __init__(self, f: Fit):
         self.nominal = np.arange(len(f.free) - len(f.hypothesis.free))
-        scale = np.array([n.scale for n in f.free])
-        self.precision = precision(f.free)
-        self.away = (np.array([n.start for n in f.free]) - f.theta) / scale
+        numbers, at = f.coordinates, f.coordinates.of(f.theta)
+        self.precision, self.away = numbers.precision, -at
         self.columns: list[int] = []
         self.groups: list[Group] = []
         place = len(self.nominal)
@@ -99,19 +98,15 @@ class OwnColumns:
             inner = list(s.free)
             strong = [k for k, n in enumerate(inner) if n in s.strengths]
             arranged = [*strong, *(k for k in range(len(inner)) if k not in strong)]
-            at = np.array([(f.theta[place + k] - inner[k].start) / inner[k].scale for k in arranged])
-            spread = np.array([inner[k].spread / inner[k].scale for k in arranged])
-            first = inner[0]
+            first, mine = inner[0], np.array([place + k for k in arranged])
             side = 1 if first.start <= first.lower else -1 if first.start >= first.upper else 0
             begin = len(self.columns)
-            self.columns += [place + k for k in arranged]
-            low, high = (
-                np.array([(getattr(inner[k], name) - inner[k].start) / inner[k].scale for k in arranged])
-                for name in ("lower", "upper")
-            )
+            self.columns += mine.tolist()
             columns = tuple(range(begin, begin + len(inner)))
+            spread = np.array([inner[k].spread / inner[k].scale for k in arranged])
             sizes = usual(s, [inner[k] for k in arranged])
-            self.groups.append(Group(columns, len(strong), at, side, spread, low, high, sizes))
+            ends = numbers.low[mine], numbers.high[mine]
+            self.groups.append(Group(columns, len(strong), at[mine], side, spread, *ends, sizes))
             place += len(inner)
 
     def problem(self, chain: Chain, count: int) -> Problem:

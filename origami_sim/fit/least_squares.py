@@ -8,10 +8,11 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from origami_sim.fit.evidence import on_bound
-from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Prediction, Predictor
 from origami_sim.fit.weights import Weights, restored, whitened
+from origami_sim.hypotheses.coordinates import Coordinates
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis
 
 STEPS = (1.0, 0.4, 0.1, 0.01)
 """Fractions of a Gauss-Newton step that are tried, until one keeps its promise."""
@@ -21,6 +22,9 @@ CHORD = (1.0, 0.4)
 
 FAITHFUL = 0.7
 """Part of the promised improvement with which a step must come true for its derivatives to be used again."""
+
+SLOW = 0.5
+"""Part of what the step before promised, above which steps by derivatives of an earlier point converge too slowly."""
 
 SHORT = 0.2
 """Part of a step up to which it is too short to be bent."""
@@ -89,30 +93,49 @@ class Fit:
         return self.misfit + self.penalty
 
     @cached_property
+    def coordinates(self) -> Coordinates:
+        """In which the numbers were fitted."""
+        return Coordinates(self.free)
+
+    @property
+    def away(self) -> np.ndarray:
+        """(P,) from the coordinates of the numbers to where they begin."""
+        return -self.coordinates.of(self.theta)
+
+    @property
+    def strain(self) -> np.ndarray:
+        """(P,) how far the numbers are from what was known before, in its standard deviations; nan: nothing was."""
+        known = self.coordinates.precision
+        return np.where(known > 0.0, np.abs(self.away) * known, np.nan)
+
+    @cached_property
     def covariance(self) -> np.ndarray:
-        """[P, P] of theta [SI], given the weights; zero if the numbers were not fitted."""
+        """[P, P] of the coordinates, given the weights; zero if the numbers were not fitted."""
         count = len(self.free)
         if self.linear is None:
             return np.full((count, count), np.nan)
         if not self.linear.tangent[0].shape[1]:
             return np.zeros((count, count))
-        scale = np.array([f.scale for f in self.free])
-        a = np.concatenate([self.linear.eliminated.rows[:, :-1], np.diag(precision(self.free))])
-        return np.linalg.pinv(a.T @ a, rcond=1e-14) * np.outer(scale, scale)
+        a = np.concatenate([self.linear.eliminated.rows[:, :-1], np.diag(self.coordinates.precision)])
+        return np.linalg.pinv(a.T @ a, rcond=1e-14)
 
     def rms(self) -> np.ndarray:
         """(D,) root mean square of the residuals [SI]; nan where nothing was seen."""
         return np.sqrt(np.nanmean(np.concatenate(self.residuals) ** 2, axis=0))
 
-    def deviations(self) -> np.ndarray:
-        """(P,) standard deviations of theta."""
+    @property
+    def spread(self) -> np.ndarray:
+        """(P,) standard deviations of the coordinates."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) * (1.0 if self.wider is None else self.wider)
+
+    def deviations(self) -> np.ndarray:
+        """(P,) standard deviations of theta [SI]."""
+        return self.spread * self.coordinates.slopes(self.theta)
 
     def intervals(self) -> tuple[np.ndarray, np.ndarray]:
         """Ends (P,) of the 95 % intervals of theta, within the bounds."""
-        reach = 1.96 * self.deviations()
-        lower, upper = (np.array([getattr(f, n) for f in self.free]) for n in ("lower", "upper"))
-        return np.maximum(self.theta - reach, lower), np.minimum(self.theta + reach, upper)
+        at, reach = self.coordinates.of(self.theta), 1.96 * self.spread
+        return self.coordinates.values(at - reach), self.coordinates.values(at + reach)
 
     def reweighted(self, new: Weights) -> "Fit":
         """The same numbers, judged with other weights."""
@@ -122,11 +145,10 @@ class Fit:
         return replace(self, linear=line, misfit=misfit, weights=new, exact=False)
 
 
-def penalty(free: Sequence[Free], theta: np.ndarray) -> float:
+def penalty(numbers: Coordinates, theta: np.ndarray) -> float:
     """Sum of squares of the departures from what was known before."""
-    return float(
-        sum(((t - f.start) / f.spread) ** 2 for f, t in zip(free, theta, strict=True) if np.isfinite(f.spread))
-    )
+    known = numbers.precision > 0.0
+    return float(np.sum((numbers.of(theta)[known] * numbers.precision[known]) ** 2))
 
 
 def linearise(
@@ -150,28 +172,29 @@ def linearise(
         fixed: leave theta out (only the starts are to be fitted).
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
         residual: whitened residuals at this point, if they are known.
-        steps: (k,) those of the first numbers that were small enough at a near point [SI].
+        steps: (k,) those of the first numbers' coordinates that were small enough at a near point.
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
     size = 0 if known is not None else forward.local
     fresh = count - kept
-    steps = first_steps(forward, free, theta, steps)[:count]
+    numbers = Coordinates(free)
+    steps = first_steps(forward, numbers, theta, steps)[:count]
     nudges = start_steps(forward, weights, blocks) if size else np.zeros((len(blocks), 0))
     if residual is None:
         residual = residuals(forward, hypothesis, theta, local, blocks, weights)
     rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
 
-    def differences(numbers: np.ndarray, starts: int) -> list[np.ndarray]:
+    def differences(some: np.ndarray, starts: int) -> list[np.ndarray]:
         """Per block, whitened changes [k + starts, r] by steps of some of the numbers, and of the starts."""
-        thetas = np.repeat(theta[None], 1 + len(numbers) + starts, axis=0)
+        thetas = np.repeat(theta[None], 1 + len(some) + starts, axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
-        thetas[1 + np.arange(len(numbers)), numbers] += steps[numbers]
+        moved = numbers.values(numbers.of(theta) + np.append(steps, np.zeros(len(free) - count)))
+        thetas[1 + np.arange(len(some)), some] = moved[some]
         for i in range(starts):
-            locals_[1 + len(numbers) + i, blocks, i] += nudges[:, i]
+            locals_[1 + len(some) + i, blocks, i] += nudges[:, i]
         if len(thetas) == 1:
             return [np.zeros((0, r.count)) for r in rows]
-        thetas = np.clip(thetas, [f.lower for f in free], [f.upper for f in free])
         return changed(forward, forward.shoot(hypothesis, thetas, locals_, blocks), weights, blocks)
 
     changes = differences(np.arange(kept, count), size)
@@ -187,8 +210,7 @@ def linearise(
         steps[kept + bent] *= 0.5 * least / large[bent]  # so that they need not be halved again nearby
         for c, new in zip(changes, differences(kept + bent, 0), strict=True):
             c[bent] = new
-    scale = np.array([f.scale for f in free[kept:count]]) / steps[kept:]
-    tangent = [c[:fresh].T * scale for c in changes]
+    tangent = [c[:fresh].T / steps[kept:] for c in changes]
     if known is not None:
         return replace(known.at(residual).beside(tangent, kept), steps=steps)
     slopes, tie = [], []
@@ -282,14 +304,13 @@ def start_steps(forward: Predictor, weights: Weights, blocks: Sequence[int]) -> 
 
 
 def first_steps(
-    forward: Predictor, free: Sequence[Free], theta: np.ndarray, near: np.ndarray | None = None
+    forward: Predictor, numbers: Coordinates, theta: np.ndarray, near: np.ndarray | None = None
 ) -> np.ndarray:
-    """(P,) steps of derivatives: what is noticeable, or for the first numbers those `near`; inwards at a bound."""
-    steps = np.array([forward.nudge * f.scale for f in free])
+    """(P,) steps of coordinates for derivatives: what is noticeable, or those `near` first; inwards at a bound."""
+    steps = np.full(len(theta), forward.nudge)
     if near is not None:
         steps[: len(near)] = np.abs(near)
-    upper = np.array([f.upper for f in free])
-    return np.where(theta + steps > upper, -steps, steps)
+    return np.where(numbers.of(theta) + steps > numbers.high, -steps, steps)
 
 
 def fit(
@@ -325,8 +346,7 @@ def fit(
     free = (*forward.subject.nominals, *hypothesis.free)
     theta = np.array([f.start for f in free] if theta is None else theta, float)
     local = np.zeros((len(forward.blocks), forward.local)) if local is None else local.copy()
-    lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
-    width = 0 if fixed else len(free)
+    numbers, width = Coordinates(free), 0 if fixed else len(free)
 
     line: Linearisation | None = begin
 
@@ -338,7 +358,7 @@ def fit(
     def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
         """A point: its cost, its residuals, itself."""
         gaps = residuals(forward, hypothesis, theta, local, blocks, weights)
-        cost = sum(float(r @ r) for r in gaps) + penalty(free, theta)
+        cost = sum(float(r @ r) for r in gaps) + penalty(numbers, theta)
         return cost if np.isfinite(cost) else np.inf, gaps, theta, local
 
     def too_slow(theta, least: float) -> bool:
@@ -347,18 +367,18 @@ def fit(
     line = line or derived(theta, local, known, None)
     own = 0 < kept < width
     level = (ALL if exact else STALE) if begin else ALL if known is None else OWN if own else STALE
-    best, doubts = sum(float(r @ r) for r in line.residual) + penalty(free, theta), 0
+    best, doubts = sum(float(r @ r) for r in line.residual) + penalty(numbers, theta), 0
     if not np.isfinite(best):
         return _failed(hypothesis, free, theta, local, blocks, "the simulation goes unstable from the recorded start")
     step = forward.step(hypothesis, theta)
     slowest = min(step, forward.step(Hypothesis(), theta[: len(forward.subject.nominals)]) / UTMOST)
     slow = max(step / SLOWEST, slowest)
-    floor = sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks)
+    floor, before = sum(np.isfinite(forward.blocks[b].values).sum() for b in blocks), np.inf
     for n in range(most):
         assert theta is not None and local is not None
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
-        change, moves, hoped = _proposed(forward, free, theta, local, blocks, line)
+        change, moves, hoped = _proposed(forward, numbers, theta, local, blocks, line)
         enough = max(LITTLE, done * (best - floor))
         whole, gain, found = best - hoped, 0.0, None
         if whole < enough and (level > STALE or not width):
@@ -366,7 +386,7 @@ def fit(
         trying = STEPS if level == ALL or not n else CHORD
         straight = 0.0
         for part in trying:
-            trial, start = np.clip(theta + part * change * scale, lower, upper), local + part * moves
+            trial, start = numbers.values(numbers.of(theta) + part * change), local + part * moves
             # a strength far beyond what is needed can ask for very small steps of the solver
             # (or be of no model at all)
             if hypothesis.suspects and too_slow(trial, slow if part > trying[-1] else slowest):
@@ -377,9 +397,9 @@ def fit(
             if trying is STEPS and part > SHORT and best - owed <= there[0] < np.inf:
                 # a curved valley: the way is bent by what predictions differ from what the derivatives said
                 # (geodesic acceleration, Transtrum & Sethna 2012)
-                more, moved, reach = _proposed(forward, free, trial, start, blocks, line.at(there[1]))
+                more, moved, reach = _proposed(forward, numbers, trial, start, blocks, line.at(there[1]))
                 bend = more - (1.0 - part) * change
-                aside = np.clip(trial + bend * scale, lower, upper)
+                aside = numbers.values(numbers.of(trial) + bend)
                 longer = np.linalg.norm(bend) > np.linalg.norm(part * change)
                 if reach < min(there[0], best - gain) and not longer and not too_slow(aside, slow):
                     there = min(there, at(aside, start + moved - (1.0 - part) * moves), key=lambda p: p[0])
@@ -388,13 +408,14 @@ def fit(
             if best - there[0] > owed:
                 break
         faithful, stuck = straight > FAITHFUL * whole, gain < enough
+        lagging, before = level == STALE and whole > SLOW * before, whole
         if stuck and level == ALL:
             break
         if found is not None:
             best, gaps, theta, local = found
             line = line.at(gaps)
         level = STALE
-        if stuck or not faithful:  # first the hypothesis' own derivatives are renewed, then all
+        if stuck or lagging or not faithful:  # first the hypothesis' own derivatives are renewed, then all
             doubts += 1
             level = OWN if own and doubts == 1 else ALL
             line = derived(theta, local, line if level == OWN else None, line.residual)
@@ -429,7 +450,7 @@ def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
     assert f.linear is not None and f.weights is not None
     line = f.linear.reweighted(f.weights, weights)
     width = line.tangent[0].shape[1]
-    change, moves, _ = _proposed(forward, f.free, f.theta, f.local, f.blocks, line)
+    change, moves, _ = _proposed(forward, f.coordinates, f.theta, f.local, f.blocks, line)
     left = [r - t @ change[:width] for r, t in zip(line.residual, line.tangent, strict=True)]
     return restored(weights, line.smoothed(left, list(moves[list(f.blocks)])), line.rows)
 
@@ -437,46 +458,39 @@ def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
 def promised(forward, f: Fit) -> float:
     """The cost that one more step promises a fit, by the derivatives that it has."""
     assert f.linear is not None
-    return _proposed(forward, f.free, f.theta, f.local, f.blocks, f.linear)[2]
+    return _proposed(forward, f.coordinates, f.theta, f.local, f.blocks, f.linear)[2]
 
 
-def _proposed(forward, free, theta, local, blocks, line: Linearisation) -> tuple[np.ndarray, np.ndarray, float]:
-    """A Gauss-Newton step within the bounds: of theta / scale (P,), of the starts [B, L], and the cost it promises."""
-    lower, upper, scale = (np.array([getattr(f, n) for f in free]) for n in ("lower", "upper", "scale"))
-    width = line.tangent[0].shape[1]
-    change = np.zeros(len(free))
+def _proposed(
+    forward, numbers: Coordinates, theta, local, blocks, line: Linearisation
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """A Gauss-Newton step within the bounds: of coordinates (P,), of the starts [B, L], and the cost it promises."""
+    at, prior, width = numbers.of(theta), numbers.precision, line.tangent[0].shape[1]
+    change = np.zeros(len(theta))
     chain = line.eliminated
     whole = chain.rows
     if width:
-        prior = precision(free)
         a = np.concatenate([whole[:, :-1], np.diag(prior)])
-        right = prior * (np.array([f.start for f in free]) - theta) / scale
-        y = np.concatenate([whole[:, -1], right])
+        y = np.concatenate([whole[:, -1], -prior * at])
         norms = np.linalg.norm(a, axis=0)
         a = np.concatenate([a, np.diag(1e-6 * np.maximum(norms, 1e-12))])
-        y = np.concatenate([y, np.zeros(len(free))])
+        y = np.concatenate([y, np.zeros(len(theta))])
         q, r = np.linalg.qr(a)  # a small system with the same least squares
-        low, high = (lower - theta) / scale, (upper - theta) / scale
+        low, high = numbers.low - at, numbers.high - at
         change = np.asarray(lsq_linear(r, q.T @ y, (np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x, float)
     left = np.append(-change[:width], 1.0)  # what columns and residual add up to after the step
     moves = np.zeros_like(local)
     if forward.local:
         moves[list(blocks)] = chain.starts(left[:, None])[:, :, 0]
-    promised = penalty(free, theta + change * scale) + float(np.sum((whole @ left) ** 2))
+    promised = float(np.sum((prior * (at + change)) ** 2) + np.sum((whole @ left) ** 2))
     return change, moves, promised
-
-
-def precision(free: Sequence[Free]) -> np.ndarray:
-    """(P,) scales over the standard deviations of what was known before."""
-    return np.array([f.scale / f.spread if np.isfinite(f.spread) else 0.0 for f in free])
 
 
 def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) -> Fit:
     residuals = restored(weights, line.residual, line.rows)
     misfit = float(sum(r @ r for r in line.residual))
-    scale = np.array([f.scale for f in free])
-    lower, upper = np.array([f.lower for f in free]), np.array([f.upper for f in free])
-    at_bound = on_bound(theta / scale, lower / scale, upper / scale)
+    numbers = Coordinates(free)
+    at_bound = on_bound(numbers.of(theta), numbers.low, numbers.high)
     return Fit(
         hypothesis,
         free,
@@ -484,7 +498,7 @@ def _finished(forward, hypothesis, free, theta, local, blocks, weights, line) ->
         local,
         blocks,
         misfit,
-        penalty(free, theta),
+        penalty(numbers, theta),
         residuals,
         at_bound,
         linear=line,

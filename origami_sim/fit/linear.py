@@ -27,7 +27,7 @@ class Linearisation:
         tangent: per segment [r, P] derivative of what is predicted by theta / scale.
         slopes: per segment [r, L] by its own start.
         tie: per segment (L,) one over the standard deviations of the gap to the next; None where that is not tied.
-        steps: (P,) changes of theta [SI] by which the derivatives were found.
+        steps: (P,) changes of coordinates by which the derivatives were found.
     """
 
     rows: list[Rows]

@@ -3,11 +3,11 @@
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import Fit, carried_on, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.residual_process import level_prior
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Hypothesis
 
 GAP = 0.03
 """Gaps between segments, as a part of usual rates, with which fits are made; evidence then looks at all sizes.

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from origami_sim.drive import Drive
-from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.fit.noise import numbered
 from origami_sim.fit.weights import Rows
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.model import Model, Parameters
 from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.recording import Recording

@@ -29,6 +29,7 @@ class Free:
         owner: NOMINAL for a setting of the model, else the effect. name: the setting or parameter.
         start: where fits begin. scale: a change that is noticeable. lower, upper: physical bounds.
         spread: standard deviation of what was known before; infinite if nothing was.
+        logarithmic: whether it is a positive scale, of whose logarithm scale and spread are; see `Coordinates`.
         entities: entities of the effect's family that share the number; None for all. recording: likewise (index).
         aligned: whether it says how recorder or supply are aligned, named "effect.parameter"; see `Subject.beside`.
     """
@@ -44,6 +45,7 @@ class Free:
     entities: tuple[int, ...] | None = None
     aligned: bool = False
     recording: int | None = None
+    logarithmic: bool = False
 
     @property
     def label(self) -> str:
@@ -275,7 +277,8 @@ def factor(name: str, spread: float) -> Free:
 
 
 PLAUSIBLE = 10.0
-"""How far a number beside an effect's strength may plausibly be from its typical value, in units of that."""
+"""How far a number beside an effect's strength may plausibly be from its typical value: in units of that, or by which
+factor, if it is a positive scale."""
 
 ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
 """Parameters of a node that stand for its reference position."""

@@ -11,7 +11,7 @@ from origami_sim.device.scene import Setting, Settings, _parse, scene_module, sc
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
+from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
 

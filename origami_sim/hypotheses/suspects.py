@@ -8,7 +8,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.effects._effect import Effect
-from origami_sim.fit.hypothesis import ACROSS, ANCHORS, PLAUSIBLE, Free, Suspect
+from origami_sim.hypotheses.hypothesis import ACROSS, ANCHORS, PLAUSIBLE, Free, Suspect
 from origami_sim.model import Model, Parameters, magnets
 from origami_sim.model.places import points, stretches
 from origami_sim.recording import Recording
@@ -198,16 +198,18 @@ def _free(effect: str, name: str, entities) -> Free:
     assert p.typical is not None
     first = get(effect).parameter(get(effect).fitted[0])
     scale = abs(p.typical) or abs(first.typical or 1.0)
+    ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-") and not p.threshold
     return Free(
         effect,
         name,
         p.unit,
         start=0.0 if p.unit == first.unit else p.typical,  # other components of a strength are absent as well
-        scale=scale,
+        scale=1.0 if ratio else scale,
         lower=p.bounds[0],
         upper=p.bounds[1],
-        spread=np.inf if name == first.name else PLAUSIBLE * scale,
+        spread=np.inf if name == first.name else np.log(PLAUSIBLE) if ratio else PLAUSIBLE * scale,
         entities=entities,
+        logarithmic=ratio,
     )
 
 
@@ -257,7 +259,6 @@ def at_several_times(every: Sequence[Suspect], shortest: float, longest: float) 
             out.append(s)
             continue
         for time in np.geomspace(shortest, longest, CONSTANTS + 2)[1:-1]:
-            given = {"start": float(time), "scale": float(time), "spread": PLAUSIBLE * float(time)}
-            free = [replace(f, **given) if n in slow else f for n, f in enumerate(s.free)]
+            free = [replace(f, start=float(time)) if n in slow else f for n, f in enumerate(s.free)]
             out.append(replace(s, free=tuple(free)))
     return out

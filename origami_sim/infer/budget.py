@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.least_squares import Fit, precision
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
@@ -135,18 +135,16 @@ def _subsets(n: int) -> list[tuple[int, ...]]:
 
 def _without(f: Fit, line: Linearisation, lacking: list[int], ends: np.ndarray) -> float:
     """Squares that are missed without some effects, all other numbers refitted."""
-    scale = np.array([n.scale for n in f.free])
+    at = f.coordinates.of(f.theta)
     gone = np.zeros(len(f.free), bool)
     for k in lacking:
         gone[ends[k] : ends[k + 1]] = True
-    firsts = [ends[k] for k in lacking]
-    back = np.zeros(len(f.free))
-    for k in firsts:
-        back[k] = (f.theta[k] - f.free[k].start) / scale[k]
+    strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
+    back = np.where(gone & [id(n) in strong for n in f.free], at, 0.0)
     whole = line.eliminated.rows
     tangent, left = whole[:, :-1], whole[:, -1] + whole[:, :-1] @ back
-    prior = precision(f.free)
-    away = prior * (np.array([n.start for n in f.free]) - f.theta) / scale
+    prior = f.coordinates.precision
+    away = -prior * at
     a = np.concatenate([tangent[:, ~gone], np.diag(prior)[:, ~gone]])
     y = np.concatenate([left, np.where(gone, 0.0, away)])
     x, *_ = np.linalg.lstsq(a, y, rcond=1e-12)

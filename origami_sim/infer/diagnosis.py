@@ -23,7 +23,13 @@ EXIT = {name: 10 + n for n, name in enumerate(VERDICTS)}
 
 @dataclass
 class Number:
-    """A fitted number with its 95 % interval [SI]; `prior` and `spread` are what was known before (nan: nothing)."""
+    """A fitted number with its 95 % interval [SI].
+
+    Attributes:
+        prior, spread: value and standard deviation of what was known before (inf: nothing was); of a positive scale,
+            such as a time constant, the deviation is that of its logarithm.
+        away: how far it is from there, in standard deviations (nan: nothing was known).
+    """
 
     label: str
     unit: str
@@ -33,6 +39,7 @@ class Number:
     prior: float
     spread: float
     at_bound: bool
+    away: float = float("nan")
 
 
 @dataclass
@@ -294,6 +301,11 @@ class Diagnosis:
     @property
     def exit_code(self) -> int:
         return EXIT[self.verdict]
+
+    @property
+    def unfitted(self) -> float:
+        """Probability of sets of effects that were estimated and not fitted, such as the best one and more."""
+        return max(0.0, 1.0 - sum(c.probability for c in self.candidates))
 
     def __repr__(self) -> str:
         from origami_sim.view.findings import diagnosis_line  # only who looks pays for it

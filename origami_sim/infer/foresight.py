@@ -14,11 +14,11 @@ from scipy.optimize import lsq_linear
 from origami_sim.fit.chain import Chain, Eliminated, triangle
 from origami_sim.fit.evidence import Group, Summed, beside_numbers, log_occam, summed, with_priors, without_numbers
 from origami_sim.fit.hyper import Hyper
+from origami_sim.fit.implied import OwnColumns, left_by
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, log_volume, patterns
 from origami_sim.infer.columns import Columns
-from origami_sim.infer.implied import OwnColumns, left_by
 from origami_sim.threads import shared
 
 

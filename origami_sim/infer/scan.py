@@ -12,11 +12,12 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from origami_sim.fit.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
-from origami_sim.fit.least_squares import UTMOST, Fit, changed, precision
+from origami_sim.fit.least_squares import UTMOST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import along_numbers, missed
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.coordinates import Coordinates
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.screen import Signature
 
 DOUBTED = 0.01
@@ -40,6 +41,10 @@ SHAPES = 7
 With four, friction and drag of two real swings end 165 of log evidence lower, in another valley of the yield angle.
 Half and double change no word of four simulated swings, and no probability by more than 0.033.
 """
+
+
+BEYOND = 3.0
+"""Standard deviations, as its interval has them, beyond which a number may have another mode that is worth a look."""
 
 
 def strained(f: Fit) -> bool:
@@ -78,9 +83,8 @@ class Cleared:
         line = f.reweighted(weights).linear
         assert line is not None
         self.weights = weights
-        self.line, self.scale = line, np.array([n.scale for n in f.free])
-        prior = precision(f.free)
-        self.away = prior * (np.array([n.start for n in f.free]) - f.theta) / self.scale
+        self.line, prior = line, f.coordinates.precision
+        self.away = prior * f.away
         self.moved = np.array([n for n in range(len(f.free)) if n not in held], int)
         columns = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])[:, self.moved]
         self.q, self.r = np.linalg.qr(columns)
@@ -95,8 +99,10 @@ class Cleared:
         return whole - self.q @ (self.q.T @ whole)
 
     def explaining(self, whole: np.ndarray) -> np.ndarray:
-        """Changes of the numbers that are not held, over their scales, that explain (rows,)."""
-        return np.linalg.lstsq(self.r, self.q.T @ whole, rcond=1e-10)[0]
+        """Changes (P,) of the coordinates of numbers, but of those that are held, that explain (rows,)."""
+        out = np.zeros_like(self.away)
+        out[self.moved] = np.linalg.lstsq(self.r, self.q.T @ whole, rcond=1e-10)[0]
+        return out
 
     @cached_property
     def missed(self) -> float:
@@ -124,7 +130,7 @@ def from_given_numbers(
     about, before = Cleared(given, weights), Cleared(base, weights).missed
     residual = about.whole([r[:, None] for r in about.line.residual], away=True)[:, 0]
     rest = about.rest(residual[:, None])[:, 0]
-    low, high = np.array([(n.lower, n.upper) for n in given.free]).T
+    numbers = given.coordinates
     for s in signatures:
         if not s.parts or s.status:
             yield None
@@ -134,7 +140,7 @@ def from_given_numbers(
         strength = lsq_linear(mine, rest, s.bounds).x
         left = float(np.sum((rest - mine @ strength) ** 2))
         moved = about.explaining(residual - change @ strength)
-        theta = np.concatenate([np.clip(given.theta + moved * about.scale, low, high), s.values(strength)])
+        theta = np.concatenate([numbers.values(numbers.of(given.theta) + moved), s.values(strength)])
         gain = gained(forward, base, before, left)
         yield (theta, gain) if gain > 0.0 else None
 
@@ -184,19 +190,28 @@ def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]
             yield k, thetas
 
 
+def next_shapes(forward: Predictor, f: Fit) -> list[np.ndarray]:
+    """Numbers (P,) of a fit with the next values, on either side, of one beside a strength, if far from its own."""
+    out, at = [], f.coordinates.of(f.theta)
+    for k, thetas in _along_shapes(forward, f):
+        below, above = thetas[thetas[:, k] < f.theta[k]], thetas[thetas[:, k] > f.theta[k]]
+        each = [*below[-1:], *above[:1]]
+        out += [t for t in each if abs(f.coordinates.of(t)[k] - at[k]) > BEYOND * f.spread[k]]
+    return out
+
+
 def _best_along(
     forward: Predictor, f: Fit, weights: Weights, each: Iterable[tuple[int, np.ndarray]]
 ) -> tuple[np.ndarray, float] | None:
     """The best of values of single numbers of a fit, with all others that follow linearly, and what it gains."""
-    low, high = np.array([(n.lower, n.upper) for n in f.free]).T
+    numbers = f.coordinates
     found: tuple[np.ndarray, float] | None = None
     for k, thetas in each:
         about = Cleared(f, weights, held=[k])
         best = _best_of(forward, f, about, f.hypothesis, list(thetas))
         if best and best[1] > (found[1] if found else 0.0):
             theta, gain, left = best
-            theta[about.moved] += about.explaining(left) * about.scale[about.moved]
-            found = np.clip(theta, low, high), gain
+            found = numbers.values(numbers.of(theta) + about.explaining(left)), gain
     return found
 
 
@@ -234,11 +249,9 @@ def over_range(suspect: Suspect, grid: np.ndarray = GRID) -> list[np.ndarray]:
 
 
 def over_shape(shape: Free, at: float) -> np.ndarray:
-    """Values of a number beside a strength: SHAPES of what is plausible, and as evenly up to where it is beyond."""
-    if shape.lower >= 0.0 and shape.start > 0.0:
-        ends = max(shape.lower, shape.start / PLAUSIBLE), min(shape.upper, shape.start * PLAUSIBLE)
-        whole = min(ends[0], at or ends[0]), max(ends[1], at)
-        share = np.log(whole[1] / whole[0]) / np.log(ends[1] / ends[0])
-        return np.geomspace(*whole, round(SHAPES * share))
-    far = PLAUSIBLE * shape.scale
-    return np.linspace(max(shape.lower, shape.start - far), min(shape.upper, shape.start + far), SHAPES)
+    """Other values of a number beside a strength: SHAPES of what is plausible, and evenly as far about where it is."""
+    number, far = Coordinates([shape]), shape.spread / shape.scale
+    here, step = number.of(np.array([at]))[0], 2.0 * far / (SHAPES - 1)
+    low, high = max(number.low[0], min(here, 0.0) - far), min(number.high[0], max(here, 0.0) + far)
+    away = np.arange(np.ceil((low - here) / step), np.floor((high - here) / step) + 1.0)
+    return number.values(here + step * away[away != 0.0][:, None])[:, 0]

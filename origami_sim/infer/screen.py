@@ -9,10 +9,10 @@ import numpy as np
 from origami_sim.effects import get
 from origami_sim.fit.chain import Chain
 from origami_sim.fit.evidence import Group
-from origami_sim.fit.hypothesis import Suspect, along_each_axis, scaled, usual
-from origami_sim.fit.least_squares import SLOWEST, Fit, changed, precision, small
+from origami_sim.fit.least_squares import SLOWEST, Fit, changed, small
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Suspect, along_each_axis, scaled, usual
 from origami_sim.threads import side_by_side
 
 SILENT = 0.3
@@ -139,7 +139,7 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     good = [s for s in found if s.parts and np.all(np.isfinite(np.concatenate(s.parts)))]
     if not good:
         return [replace(s, status=s.status or "its simulation goes unstable") for s in found]
-    prior = precision(base.free)
+    prior = base.coordinates.precision
 
     def columns(some: Sequence[int]) -> list[np.ndarray]:
         return [np.concatenate([line.tangent[n], *(s.parts[n] for s in good)], axis=1) for n in some]

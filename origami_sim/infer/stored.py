@@ -12,6 +12,7 @@ diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,10 @@ from scipy.linalg import solve_triangular
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, Problem, Sets, Summed, at_bounds
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.infer.remainder import mismatch
@@ -130,7 +131,7 @@ class Stored:
             for s, side, status in self.suspects
         ]
         out = Posterior(signatures, Weights(np.ones(1)), hyper)
-        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(self.nodes)
+        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(permutations(self.nodes, 2))
         prior = log_priors(signatures, hyper)
         for key, node in self.nodes.items():
             judge_by = place if key in self.wide else enter

@@ -14,14 +14,14 @@ from scipy.signal import savgol_filter
 from origami_sim.effects.crease_polynomial import EFFECT, ORDER, TERMS
 from origami_sim.fit.evidence import Group
 from origami_sim.fit.hyper import HYPER, Hyper
-from origami_sim.fit.hypothesis import Free, Suspect, scaled
+from origami_sim.fit.implied import OwnColumns
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.suspects import suspects, told_apart
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Free, Suspect, scaled
+from origami_sim.hypotheses.suspects import suspects, told_apart
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
-from origami_sim.infer.implied import OwnColumns
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.predict.track import followed
 

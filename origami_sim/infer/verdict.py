@@ -1,19 +1,18 @@
 """The verdict: sums over the posterior, put into words."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import logsumexp
 
 from origami_sim.effects import get
-from origami_sim.fit.least_squares import Fit, precision
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
 from origami_sim.infer.bursts import bursts
 from origami_sim.infer.discrepancy import laws, of_recorder
-from origami_sim.infer.implied import OwnColumns
-from origami_sim.infer.posterior import Key, Node, Posterior
+from origami_sim.infer.intervals import widened
+from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
@@ -273,7 +272,9 @@ def odds_of_numbers(given: Fit, base: Fit) -> float:
     assert line is not None
     if not line.tangent[0].shape[1]:
         return -np.inf
-    prior = np.maximum(precision(base.free), 1e-6)  # nothing is known to better than that of those without a prior
+    prior = np.maximum(
+        base.coordinates.precision, 1e-6
+    )  # nothing is known to better than that of those without a prior
     a = np.concatenate([*line.cleared(line.tangent), np.diag(prior)])
     size = np.abs(np.diag(np.linalg.qr(a, mode="r")))
     return float(0.5 * (given.misfit - base.cost) - np.sum(np.log(size / prior)))
@@ -357,42 +358,6 @@ def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]]
         if not any(c > d for d in out if d):
             out.append(c)
     return out, min(total, 1.0)
-
-
-def widened(p: Posterior, key: Key) -> Fit:
-    """A fit whose intervals count flaws and discrepancy."""
-    node = p.nodes[key]
-    f = node.fit
-    own = len(f.free) - len(f.hypothesis.free)
-    if not f.hypothesis.suspects:
-        return f
-    sd = deviations(node, p)
-    plain = f.deviations()
-    wider = np.ones(len(f.free))
-    wider[own:] = np.maximum(sd, plain[own:]) / np.maximum(plain[own:], 1e-300)
-    return replace(f, wider=wider)
-
-
-def deviations(node: Node, p: Posterior) -> np.ndarray:
-    """Standard deviations of the numbers of a fit's effects, in the order of its numbers [SI].
-
-    Their variances are the mean over all sizes of flaws and discrepancy.
-    """
-    own = OwnColumns(node.fit)
-    count, first = len(own.columns), len(own.nominal)
-    spread = np.concatenate([g.spread for g in own.groups])
-    strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in own.groups])
-    known = np.where(strength | ~np.isfinite(spread), 0.0, 1.0 / spread) ** 2
-    log = node.evidence + p.hyper.log_cells
-    variance = np.zeros(count)
-    for cell, weight in zip(node.grid, np.exp(log - logsumexp(log)), strict=True):
-        if cell is not None:
-            cover = np.linalg.pinv(cell.gram[:count, :count] + np.diag(known), rcond=1e-14)
-            variance += weight * np.maximum(np.diag(cover), 0.0)
-    out = np.zeros(count)
-    scale = np.array([node.fit.free[c].scale for c in own.columns])
-    out[np.array(own.columns) - first] = scale * np.sqrt(variance)
-    return out
 
 
 def _explained(b: Budget, left: str) -> str:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.nominal import GAP
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.nominal import GAP
 
 LASTING = 2
 """Segments in a row that have to depart, or else one by `ALONE`: a mishap of the recorder shows in one, and little."""

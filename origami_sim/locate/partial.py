@@ -11,9 +11,9 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.infer.diagnosis import Curve, Partial, Place
 from origami_sim.locate.locate import Motion, dynamics, frozen, locate, loose, motion
 from origami_sim.locate.locate_curves import places

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.channels import stacked
 from origami_sim.predict.filming import film

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.model import Model, Parameters
 
 Rows = list[tuple[slice, np.ndarray]]

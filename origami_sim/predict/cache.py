@@ -18,15 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.fit.hypothesis import Free, Hypothesis
 from origami_sim.fit.predictor import Prediction
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis
 from origami_sim.predict.worlds import Worlds
 from origami_sim.threads import leads, told
 
 WORTH = 0.02
 """Predictions that took less [s] are not stored."""
 
-_FOLDERS = "physics drive effects model pattern solve recording device observation fit predict".split()
+_FOLDERS = "physics drive effects model pattern solve recording device observation hypotheses fit predict".split()
 _SOURCES = ("*.py", *(f"{folder}/**/*.py" for folder in _FOLDERS))
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.fit.predictor import Block, Prediction
-from origami_sim.fit.suspects import at_several_times, told_apart
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
+from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.observation.observe import Poses, read_channel

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.distort import distorted

@@ -10,8 +10,8 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject
 from origami_sim.fit.predictor import Block
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Pose
 from origami_sim.predict.filming import even, film, film_step, pictured

@@ -8,7 +8,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import depths, turned_axes

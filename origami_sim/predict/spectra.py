@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import PLAUSIBLE, Suspect
+from origami_sim.hypotheses.hypothesis import Suspect
 
 IDLE = 1e-6
 """Part of its scale below which a branch does nothing: what bounded least squares leave of a number that a bound holds.
@@ -34,8 +34,7 @@ def with_spectra(every: Sequence[Suspect], shortest: float, longest: float) -> l
             free = []
             for n, t in enumerate(times, 1):
                 free.append(replace(stiffness, name=f"stiffness_{n}"))
-                given = {"start": float(t), "scale": float(t), "spread": PLAUSIBLE * float(t)}
-                free.append(replace(time, name=f"time_{n}", **given))
+                free.append(replace(time, name=f"time_{n}", start=float(t)))
             out.append(replace(s, free=tuple(free)))
     return out
 

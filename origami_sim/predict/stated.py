@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.predictor import Block
+from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.weight import weighed

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Suspect
+from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.predict.track import recorded_folds
 from origami_sim.predict.worlds import Worlds
 

@@ -10,9 +10,9 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Subject, apply
 from origami_sim.fit.predictor import Block, Prediction
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, apply
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Model, Parameters
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.begun import within

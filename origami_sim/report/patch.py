@@ -26,7 +26,7 @@ from origami_sim.device.scene import Settings
 from origami_sim.effects import CATALOGUE, Parameter, get
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect, apply, silent
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.infer.diagnosis import Candidate, Diagnosis
 from origami_sim.model import BODY, Model, Parameters
 from origami_sim.model.entities import OWNERS, WAYS, located

@@ -10,8 +10,8 @@ from origami_proof import command, rejudge
 from origami_sim.errors import InputError
 from origami_sim.fit.evidence import Group, problem
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.hypothesis import Free, Suspect
 from origami_sim.fit.linear import Linearisation, Rows
+from origami_sim.hypotheses.hypothesis import Free, Suspect
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.stored import Reduced, Stored
 

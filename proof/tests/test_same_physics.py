@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from origami_proof import case
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.prescribed import curves
 from origami_sim.predict.rigid import RigidRollouts

@@ -9,7 +9,7 @@ from scipy.integrate import solve_bvp
 
 from origami_proof import STRUCTURES, battery, case
 from origami_sim.device.scene import scene_module, scene_settings
-from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.observation.observe import follow, observe_equilibria
 from origami_sim.predict.prescribed import curves
 from origami_sim.recording import read_recording

@@ -19,7 +19,7 @@ from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Prediction
-from origami_sim.fit.subject import spreads
+from origami_sim.hypotheses.subject import spreads
 from origami_sim.predict import cache
 from origami_sim.recording import read_recording
 from origami_sim.report.page import read_report
@@ -115,9 +115,9 @@ def test_the_replay_shows_the_recorded_object_over_both_simulations(diagnosed):
 
 def test_films_are_what_was_fitted(recorded, monkeypatch):
     """The drawn simulation has the channels of the fit, and the drawn recording those that were measured."""
-    from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
+    from origami_sim.hypotheses.hypothesis import Hypothesis
     from origami_sim.observation.observe import panel_angle
     from origami_sim.predict.bars import BarRollouts
 
@@ -144,9 +144,9 @@ def test_films_are_what_was_fitted(recorded, monkeypatch):
 
 
 def test_an_error_of_one_channel_moves_no_node(recorded):
-    from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
     from origami_sim.fit.least_squares import fit
     from origami_sim.fit.weights import Weights
+    from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
     from origami_sim.predict.bars import BarRollouts
 
     subject, recording = Subject.from_scene(*single()), read_recording(recorded).window(0.0, 1.0)
@@ -194,8 +194,8 @@ def test_an_interrupted_diagnosis_goes_on_where_it_stopped(diagnosed, recorded, 
 
 def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeypatch):
     """Another start, number, site or recording never finds a stored prediction; a damaged file is computed again."""
-    from origami_sim.fit.hypothesis import Hypothesis
-    from origami_sim.fit.suspects import suspects
+    from origami_sim.hypotheses.hypothesis import Hypothesis
+    from origami_sim.hypotheses.suspects import suspects
     from origami_sim.predict.bars import BarRollouts
 
     monkeypatch.setattr(cache, "WORTH", 0.0)  # however quick they are
@@ -235,10 +235,10 @@ def test_stored_predictions_are_of_these_inputs_only(tmp_path, recorded, monkeyp
 def test_a_hypothesis_that_diverges_is_reported_and_no_crash(recorded, monkeypatch):
     import warp as wp
 
-    from origami_sim.fit.hypothesis import Hypothesis
     from origami_sim.fit.least_squares import fit
-    from origami_sim.fit.suspects import suspects
     from origami_sim.fit.weights import Weights
+    from origami_sim.hypotheses.hypothesis import Hypothesis
+    from origami_sim.hypotheses.suspects import suspects
     from origami_sim.predict.bars import BarRollouts
 
     @wp.func

@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from origami_sim.device.scene import read_calibration, scene_module, scene_settings
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.infer.screen import screen
 from origami_sim.locate.locate_curves import sign_changes
 from origami_sim.observation.observe import follow, observe_equilibria
@@ -132,7 +132,7 @@ def test_prescribed_relaxation_is_exact():
 
 
 def suspected(forward):
-    from origami_sim.fit.suspects import suspects
+    from origami_sim.hypotheses.suspects import suspects
 
     return suspects(forward.model, forward.recordings, forward.drives[0])
 

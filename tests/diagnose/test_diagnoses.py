@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Options, diagnose
-from origami_sim.fit.subject import alignments
+from origami_sim.hypotheses.subject import alignments
 from origami_sim.predict import rollouts
 from tests.diagnose.strips import record, subject
 

@@ -14,9 +14,9 @@ from origami_sim.diagnose.baselines import _samples, baselines
 from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
-from origami_sim.fit.hypothesis import Hypothesis, apply
-from origami_sim.fit.suspects import suspects
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis, apply
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.locate import locate, motion, motions_of, touching
 from origami_sim.model.articulation import Articulation

@@ -11,11 +11,11 @@ from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Hypothesis
 from origami_sim.fit.least_squares import carried_on, fit
-from origami_sim.fit.suspects import suspects
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.diagnosis import REVERSAL
-from origami_sim.infer.nominal import nominal_fits
 from origami_sim.locate.acting import _actions, acting
 from origami_sim.locate.locate import frozen, locate, motions_of, phase, reversals, since
 from origami_sim.locate.partial import partials

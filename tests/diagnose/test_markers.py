@@ -9,7 +9,7 @@ import pytest
 from origami_sim.diagnose import Subject, diagnose
 from origami_sim.diagnose.arrange import starting
 from origami_sim.drive import Drive, ramp
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid

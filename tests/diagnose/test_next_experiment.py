@@ -10,10 +10,10 @@ from scipy.stats import norm
 from origami_sim.diagnose.experiment import Prospect, entropy, propose
 from origami_sim.diagnose.menu import menu
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.suspects import suspects
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording.possible import Possible
 from origami_sim.recording.sidecar import Sidecar

@@ -7,7 +7,7 @@ from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
 from origami_sim.locate.onset import onset
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation

@@ -9,8 +9,8 @@ import pytest
 from origami_sim.device.scene import read_calibration, scene_module, scene_settings
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, apply
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.hypothesis import Hypothesis, apply
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.words import say
 from origami_sim.model.entities import located
 from origami_sim.report.patch import additions, read_additions, switched_on, write_patch

@@ -8,8 +8,8 @@ import pytest
 from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive
 from origami_sim.effects import get
-from origami_sim.fit.hypothesis import Hypothesis
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.observe import body_point, observe

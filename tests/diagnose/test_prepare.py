@@ -9,7 +9,7 @@ from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.errors import InputError
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.recording import Channel, NoiseReport, Recording
 from tests.diagnose.strips import hanging, record, subject
 

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from origami_sim.device.scene import read_calibration, recordings_folder
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.errors import InputError
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit, fit
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Channel, Recording, read_recording

@@ -16,12 +16,12 @@ from origami_sim.diagnose.tables import varying_drive
 from origami_sim.drive import Drive, sine
 from origami_sim.errors import InputError
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.hypothesis import Hypothesis
+from origami_sim.fit.implied import at_gap, log_evidence, with_own_noise
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.suspects import suspects
+from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.implied import at_gap, log_evidence, with_own_noise
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
 from origami_sim.infer.screen import screen

@@ -1,6 +1,7 @@
 """A stored search is judged anew as the search itself was, with these and with other hyperparameters."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from origami_sim.errors import InputError
 from origami_sim.fit.evidence import problem, summed
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.linear import Linearisation, Rows
-from origami_sim.fit.suspects import suspects
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import _node, enter, log_priors, place, search
@@ -66,7 +67,7 @@ def test_other_hyperparameters_give_what_the_fits_give_with_them(kept, changed):
     _, stored, forward, p = kept
     hyper = replace(HYPER, **changed)
     direct = Posterior(p.signatures, p.weights, hyper)
-    direct.failed, direct.renewed = dict(p.failed), set(p.nodes)
+    direct.failed, direct.renewed = dict(p.failed), set(permutations(p.nodes, 2))
     prior = log_priors(p.signatures, hyper)
     for key, node in p.nodes.items():
         again, _ = _node(direct, forward, key, node.fit)

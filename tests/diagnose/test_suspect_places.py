@@ -8,8 +8,8 @@ import pytest
 from origami_sim import Drive, Sheet, strip
 from origami_sim.device.scene import scene_settings
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.hypothesis import Hypothesis, along_each_axis, apply
-from origami_sim.fit.suspects import suspects, told_apart
+from origami_sim.hypotheses.hypothesis import Hypothesis, along_each_axis, apply
+from origami_sim.hypotheses.suspects import suspects, told_apart
 from origami_sim.model import node_mass
 from origami_sim.model.bodies import rigid
 from origami_sim.model.places import across, along, points, stretches

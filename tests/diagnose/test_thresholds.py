@@ -8,7 +8,7 @@ from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.suspects import suspects
 
 SWING = {"duration": 4.0, "panels": 2, "rate": 100}
 STOP = 0.45

@@ -11,9 +11,9 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.diagnose.tables import patch
 from origami_sim.effects.crease_polynomial import TERMS
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.suspects import suspects
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.budget import budget
-from origami_sim.infer.nominal import nominal_fits
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
 from origami_sim.infer.stored import Stored

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from origami_sim.fit.hyper import HYPER
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Estimate, Posterior, realised_part

@@ -9,7 +9,7 @@ from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.diagnose import diagnose
 from origami_sim.drive import Drive, series
 from origami_sim.errors import InputError
-from origami_sim.fit.suspects import suspects
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import magnets
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import MU0

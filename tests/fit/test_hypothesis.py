@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from origami_sim.fit.hypothesis import Hypothesis, distinct_sites
-from origami_sim.fit.suspects import suspects, told_apart
+from origami_sim.hypotheses.hypothesis import Hypothesis, distinct_sites
+from origami_sim.hypotheses.suspects import suspects, told_apart
 from origami_sim.predict.rigid import RigidRollouts
 from tests.diagnose.strips import record, subject
 

@@ -9,12 +9,12 @@ import pytest
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.fit.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.fit.least_squares import fit, linearise
+from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Block, Prediction
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import suspects
 from tests.diagnose.strips import hanging, record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}

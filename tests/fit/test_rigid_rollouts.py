@@ -12,10 +12,10 @@ from origami_sim.design.build import Sheet
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
-from origami_sim.fit.hypothesis import Hypothesis, scaled
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Hypothesis, scaled
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.unlisted import anywhere
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation

@@ -8,10 +8,10 @@ import pytest
 from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Subject, factor
 from origami_sim.drive import Drive, sine
-from origami_sim.fit.hypothesis import Hypothesis, Suspect
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.suspects import suspects
 from origami_sim.fit.weights import Weights
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model.bodies import rigid
 from origami_sim.pattern import strip
 from origami_sim.predict.begun import within

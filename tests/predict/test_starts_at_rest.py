@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim import Drive, Sheet, equilibrium, quasistatic, simulate
 from origami_sim.device.scene import read_calibration
-from origami_sim.fit.hypothesis import Free, Hypothesis, Subject, Suspect
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Subject, Suspect
 from origami_sim.model import State
 from origami_sim.model.model_file import model_tables, read_model
 from origami_sim.observation.observe import observe

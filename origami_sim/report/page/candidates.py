@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.fit.hypothesis import SEPARATOR
+from origami_sim.hypotheses.hypothesis import SEPARATOR
 from origami_sim.infer.diagnosis import Candidate, Diagnosis, Number
 from origami_sim.report.page.markup import MISSING, Html, amount, element, interval, number, times
 from origami_sim.report.page.measures import has_noise, known, multiples
@@ -26,6 +26,8 @@ def section(d: Diagnosis) -> list:
         "over the model without an effect. Error: root mean square over all channels, on data that were left out of "
         "the fit."
     )
+    if round(d.unfitted, 2) > 0.0:
+        about += f" Sets that were estimated and not fitted hold {d.unfitted:.2f}."
     out = [quiet(about), table(head, rows[:OPEN], "Explanations", kind="wide")]
     if len(rows) > OPEN:
         out.append(fold(f"{len(rows) - OPEN} more", table(head, rows[OPEN:], "More explanations", kind="wide")))
@@ -76,11 +78,9 @@ def _odds(c: Candidate) -> str:
 
 
 def _number(n: Number, *, owner: bool) -> Html:
-    spread, prior = known(n.spread), known(n.prior)
-    before = None
-    if np.isfinite(prior) and np.isfinite(spread) and spread > 0:
-        away = abs(known(n.value) - prior) / spread
-        before = element("small", f"before: {amount(prior, n.unit, 3)}, {away:.1f} sd away")
+    away, before = known(n.away), None
+    if np.isfinite(away):
+        before = element("small", f"before: {amount(known(n.prior), n.unit, 3)}, {away:.1f} sd away")
     bound = element("span", "at its bound", class_="badge") if n.at_bound else None
     value = interval(known(n.value), known(n.low), known(n.high), n.unit)
     name = element("span", number_of(n.label, owner=owner), class_="name")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.hypothesis import SEPARATOR
+from origami_sim.hypotheses.hypothesis import SEPARATOR
 from origami_sim.infer.diagnosis import REVERSAL, Curve, Diagnosis, Partial, Trace
 from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.report.page.markup import Html, element

@@ -4,7 +4,7 @@ import re
 from functools import cache
 
 from origami_sim.effects import CATALOGUE, get
-from origami_sim.fit.hypothesis import SEPARATOR
+from origami_sim.hypotheses.hypothesis import SEPARATOR
 from origami_sim.infer.words import WHOLE, title
 
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
