@@ -218,6 +218,8 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
         return
     _add(out, forward, key, fitted, log_priors(out.signatures))
     out.gains.setdefault(estimate.parent, []).append(out.total[key] - promise)
+    if estimate.parent and key in out.ranked:  # what the model without any had promised of it
+        out.gains.setdefault(frozenset(), []).append(out.total[key] - out.ranked[key])
     realised = estimate.gain, estimate.gain + out.total[key] - estimated
     out.realised.setdefault(estimate.parent, []).append(realised)
     if swapped is not None:
@@ -299,7 +301,7 @@ def _alone(out: Posterior) -> Key | None:
     instead = _in_place_of(out, best)
     if not instead or not singles:
         return next(iter(singles), None)
-    # to leave a strong effect out is not quite linear: the first one tells by how much others are underestimated
+    # to leave a strong effect out is not linear: the first one, which is fitted, tells what others are better by
     key = max(singles, key=lambda k: instead.get(k, np.inf))
     return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
 
