@@ -24,7 +24,11 @@ FAITHFUL = 0.7
 """Part of the promised improvement with which a step must come true for its derivatives to be used again."""
 
 SLOW = 0.5
-"""Part of what the step before promised, above which steps by derivatives of an earlier point converge too slowly."""
+"""Part of what the step before promised, above which steps by derivatives of an earlier point converge too slowly.
+
+A decay that is 25 times faster than where its fit begins takes 15 steps, with half 13, with 0.8 already 28. On four
+swings half and double change no word, and no probability by more than 0.013.
+"""
 
 SHORT = 0.2
 """Part of a step up to which it is too short to be bent."""

@@ -198,7 +198,8 @@ def _free(effect: str, name: str, entities) -> Free:
     assert p.typical is not None
     first = get(effect).parameter(get(effect).fitted[0])
     scale = abs(p.typical) or abs(first.typical or 1.0)
-    ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-") and not p.threshold
+    # an angle may be next to nothing, as in Coulomb's law, where its logarithm would go on for ever
+    ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-", "rad") and not p.threshold
     return Free(
         effect,
         name,

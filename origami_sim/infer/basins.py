@@ -7,7 +7,7 @@ priors, in batches; a loss that calms the model makes it linear, and what furthe
 fit.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from origami_sim.fit.profile import OWED, along_numbers, missed, several
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
 from origami_sim.infer.budget import FAR
-from origami_sim.infer.scan import GRID, Cleared, gained, next_shapes, over_numbers, over_shapes, over_their_range
+from origami_sim.infer.scan import GRID, Cleared, gained, over_numbers, over_shapes, over_their_range
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.words import pooled
 
@@ -57,17 +57,6 @@ def moved_on(forward: Predictor, f: Fit, found: tuple[np.ndarray, float] | None)
         return None
     other = fit(forward, f.hypothesis, f.weights, theta=found[0], local=f.local)
     return other if not other.failed and other.cost < f.cost else None
-
-
-def from_next_shapes(forward: Predictor, f: Fit) -> Iterator[Fit]:
-    """Fits that begin at the next values, on either side, of a number beside a strength; all else begins where it is.
-
-    Each value has the noise that it implies, in which it may be the best, while in that of another one it is not.
-    """
-    assert f.weights is not None and f.linear is not None
-    near = {"known": f.linear, "kept": len(forward.subject.nominals), "local": f.local}
-    for theta in next_shapes(forward, f):
-        yield fit(forward, f.hypothesis, f.weights, theta=theta, **near, most=16)
 
 
 def noticeable(s: Suspect) -> Suspect:

@@ -71,7 +71,7 @@ class Posterior:
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
-        renewed: sets fitted again, each with the larger one from whose fit. polished: what leaders gained that
+        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
             were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
             were better than they promised in the place of the best set. realised: log Bayes factors of sets over the
@@ -93,7 +93,7 @@ class Posterior:
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     smooth: list[np.ndarray] = field(default_factory=list)
-    renewed: set[tuple[Key, Key]] = field(default_factory=set)
+    renewed: set[Key] = field(default_factory=set)
     polished: dict[Key, float] = field(default_factory=dict)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False

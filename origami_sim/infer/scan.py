@@ -16,8 +16,7 @@ from origami_sim.fit.least_squares import UTMOST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import along_numbers, missed
 from origami_sim.fit.weights import Weights
-from origami_sim.hypotheses.coordinates import Coordinates
-from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
+from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
 from origami_sim.infer.screen import Signature
 
 DOUBTED = 0.01
@@ -41,10 +40,6 @@ SHAPES = 7
 With four, friction and drag of two real swings end 165 of log evidence lower, in another valley of the yield angle.
 Half and double change no word of four simulated swings, and no probability by more than 0.033.
 """
-
-
-BEYOND = 3.0
-"""Standard deviations, as its interval has them, beyond which a number may have another mode that is worth a look."""
 
 
 def strained(f: Fit) -> bool:
@@ -190,16 +185,6 @@ def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]
             yield k, thetas
 
 
-def next_shapes(forward: Predictor, f: Fit) -> list[np.ndarray]:
-    """Numbers (P,) of a fit with the next values, on either side, of one beside a strength, if far from its own."""
-    out, at = [], f.coordinates.of(f.theta)
-    for k, thetas in _along_shapes(forward, f):
-        below, above = thetas[thetas[:, k] < f.theta[k]], thetas[thetas[:, k] > f.theta[k]]
-        each = [*below[-1:], *above[:1]]
-        out += [t for t in each if abs(f.coordinates.of(t)[k] - at[k]) > BEYOND * f.spread[k]]
-    return out
-
-
 def _best_along(
     forward: Predictor, f: Fit, weights: Weights, each: Iterable[tuple[int, np.ndarray]]
 ) -> tuple[np.ndarray, float] | None:
@@ -249,9 +234,11 @@ def over_range(suspect: Suspect, grid: np.ndarray = GRID) -> list[np.ndarray]:
 
 
 def over_shape(shape: Free, at: float) -> np.ndarray:
-    """Other values of a number beside a strength: SHAPES of what is plausible, and evenly as far about where it is."""
-    number, far = Coordinates([shape]), shape.spread / shape.scale
-    here, step = number.of(np.array([at]))[0], 2.0 * far / (SHAPES - 1)
-    low, high = max(number.low[0], min(here, 0.0) - far), min(number.high[0], max(here, 0.0) + far)
-    away = np.arange(np.ceil((low - here) / step), np.floor((high - here) / step) + 1.0)
-    return number.values(here + step * away[away != 0.0][:, None])[:, 0]
+    """Values of a number beside a strength: SHAPES of what is plausible, and as evenly up to where it is beyond."""
+    if shape.lower >= 0.0 and shape.start > 0.0:
+        ends = max(shape.lower, shape.start / PLAUSIBLE), min(shape.upper, shape.start * PLAUSIBLE)
+        whole = min(ends[0], at or ends[0]), max(ends[1], at)
+        share = np.log(whole[1] / whole[0]) / np.log(ends[1] / ends[0])
+        return np.geomspace(*whole, round(SHAPES * share))
+    far = PLAUSIBLE * shape.scale
+    return np.linspace(max(shape.lower, shape.start - far), min(shape.upper, shape.start + far), SHAPES)

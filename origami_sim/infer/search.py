@@ -26,11 +26,10 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import OWED
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites
-from origami_sim.infer.basins import Calm, elsewhere, from_next_shapes
+from origami_sim.infer.basins import Calm, elsewhere
 from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
-from origami_sim.infer.intervals import widened
 from origami_sim.infer.judged import judged
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
@@ -301,7 +300,7 @@ def _alone(out: Posterior) -> Key | None:
     instead = _in_place_of(out, best)
     if not instead or not singles:
         return next(iter(singles), None)
-    # to leave a strong effect out is not linear: the first one, which is fitted, tells what others are better by
+    # to leave a strong effect out is not quite linear: the first one tells by how much others are underestimated
     key = max(singles, key=lambda k: instead.get(k, np.inf))
     return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
 
@@ -345,23 +344,15 @@ def polished(out: Posterior, forward: Predictor) -> bool:
         if not leaders:
             return some
         key, some = max(leaders, key=lambda k: out.total[k]), True
-        before, on, ways = out.total[key], True, key in fitted
-        while on:  # until neither the fit nor its noise changes any more
-            last, f = out.total[key], _carried_on(forward, out.nodes[key].fit)
-            on = not f.failed and _add(out, forward, key, f, prior) and out.total[key] >= last + OWED
-            if not on and ways:
-                ways = False
-                for other in from_next_shapes(forward, widened(out, key)):
-                    on |= not other.failed and _add(out, forward, key, other, prior, least=out.total[key] + OWED)
-        out.polished[key] = out.total[key] - before
-
-
-def _carried_on(forward: Predictor, f: Fit) -> Fit:
-    """A fit carried on in the noise that it has, with all derivatives taken where it ends."""
-    f = renewed(forward, f)
-    if f.cost - promised(forward, f) >= OWED:
-        f = carried_on(forward, f)
-    return f if f.failed or f.exact else renewed(forward, f)
+        out.polished[key] = 0.0
+        before, f = out.total[key], out.nodes[key].fit
+        f = renewed(forward, f)
+        if f.cost - promised(forward, f) >= OWED:
+            f = carried_on(forward, f)
+            f = f if f.failed or f.exact else renewed(forward, f)
+        if not f.failed:
+            _add(out, forward, key, f, prior)
+            out.polished[key] = out.total[key] - before
 
 
 def log_priors(signatures: Sequence[Signature], hyper: Hyper = HYPER) -> np.ndarray:
@@ -382,29 +373,22 @@ def _log_prior(key: Key, prior: np.ndarray, hyper: Hyper) -> float:
     return float(sum(prior[n] for n in key) + np.log(1.0 - hyper.effects) + gammaln(len(key) + 1))
 
 
-def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray, *, least: float = -np.inf) -> bool:
-    """Judges a fitted set, and all that add one or two effects to it if it leads, or leads those of its size.
-
-    It is not entered, and the answer is no, if its log posterior is less than `least`.
-    """
+def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
+    """Judges a fitted set, and all that add one or two effects to it if it leads, or leads those of its size."""
     node, effects = _node(out, forward, key, f)
-    total = float(logsumexp(node.evidence + out.hyper.log_cells)) + _log_prior(key, prior, out.hyper)
-    if total < least:
-        return False
-    if _leads(out, node, total):
+    if _leads(out, node, prior):
         own = OwnColumns(node.fit)
         coloured = node.fit.weights is not None and node.fit.weights.colour
         node.foresight = Foresight.of(forward, node.fit, own, effects, out.hyper) if coloured else None
         place(out, node, prior)
     else:
         enter(out, node, prior)
-    return True
 
 
-def _leads(out: Posterior, node: Node, total: float) -> bool:
-    """Whether a set holds part of the posterior, or is the best of so many effects, if it may be named of those."""
-    every = out.imitates(node.key)
-    others = {k: out.total[k] for k in out.nodes if k != node.key and (every or not out.imitates(k))}
+def _leads(out: Posterior, node: Node, prior: np.ndarray) -> bool:
+    """Whether a set holds part of the posterior, or is the best of so many effects."""
+    total = float(logsumexp(node.evidence + out.hyper.log_cells)) + _log_prior(node.key, prior, out.hyper)
+    others = {k: out.total[k] for k in out.nodes if k != node.key}
     alike = max((t for k, t in others.items() if len(k) == len(node.key)), default=-np.inf)
     return total >= min(alike, max(others.values(), default=-np.inf) + np.log(UNFITTED))
 
@@ -520,9 +504,9 @@ def _judge(
     for n, key in enumerate(keys):
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
-        if key in out.nodes and key and key < node.key and (key, node.key) not in out.renewed:
+        if key in out.nodes and key and key < node.key and key not in out.renewed:
             if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
-                out.renewed.add((key, node.key))
+                out.renewed.add(key)
                 out.hoped.pop(out.labels(key), None)
                 forget(out, key)
         if key in out.nodes or key in out.failed or n not in values:
@@ -559,9 +543,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
     members = _members(node.fit.hypothesis, out)
     line, count = node.fit.linear, len(forward.subject.nominals)
     assert line is not None and line.steps is not None and node.fit.weights is not None
-    fewer = max(estimate.groups, default=-1) < len(members)  # it lacks what hardly acts, and goes on from there
-    # else white, and with gaps that are no obstacle on the way
-    by = node.fit.weights if fewer else level(forward, node.fit)
+    by = level(forward, node.fit)  # white, and with gaps that are no obstacle on the way
     begin, steps, suspects = [node.fit.theta[:count]], [line.steps[:count]], []
     own = np.cumsum([count, *(len(s.free) for s in node.fit.hypothesis.suspects)])
     # of a signature, the part that changes little enough for a derivative, in the weights of the fit
@@ -582,9 +564,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
         column += len(node.groups[g].columns)
     hypothesis, parent = Hypothesis(tuple(suspects)), node.fit
     given, rough = out.begun.get(key), out.rough and len(suspects) == 1  # several begin from a calm fit
-    if fewer:
-        given = None
-    elif len(suspects) == 1 and strained(parent):
+    if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
     if given is not None:
         return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), rough)

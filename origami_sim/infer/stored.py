@@ -12,7 +12,6 @@ diagonal: with K of them and C effects that is C K numbers in place of (C + K)^2
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +130,7 @@ class Stored:
             for s, side, status in self.suspects
         ]
         out = Posterior(signatures, Weights(np.ones(1)), hyper)
-        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(permutations(self.nodes, 2))
+        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(self.nodes)
         prior = log_priors(signatures, hyper)
         for key, node in self.nodes.items():
             judge_by = place if key in self.wide else enter

@@ -101,10 +101,10 @@ def example(verdict: str = "MECHANISM", frames: int = 1200) -> Diagnosis:
     second = f"crease_friction at {middle}"
     traces = [ring_down(r, c, frames, rng) for r in ("first drop", "second <drop>") for c in range(3)]
     number = Number("crease_viscosity.viscosity", "N m s/rad", 2.13e-5, 2.04e-5, 2.22e-5, NAN, NAN, False)
-    stiffness = Number("crease.stiffness", "N m/rad", 1.312e-3, 1.29e-3, 1.33e-3, 1.25e-3, 5e-5, False)
+    stiffness = Number("crease.stiffness", "N m/rad", 1.312e-3, 1.29e-3, 1.33e-3, 1.25e-3, 5e-5, False, 1.24)
     friction = [
         Number("crease_friction.friction_moment", "N m", 8.1e-6, 6.4e-6, 9.8e-6, 0.0, math.inf, False),
-        Number("crease_friction.yield_angle", "rad", 0.03, 0.01, 0.05, 0.01, 0.01, True),
+        Number("crease_friction.yield_angle", "rad", 0.03, 0.01, 0.05, 0.01, 2.3, True, 0.48),
     ]
     rms = [4.1e-3, 4.0e-3, 4.2e-3]
     candidates = [

@@ -79,12 +79,17 @@ def test_positive_scales_beside_strengths_are_fitted_by_their_logarithms():
     scales = {(name, p) for name, e in CATALOGUE.items() for p in e.fitted if _free(name, p, None).logarithmic}
     assert {
         ("crease_relaxation", "time_1"),
-        ("crease_friction", "yield_angle"),
+        ("stribeck", "fading_speed"),
         ("ground_compliance", "reach"),
     } <= scales
     for name, number in scales:
         f = _free(name, number, None)
         assert f.start > 0.0 and f.lower >= 0.0 and f.spread == pytest.approx(np.log(PLAUSIBLE)), name
-    # a strength may be absent; thresholds lie within what was recorded; a ratio may be nothing
-    absent = {("crease_friction", "friction_moment"), ("crease_stop", "stop_angle"), ("field_slope", "narrowing")}
+    # a strength and an angle may be nothing; thresholds lie within what was recorded; a ratio may be nothing
+    absent = {
+        ("crease_friction", "friction_moment"),
+        ("crease_friction", "yield_angle"),
+        ("crease_stop", "stop_angle"),
+        ("field_slope", "narrowing"),
+    }
     assert not absent & scales
