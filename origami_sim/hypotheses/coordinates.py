@@ -1,6 +1,6 @@
 """Coordinates in which numbers are fitted: departures from where they begin, over their scales.
 
-A number that is a positive scale itself, such as a time constant or a yield angle, is fitted by its logarithm: what is
+A number that is a positive scale itself, such as a time constant, is fitted by its logarithm: what is
 known of it beforehand is its order of magnitude, and what it does changes by factors (a log-normal prior).
 """
 
