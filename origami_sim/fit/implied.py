@@ -89,8 +89,8 @@ class OwnColumns:
 
     def __init__(self, f: Fit):
         self.nominal = np.arange(len(f.free) - len(f.hypothesis.free))
-        numbers, at = f.coordinates, f.coordinates.of(f.theta)
-        self.precision, self.away = numbers.precision, -at
+        numbers = f.coordinates
+        self.precision, self.away = numbers.precision, f.away
         self.columns: list[int] = []
         self.groups: list[Group] = []
         place = len(self.nominal)
@@ -106,7 +106,7 @@ class OwnColumns:
             spread = np.array([inner[k].spread / inner[k].scale for k in arranged])
             sizes = usual(s, [inner[k] for k in arranged])
             ends = numbers.low[mine], numbers.high[mine]
-            self.groups.append(Group(columns, len(strong), at[mine], side, spread, *ends, sizes))
+            self.groups.append(Group(columns, len(strong), -self.away[mine], side, spread, *ends, sizes))
             place += len(inner)
 
     def problem(self, chain: Chain, count: int) -> Problem:

@@ -21,13 +21,9 @@ CHORD = (1.0, 0.4)
 """The same while derivatives of an earlier point are in use; if none of them helps, the derivatives are taken anew."""
 
 FAITHFUL = 0.7
-"""Part of the promised improvement with which a step must come true for its derivatives to be used again."""
+"""Part of the promised improvement with which a step must come true for its derivatives to be used again.
 
-SLOW = 0.5
-"""Part of what the step before promised, above which steps by derivatives of an earlier point converge too slowly.
-
-A decay that is 25 times faster than where its fit begins takes 15 steps, with half 13, with 0.8 already 28. On four
-swings half and double change no word, and no probability by more than 0.013.
+What the next step by them promises may be the rest of that at most: more says that they converge too slowly.
 """
 
 SHORT = 0.2
@@ -412,7 +408,7 @@ def fit(
             if best - there[0] > owed:
                 break
         faithful, stuck = straight > FAITHFUL * whole, gain < enough
-        lagging, before = level == STALE and whole > SLOW * before, whole
+        lagging, before = level == STALE and whole > (1.0 - FAITHFUL) * before, whole
         if stuck and level == ALL:
             break
         if found is not None:

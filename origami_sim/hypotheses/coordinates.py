@@ -1,7 +1,7 @@
 """Coordinates in which numbers are fitted: departures from where they begin, over their scales.
 
-A number that is a positive scale itself, such as a time constant, is fitted by its logarithm: what is
-known of it beforehand is its order of magnitude, and what it does changes by factors (a log-normal prior).
+A number that is a positive scale itself, such as a time constant, is fitted by its logarithm: what is known of it
+beforehand is its order of magnitude, and what it does changes by factors (a log-normal prior).
 """
 
 from collections.abc import Sequence
