@@ -1,4 +1,7 @@
-"""Eccentric weight: of a patch that sits on one side of the sheet, off the mid-plane."""
+"""Eccentric weight: of a patch that sits on one side of the sheet, off the mid-plane.
+
+Rigid panels get its inertia as well, by mass points off the mid-plane in place of this law (`bodies.eccentric`).
+"""
 
 import warp as wp
 

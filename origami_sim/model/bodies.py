@@ -5,13 +5,14 @@ the same six second moments. They are nodes like others, so that every law that 
 acts on the true body, off its mid-plane if that is where it lies.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError
-from origami_sim.model.model import STATED, Model, Parameters
+from origami_sim.model.model import STATED, Model, Parameters, node_mass
 
 TETRAHEDRON = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Corners whose mean is zero and whose mean square along every axis is one."""
@@ -146,6 +147,42 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
             new = old
         given.replace(owner, name, new)
     return out, given
+
+
+def eccentric(model: Model, parameters: Parameters) -> Callable[[np.ndarray], np.ndarray] | None:
+    """How far eccentric weights move the mass points of rigid panels off the mid-plane; None: there are none.
+
+    With its mass points there, a panel has the inertia of such a weight as well as its moment, which `centred`
+    parameters then lack.
+
+    Returns: of positions [N, W, 3] [m] the displacements [N, W, 3] [m] that the centres of the panels' masses need.
+    """
+    if "eccentric_weight" not in model.effects or not len(model.carriers):
+        return None
+    moment = parameters["eccentric_weight", "mass"] * parameters["eccentric_weight", "offset"]
+    if not np.any(moment):
+        return None
+    first = len(model.position) - len(model.carriers)
+    points = {p: first + np.flatnonzero(model.carriers == p) for p in np.unique(model.carriers)}
+    mass = node_mass(model, parameters)
+
+    def displacement(x: np.ndarray) -> np.ndarray:
+        a, b, c = (x[model.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        along = moment[:, :, None] * normal / np.linalg.norm(normal, axis=2, keepdims=True)
+        out = np.zeros_like(x)
+        for panel, mine in points.items():
+            out[mine] = along[model.triangle_panel == panel].sum(axis=0) / mass[mine].sum(axis=0)[:, None]
+        return out
+
+    return displacement
+
+
+def centred(parameters: Parameters) -> Parameters:
+    """The parameters without eccentric weights: of a model whose mass points lie off the mid-plane in their place."""
+    out = parameters.copy()
+    out.replace("eccentric_weight", "offset", np.zeros((len(out["eccentric_weight", "offset"]), 1)))
+    return out
 
 
 def body_of(parameters: Parameters, panel: int) -> tuple[np.ndarray, np.ndarray]:

@@ -41,7 +41,7 @@ APART = {
 UNLIKE = {
     "mullins": "stiffness that folding destroys is of fibres in the truth, of the whole crease here",
     "static_friction": "falls with speed by another law",
-    "eccentric_weight": "the patch has a mass of its own here; its inertia is left out",
+    "eccentric_weight": "the patch has a mass of its own in the truth, the mass of its panel here",
 }
 """Effects whose size means something else: only the sign is compared."""
 

@@ -166,6 +166,43 @@ def test_a_body_hangs_from_its_crease_by_its_own_inertia_off_the_plane():
     assert np.abs(swing - expected).max() < 1e-8
 
 
+@pytest.mark.parametrize("held", [True, False])
+def test_an_eccentric_weight_has_its_inertia(held):
+    """The law moves the centre of a panel's mass: the same swing, or flight, as of a body whose centre is stated there."""
+    offset = 0.02
+
+    def run(lift, law):
+        free = Sheet(strip([0.05, 0.08, 0.06], 0.04), thickness=2e-3, panels="rigid").gravity()
+        sheet = hanging((0.04, 0.2, 0.15)) if held else free
+        model, parameters = sheet.build()
+        centre, inertia = body_of(parameters, 2)
+        mass, normal = parameters["body", "mass"][2, 0], panel_normal(model, 2)
+        sheet.body(2, mass=mass, centre=centre + lift * normal, inertia=inertia)
+        model, parameters = sheet.build()
+        if law:
+            model = model.with_effects("eccentric_weight")
+            parameters = parameters.for_model(model)
+            mine = np.flatnonzero(model.triangle_panel == 2)
+            parameters.set("eccentric_weight", "mass", mass / len(mine), mine)
+            parameters.set("eccentric_weight", "offset", law, mine)
+        state = folded(model, [0.9, -0.5], [1.0, 3.0])
+        half = simulate(model, parameters, duration=0.3, rate=50.0, state=state, tolerance=1e-12)
+        rest = simulate(model, parameters, duration=0.3, rate=50.0, state=half.state, tolerance=1e-12)
+        assert np.ptp(rest.energy_balance()) < 1e-8 * rest.energies["kinetic"].max()
+        corners = len(model.position) - len(model.carriers)
+        return np.concatenate([half.x, rest.x])[:, :corners], np.concatenate([half.creases, rest.creases])
+
+    (x, angles), (stated, expected) = run(0.0, offset), run(offset, 0.0)
+    assert np.abs(angles - expected).max() < 1e-8
+    assert np.abs(x - stated).max() < 1e-8
+    assert np.abs(angles - run(0.0, 0.0)[1]).max() > 0.01
+
+
+def panel_normal(model, panel):
+    a, b, c = model.position[model.triangles[np.flatnonzero(model.triangle_panel == panel)[0]]]
+    return np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))
+
+
 @pytest.mark.parametrize("held", ["line", "point", "plane"])
 def test_a_panel_held_at_some_nodes_turns_about_them(held):
     sheet = Sheet(grid(1, 1, 0.1, 0.06), thickness=2e-3, material="aluminium", panels="rigid").gravity()

@@ -8,7 +8,7 @@ import warp as wp
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, bodies
 from origami_sim.model.articulation import Articulation
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels import articulated
@@ -59,6 +59,10 @@ class RigidBatch(Batch):
         self.tree_of = tree or Topology(model)
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
+        self._eccentric = bodies.eccentric(model, parameters)
+        if self._eccentric is not None:
+            state = replace(state, x=state.x + self._eccentric(state.x))
+            parameters = bodies.centred(parameters)
         super().__init__(model, parameters, drive, state, **options)
         self.tolerance, self.finest = tolerance, FINEST
         self._fresh = 1
@@ -239,6 +243,11 @@ class RigidBatch(Batch):
     def carry(self, path: np.ndarray, dt: float, noted: Sequence[int] = ()) -> np.ndarray:
         """Refused: rigid panels that are carried along a path are held; see `batch_of`."""
         raise InputError("only held panels can be carried", field="carry", allowed="a model that is held everywhere")
+
+    def state(self) -> State:
+        """See `Batch.state`; mass points are where the model has them, whatever eccentric weights there are."""
+        out = super().state()
+        return out if self._eccentric is None else replace(out, x=out.x - self._eccentric(out.x))
 
     def place(self, x: np.ndarray, angles: np.ndarray, memory: np.ndarray | None = None):
         """See `Batch.place`: what asks for forces there needs no tree; to move on from there, make another batch."""
