@@ -340,7 +340,7 @@ def least_within(a: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray
         force = np.where(held, 0.0, b - (a @ y[..., None])[..., 0])
         free = np.where(held[:, :, None] | held[:, None, :], np.eye(k), a)
         step = np.linalg.solve(free, force[..., None])[..., 0]
-        room = np.where(step > 0, high - y, y - low) / np.maximum(np.abs(step), 1e-300)
+        room = np.where(step > 0, high - y, y - low) / np.maximum(np.abs(step), 1e-200)
         y = np.clip(y + step * np.minimum(1.0, room.min(axis=-1, initial=1.0, where=~held))[:, None], low, high)
         found[going] = y
         pull = (b - (a @ y[..., None])[..., 0]) / root[going]

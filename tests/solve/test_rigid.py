@@ -168,7 +168,7 @@ def test_a_body_hangs_from_its_crease_by_its_own_inertia_off_the_plane():
 
 @pytest.mark.parametrize("held", [True, False])
 def test_an_eccentric_weight_has_its_inertia(held):
-    """The law moves the centre of a panel's mass: the same swing, or flight, as of a body whose centre is stated there."""
+    """The law moves the centre of a panel's mass: the same motion as of a body whose centre is stated there."""
     offset = 0.02
 
     def run(lift, law):

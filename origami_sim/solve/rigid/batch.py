@@ -8,8 +8,9 @@ import warp as wp
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State, bodies
+from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
+from origami_sim.model.bodies import centred, eccentric
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels import articulated
 from origami_sim.solve.kernels.runge_kutta import TABLEAU
@@ -59,10 +60,10 @@ class RigidBatch(Batch):
         self.tree_of = tree or Topology(model)
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
-        self._eccentric = bodies.eccentric(model, parameters)
+        self._eccentric = eccentric(model, parameters)
         if self._eccentric is not None:
             state = replace(state, x=state.x + self._eccentric(state.x))
-            parameters = bodies.centred(parameters)
+            parameters = centred(parameters)
         super().__init__(model, parameters, drive, state, **options)
         self.tolerance, self.finest = tolerance, FINEST
         self._fresh = 1
