@@ -1,6 +1,7 @@
 """Eccentric weight: of a patch that sits on one side of the sheet, off the mid-plane.
 
-Rigid panels get its inertia as well, by mass points off the mid-plane in place of this law (`bodies.eccentric`).
+Rigid panels get its inertia as well: their mass points lie off the mid-plane, and have their weight there, of which
+this law then has what is not of the model's gravity (`bodies.eccentric`).
 """
 
 import warp as wp

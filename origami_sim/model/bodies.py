@@ -152,8 +152,8 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
 def eccentric(model: Model, parameters: Parameters) -> Callable[[np.ndarray], np.ndarray] | None:
     """How far eccentric weights move the mass points of rigid panels off the mid-plane; None: there are none.
 
-    With its mass points there, a panel has the inertia of such a weight as well as its moment, which `centred`
-    parameters then lack.
+    With its mass points there, a panel has the inertia of such a weight as well, and what `gravity` pulls at it, which
+    the law of `centred` parameters then lacks.
 
     Returns: of positions [N, W, 3] [m] the displacements [N, W, 3] [m] that the centres of the panels' masses need.
     """
@@ -178,10 +178,14 @@ def eccentric(model: Model, parameters: Parameters) -> Callable[[np.ndarray], np
     return displacement
 
 
-def centred(parameters: Parameters) -> Parameters:
-    """The parameters without eccentric weights: of a model whose mass points lie off the mid-plane in their place."""
+def centred(model: Model, parameters: Parameters) -> Parameters:
+    """The parameters of a model whose mass points lie where eccentric weights move them: the law without `gravity`."""
     out = parameters.copy()
-    out.replace("eccentric_weight", "offset", np.zeros((len(out["eccentric_weight", "offset"]), 1)))
+    if "gravity" in model.effects:
+        first = len(model.position) - len(model.carriers)
+        of = [first + int(np.flatnonzero(model.carriers == p)[0]) for p in model.triangle_panel]
+        for axis in ("gravity_x", "gravity_y", "gravity_z"):
+            out.replace("eccentric_weight", axis, out["eccentric_weight", axis] - out["gravity", axis][of])
     return out
 
 

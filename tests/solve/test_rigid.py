@@ -198,6 +198,23 @@ def test_an_eccentric_weight_has_its_inertia(held):
     assert np.abs(angles - run(0.0, 0.0)[1]).max() > 0.01
 
 
+def test_an_eccentric_weight_swings_by_a_gravity_of_its_own():
+    """Small swings of a plate that nothing else pulls at: the moment of the weight, and the inertia that it adds."""
+    offset = 0.02
+    model, parameters = hanging((0.04, 0.1)).build()
+    model = model.with_effects("eccentric_weight", without=("gravity",))
+    parameters, mine = parameters.for_model(model), np.flatnonzero(model.triangle_panel == 1)
+    centre, inertia = body_of(parameters, 1)
+    mass, normal = parameters["body", "mass"][1, 0], panel_normal(model, 1)
+    parameters.set("eccentric_weight", "mass", mass / len(mine), mine).set("eccentric_weight", "offset", offset, mine)
+    for axis, g in zip("xyz", G * normal, strict=True):
+        parameters.set("eccentric_weight", f"gravity_{axis}", g)
+    arm = np.hypot(offset, centre[2] + 0.04)
+    period = 2 * np.pi * np.sqrt((inertia[1, 1] + mass * arm**2) / (mass * offset * G))
+    run = simulate(model, parameters, duration=2 * period, rate=100.0, state=folded(model, [1e-4]))
+    assert np.abs(run.creases[:, 0, 0] - 1e-4 * np.cos(2 * np.pi * run.times / period)).max() < 1e-8
+
+
 def panel_normal(model, panel):
     a, b, c = model.position[model.triangles[np.flatnonzero(model.triangle_panel == panel)[0]]]
     return np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))

@@ -63,7 +63,7 @@ class RigidBatch(Batch):
         self._eccentric = eccentric(model, parameters)
         if self._eccentric is not None:
             state = replace(state, x=state.x + self._eccentric(state.x))
-            parameters = centred(parameters)
+            parameters = centred(model, parameters)
         super().__init__(model, parameters, drive, state, **options)
         self.tolerance, self.finest = tolerance, FINEST
         self._fresh = 1
