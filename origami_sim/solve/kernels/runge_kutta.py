@@ -25,14 +25,6 @@ TABLEAU = np.array(
 """Times and weights of the stages, and the weights of the error (fifth less fourth order)."""
 
 
-REVERSAL = 0.01
-"""Turn that a reversal may lose within a step [rad], over the root of the error that a step may have [rad].
-
-That is 1e-6 where a step may be off by 1e-8. Swings with dry friction that yields in 3 mrad are then off by 5e-6 rad
-after 3 s, by 2.5e-5 with ten times as much, and by 7.6e-4 without this; the time that they take is the same.
-"""
-
-
 @wp.func
 def step_of(tree: Tree, clock: scalar, dt: scalar, tolerance: scalar, w: int):
     """Length of the next step within one of dt, of which `clock` is over: never one that leaves a crumb."""
@@ -47,7 +39,7 @@ def step_of(tree: Tree, clock: scalar, dt: scalar, tolerance: scalar, w: int):
 def lengthen(tree: Tree, step: scalar, error: scalar, cut: int, w: int):
     """Sets the length of the next step from the error of one, over what is allowed; returns it.
 
-    A step that was cut off by the end of a frame says nothing against the longer ones before.
+    A step that was cut off by the end of a frame or a reversal says nothing against the longer ones before.
     """
     k = w * tree.width + tree.span
     factor = scalar(0.1)  # also where the error is not a number
@@ -206,21 +198,25 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
 
 
 @wp.func
-def reversal_of(tree: Tree, h: scalar, tolerance: scalar, w: int):
-    """Turn of a hinge forth and back within a step of h that laws with memory do not see, as an error of a step.
+def reversal(tree: Tree, h: scalar, tolerance: scalar, w: int):
+    """When a hinge reverses within a step of h, by its rates, if it turns forth and back by more than it may be off.
 
-    They are told by how much a hinge has turned from the step's begin to its end.
+    Laws with memory are told by how much a hinge has turned since the step's begin, so a step has to end there.
+    Infinite if none does; what is left after a step to there falls with the fourth power of h.
     """
-    o = w * tree.width
-    lost = scalar(0.0)
+    most = tolerance
+    when = scalar(wp.inf)
     for i in range(tree.roots, tree.rates):
-        before = wp.abs(at(tree.data, o + tree.u0 + i))
-        after = wp.abs(at(tree.data, o + tree.u + i))
-        if at(tree.data, o + tree.u0 + i) * at(tree.data, o + tree.u + i) < scalar(0.0):
-            least = wp.min(before, after)
-            lost = wp.max(lost, scalar(0.5) * h * least * least / (before + after))
-    # what is lost falls with the square of the step, an error with its fifth power
-    return tolerance * wp.pow(lost / (scalar(REVERSAL) * wp.sqrt(tolerance)), scalar(2.5))
+        before = at(tree.data, w * tree.width + tree.u0 + i)
+        after = at(tree.data, w * tree.width + tree.u + i)
+        if before * after < scalar(0.0):
+            part = before / (before - after)
+            least = wp.min(part, scalar(1.0) - part)
+            lost = scalar(0.5) * h * wp.abs(before - after) * least * least
+            if lost > most:
+                most = lost
+                when = h * part
+    return when
 
 
 @wp.func

@@ -164,6 +164,7 @@ def rigid({arguments}
         begin = int(-1)
     for s in range(begin, steps):
         clock = scalar(0.0)
+        until = scalar(wp.inf)  # when a hinge reverses
         going = int(1)
         still = int(0)  # a pass that finds accelerations and takes no time
         if s < 0:
@@ -176,8 +177,14 @@ def rigid({arguments}
         while going == 1:
             step = runge_kutta.step_of(tree, clock, dt, tolerance, w)
             ends = int(0)
+            cut = int(0)
             if step == dt - clock:
                 ends = int(1)
+                cut = int(1)
+            if until < step:
+                step = until
+                ends = int(0)
+                cut = int(1)
             first_stage = int(1)
             if still == 1:
                 step = scalar(0.0)
@@ -203,23 +210,25 @@ def rigid({arguments}
                 allowed = scalar(1.0)  # a step as given only may not turn anything by radians more than it should
             error = scalar(0.0)
             longer = dt
+            until = scalar(wp.inf)
             if still == 0:
-                error = runge_kutta.error_of(tree, step, size, w)
-                if tolerance > scalar(0.0) and tree.memories > 0:
-                    error = runge_kutta.larger(error, runge_kutta.reversal_of(tree, step, tolerance, w)){swept}
-            if error <= allowed:
+                error = runge_kutta.error_of(tree, step, size, w){swept}
+                if tolerance > scalar(0.0) and tree.memories > 0 and error <= allowed:
+                    until = runge_kutta.reversal(tree, step, tolerance, w)
+            if error <= allowed and until > step:
                 runge_kutta.carry_over(tree, work, step, w)
                 clock += step
                 if s < 0 or (still == 0 and ends == 1):
                     going = int(0)
                 if still == 0 and tolerance > scalar(0.0):
-                    longer = runge_kutta.lengthen(tree, step, error / allowed, ends, w)
+                    longer = runge_kutta.lengthen(tree, step, error / allowed, cut, w)
                 still = int(0){halt}
             else:
                 runge_kutta.go_back(tree, angles, memory, power, w)
-                longer = scalar(0.0)
-                if tolerance > scalar(0.0):
-                    longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
+                if not (error <= allowed):
+                    longer = scalar(0.0)
+                    if tolerance > scalar(0.0):
+                        longer = runge_kutta.lengthen(tree, step, error / allowed, 0, w)
             if longer <= finest:
                 status[0, w] = first_step + s + 1
                 articulated.place(tree, X, V, F, tree.moving.shape[0], w)
