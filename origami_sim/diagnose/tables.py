@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.fit.least_squares import LITTLE, Fit
+from origami_sim.fit.least_squares import OWED, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Candidate, Correlation, Number, Suspected, Trace
 from origami_sim.infer.intervals import widened
@@ -59,7 +59,7 @@ def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
         return "the simplest"
     best = next(k for k, n in p.nodes.items() if n.fit.hypothesis is judged.best.hypothesis)
     misses = _squares(forward, f) - _squares(forward, p.nodes[best].fit)
-    if misses < LITTLE:
+    if misses < OWED:
         return "no better for its further numbers"
     return f"misses the recordings by {misses:.3g} more in squares over the noise"
 

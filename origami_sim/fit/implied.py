@@ -3,6 +3,7 @@
 Every hypothesis is judged by its own (empirical Bayes), so that what one of them leaves is no noise to another.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -10,10 +11,9 @@ import numpy as np
 from origami_sim.fit.chain import Chain
 from origami_sim.fit.evidence import Group, Problem, Sets, reduced, summed
 from origami_sim.fit.hyper import Hyper
-from origami_sim.fit.least_squares import Fit, smoothed
+from origami_sim.fit.least_squares import OWED, Fit, settled, smoothed
 from origami_sim.fit.nominal import white
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.profile import OWED
 from origami_sim.fit.residual_process import residual_process
 from origami_sim.fit.weights import Weights, log_volume
 from origami_sim.hypotheses.hypothesis import usual
@@ -24,8 +24,30 @@ ROUNDS = 4
 in place of 91, with the same verdict and numbers (within 0.1 %)."""
 
 
-def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
-    """A fit in the most probable noise that it implies: no gaps beside its own are more probable. All is linear."""
+def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] = ()) -> tuple[Fit, float]:
+    """A fit in the most probable noise that it implies, and the squares that it promises there and does not gain.
+
+    Noise is told by what a fit leaves, and that by the noise, so that several may suit each other. Beside those that
+    follow from white noise and gaps of every size, those that suit other hypotheses (`known`) and the fit's own are
+    tried. All are compared by derivatives; in the most probable ones the fit goes on by them, as far as its steps come
+    true: what they promise beyond that counts for nothing.
+    """
+    found = [*implied(forward, f, hyper)]
+    for noise in known if f.weights is None or not f.weights.colour else (f.weights, *known):
+        other = f.reweighted(noise)
+        found.append(climbed(forward, other, log_evidence(other), (True,)))
+    best, most = (f, 0.0), -np.inf
+    for log, one in sorted(found, key=lambda each: -each[0]):
+        if log <= most:
+            break
+        one, owed = settled(forward, one)
+        if (log := log_evidence(one) - 0.5 * owed) > most:
+            best, most = (one, owed), log
+    return best
+
+
+def implied(forward: Predictor, f: Fit, hyper: Hyper) -> list[tuple[float, Fit]]:
+    """Log evidence of a fit and itself in noise that follows from white noise: no gaps beside the best are better."""
     assert f.linear is not None and f.weights is not None
     sizes = hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
     place = int(np.argmax(shared([partial(log_evidence, f, gap) for gap in sizes])))
@@ -36,7 +58,7 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper) -> Fit:
                 fits[n] = at_gap(forward, f, sizes[n])
         best = max(fits, key=lambda n: fits[n][0])
         if best == place:
-            return fits[place][1]
+            return list(fits.values())
         place = best
 
 
@@ -47,11 +69,17 @@ def at_gap(forward: Predictor, f: Fit, gap: float) -> tuple[float, Fit]:
     data. So levels and colours that are read from it are taken only while the evidence grows, white ones first.
     """
     assert f.weights is not None
-    log = log_evidence(best := f.reweighted(white(forward, f.weights.deviation, gap)))
-    for coloured in (False, True):
+    begin = f.reweighted(white(forward, f.weights.deviation, gap))
+    return climbed(forward, begin, log_evidence(begin), (False, True))
+
+
+def climbed(forward: Predictor, best: Fit, log: float, kinds: Sequence[bool]) -> tuple[float, Fit]:
+    """Log evidence and fit with noise that is read from what the fit leaves while that raises the evidence."""
+    for coloured in kinds:
         for _ in range(ROUNDS):
             assert best.weights is not None
-            new = best.reweighted(left_by(forward, smoothed(forward, best, best.weights), gap, coloured=coloured))
+            left = smoothed(forward, best, best.weights)
+            new = best.reweighted(left_by(forward, left, best.weights.gap, coloured=coloured))
             if (found := log_evidence(new)) < log + OWED:
                 break
             best, log = new, found

@@ -48,11 +48,11 @@ LARGEST = 0.01
 """Part of what is plausible by which a start is changed at most. Half and double change no word of four swings, and
 probabilities by 0.003 and 0.03."""
 
-DONE = 3e-3
-"""A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than LITTLE."""
+OWED = 1.0
+"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
-LITTLE = 0.2
-"""An improvement of the weighted squares that decides nothing."""
+DONE = 3e-3
+"""A fit ends when a step improves it by less than this part of what it misses beyond the noise, or than OWED."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,9 +379,14 @@ def fit(
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
         change, moves, hoped = _proposed(forward, numbers, theta, local, blocks, line)
-        enough = max(LITTLE, done * (best - floor))
+        enough = max(OWED, done * (best - floor))
         whole, gain, found = best - hoped, 0.0, None
         if whole < enough and (level > STALE or not width):
+            trial, start = numbers.values(numbers.of(theta) + change), local + moves
+            # what the last step promises decides nothing, but fits that all take it can be compared
+            if not too_slow(trial, slow) and (last := at(trial, start))[0] < best:
+                best, gaps, theta, local = last
+                line = line.at(gaps)
             break
         trying = STEPS if level == ALL or not n else CHORD
         straight = 0.0
@@ -459,6 +464,28 @@ def promised(forward, f: Fit) -> float:
     """The cost that one more step promises a fit, by the derivatives that it has."""
     assert f.linear is not None
     return _proposed(forward, f.coordinates, f.theta, f.local, f.blocks, f.linear)[2]
+
+
+def settled(forward, f: Fit, most: int = 8) -> tuple[Fit, float]:
+    """A fit after further steps by the derivatives that it has, and the squares that these promise and do not gain.
+
+    Where gaps are small a step breaks ties by its curvature, which the next one mends. So steps are whole, and need not
+    gain one by one (a watchdog, Chamberlain et al. 1982), as long as each misses less than the one before.
+    """
+    assert f.weights is not None
+    at, best = f, f
+    for n in range(most):
+        assert at.linear is not None
+        change, moves, hoped = _proposed(forward, at.coordinates, at.theta, at.local, at.blocks, at.linear)
+        if best.cost - hoped < OWED:
+            break
+        theta, local = at.coordinates.values(at.coordinates.of(at.theta) + change), at.local + moves
+        line = at.linear.at(residuals(forward, f.hypothesis, theta, local, f.blocks, f.weights))
+        before, at = at, _finished(forward, f.hypothesis, f.free, theta, local, f.blocks, f.weights, line)
+        if not at.cost < (before.cost if n else np.inf):
+            break
+        best = min(best, at, key=lambda one: one.cost)
+    return best, max(best.cost - promised(forward, best), 0.0)
 
 
 def _proposed(

@@ -4,13 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.least_squares import OWED, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
-
-OWED = 1.0
-"""Squares over the noise, or log evidence, that a fit has to gain by going on: less decides nothing."""
 
 NUMBERS, PRIOR = 41, 2.0
 """Values of a number of the model that are tried, and within how many standard deviations of its prior.

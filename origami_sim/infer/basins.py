@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from origami_sim.effects import get
-from origami_sim.fit.least_squares import Fit, carried_on, fit
+from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit
 from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.profile import OWED, along_numbers, missed, several
+from origami_sim.fit.profile import along_numbers, missed, several
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
 from origami_sim.infer.budget import FAR

@@ -19,8 +19,12 @@ from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.threads import shared
 
 
-def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, Columns]:
-    """A fit judged by the weights that it has, and the columns of its own and of all further effects."""
+def judged(out: Posterior, forward: Predictor, key: Key, f: Fit, owed: float = 0.0) -> tuple[Node, Columns]:
+    """A fit judged by the weights that it has, and the columns of its own and of all further effects.
+
+    Args:
+        owed: squares that derivatives promise it and that steps by them do not gain: they count for nothing.
+    """
     hyper, line, own = out.hyper, f.linear, OwnColumns(f)
     assert line is not None and f.weights is not None
     # order: the fit's own columns by suspect, then those of the strengths of each other suspect
@@ -33,7 +37,7 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     weights = f.weights
     effects = Columns(line, weights, own.columns, known, out.weights)
     held = at_bounds(own.groups)
-    laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows)
+    laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows) - 0.5 * owed
     out.smooth = smooth = out.smooth or cosines(forward, f, line)
 
     def columns(some: Sequence[int]) -> list[np.ndarray]:
@@ -54,4 +58,4 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, 
     evidence[: len(cells)] = Summed.join(cells).of(laid, hyper)[0][:, 0]
     grid: list[Summed | None] = [*cells, *[None] * (len(evidence) - len(cells))]
     problems = {gap: made for gap, (made, _) in found.items()}
-    return Node(key, f, evidence, groups, others, grid, problems=problems if out.store else {}), effects
+    return Node(key, f, evidence, groups, others, grid, owed, problems=problems if out.store else {}), effects

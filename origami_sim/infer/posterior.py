@@ -25,8 +25,9 @@ class Node:
     Attributes:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell. foresight: if the fit leaves coloured noise, until the node is in its place.
-            problems: by size of the gaps, if they are to be stored. wide: whether sets that add to it were judged.
+        grid: the summed problems by cell. owed: see `judged`. foresight: if the fit leaves coloured noise, until the
+            node is in its place. problems: by size of the gaps, if they are to be stored. wide: whether sets that add
+            to it were judged.
         instead: log posterior of single effects in its place, and of sets with another effect for one of its own, as it
             judges them.
     """
@@ -37,6 +38,7 @@ class Node:
     groups: list[Group]
     others: list[int]
     grid: list[Summed | None]
+    owed: float = 0.0
     foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
     wide: bool = False
@@ -71,8 +73,8 @@ class Posterior:
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
-        renewed: sets that were fitted again, from a fit of a larger one. polished: what leaders gained that
-            were fitted on. begun: numbers from which single effects are fitted, where those are not linear about the
+        renewed: sets that were fitted again, from a fit of a larger one. polished: leaders that were fitted
+            on. begun: numbers from which single effects are fitted, where those are not linear about the
             refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
             were better than they promised in the place of the best set. realised: log Bayes factors of sets over the
             fit that their estimates are about, as estimated and as fitted, by that fit. rough: whether fits end in many
@@ -94,7 +96,7 @@ class Posterior:
     store: bool = False
     smooth: list[np.ndarray] = field(default_factory=list)
     renewed: set[Key] = field(default_factory=set)
-    polished: dict[Key, float] = field(default_factory=dict)
+    polished: set[Key] = field(default_factory=set)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
     swapped: list[float] = field(default_factory=list)

@@ -31,7 +31,7 @@ def remainder(p: Posterior, forward: Predictor, key: Key) -> float:
     if not own.colour:
         return 0.0
     recorders = recorder_weights(forward, node.fit)
-    judge = [judged(p, forward, key, node.fit.reweighted(w))[0].evidence for w in recorders]
+    judge = [judged(p, forward, key, node.fit.reweighted(w), node.owed)[0].evidence for w in recorders]
     plain = logsumexp(judge, axis=0) - np.log(len(recorders)) + p.hyper.log_cells
     coloured = float(logsumexp(node.evidence + p.hyper.log_cells)) + np.log(p.hyper.unlisted)
     missing = np.logaddexp(coloured, logsumexp(plain[~p.hyper.clean]))

@@ -26,10 +26,10 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share
+from origami_sim.infer.placement import enter, log_priors, place
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.search import enter, log_priors, place
 from origami_sim.infer.verdict import COMPARED, best_of, decide, unnamed_verdict
 
 NULL = 1e-9

@@ -76,11 +76,11 @@ class Valley:
 
 @pytest.mark.parametrize("narrow", [10.0, 100.0])
 def test_a_curved_valley_is_followed_to_its_end(narrow):
-    """Straight steps take 65 and 129 simulations; a derivative whose step was too large takes one more."""
+    """Straight steps take 65 and 129 simulations; one more each is of a derivative's smaller step and of the end."""
     valley = Valley(narrow)
     found = fit(valley, Hypothesis(), Weights(np.ones(1)), most=4)
     assert found.theta == pytest.approx([1.0, 1.0], abs=3e-6) and found.cost < 5e-8
-    assert valley.simulated <= 7
+    assert valley.simulated <= 8
 
 
 def test_a_curved_valley_is_followed_past_what_cannot_be_simulated():
