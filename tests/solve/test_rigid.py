@@ -516,20 +516,30 @@ def test_the_gpu_follows_the_cpu(cuda, case):
     assert np.abs(adaptive[0].x - adaptive[1].x).max() <= 1e-7 * np.ptp(one.x, axis=(0, 1, 2)).max()
 
 
+def rubs(tolerance: float, moment: float = 2e-4, yields: float = 3e-3) -> np.ndarray:
+    """Angles (100, 2) of a swing of two hinges with dry friction."""
+    sheet = hanging((0.03, 0.03, 0.03)).crease(stiffness=2e-4)
+    sheet.set("crease_friction", friction_moment=moment, yield_angle=yields)
+    model, parameters = sheet.build()
+    batch = RigidBatch(model, parameters, Drive(), folded(model, [0.9, -0.7]), tolerance=tolerance)
+    return batch.film(100, 1, 0.02, np.inf)[1][:, :2, 0]
+
+
 def test_a_step_hides_no_reversal_from_a_law_with_memory():
     """Swings with dry friction: what a hinge turns forth and back within a step is no turn to the bristle."""
-
-    def swing(tolerance: float) -> np.ndarray:
-        sheet = hanging((0.03, 0.03, 0.03)).crease(stiffness=2e-4)
-        sheet.set("crease_friction", friction_moment=2e-4, yield_angle=3e-3)
-        model, parameters = sheet.build()
-        batch = RigidBatch(model, parameters, Drive(), folded(model, [0.9, -0.7]), tolerance=tolerance)
-        return batch.film(100, 1, 0.02, np.inf)[1][:, :2, 0]
-
-    exact = swing(1e-13)
+    exact = rubs(1e-13)
     assert np.ptp(exact, axis=0).min() > 0.5
-    errors = [np.abs(swing(t) - exact).max() for t in (1e-8, 1e-10)]
+    errors = [np.abs(rubs(t) - exact).max() for t in (1e-8, 1e-10)]
     assert errors[0] < 1e-4 and errors[1] < 1e-5
+
+
+def test_a_motion_changes_smoothly_where_a_hinge_reverses_within_a_step():
+    """Differences by ever smaller changes of a friction agree: steps end at a reversal, whichever world it is in."""
+    changes = np.array([1e-5, 3e-5, 1e-4])
+    plain = rubs(1e-8, yields=3e-4)
+    slopes = [(rubs(1e-8, 2e-4 * (1.0 + c), 3e-4) - plain) / c for c in changes]
+    size = np.abs(slopes[-1]).max()
+    assert all(np.abs(s - slopes[-1]).max() < 0.01 * size for s in slopes)
 
 
 def rubbing_swing():
