@@ -9,7 +9,7 @@ import pytest
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.fit.least_squares import fit, linearise
+from origami_sim.fit.least_squares import fit, linearise, promised, settled
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.weights import Weights
@@ -81,6 +81,18 @@ def test_a_curved_valley_is_followed_to_its_end(narrow):
     found = fit(valley, Hypothesis(), Weights(np.ones(1)), most=4)
     assert found.theta == pytest.approx([1.0, 1.0], abs=3e-6) and found.cost < 5e-8
     assert valley.simulated <= 8
+
+
+def test_a_fit_goes_on_by_its_derivatives_as_far_as_steps_come_true():
+    """A whole step across a bend first misses 10^6 times as much; what cannot be simulated is still owed."""
+    begun = fit(valley := Valley(100.0), Hypothesis(), Weights(np.ones(1)), theta=np.array([-3.0, 9.0]), most=0)
+    simulated = valley.simulated
+    found, owed = settled(valley, begun)
+    assert begun.cost == pytest.approx(16.0) and found.cost < 1e-4 and owed < 1e-4
+    assert valley.simulated == simulated + 2, "no derivative is taken anew"
+    begun = fit(valley := Valley(30.0, lowest=-2.0), Hypothesis(), Weights(np.ones(1)), most=0)
+    found, owed = settled(valley, begun)
+    assert found is begun and owed == pytest.approx(begun.cost - promised(valley, begun)) and owed > 100.0
 
 
 def test_a_curved_valley_is_followed_past_what_cannot_be_simulated():

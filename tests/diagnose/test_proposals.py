@@ -1,0 +1,40 @@
+"""Which set of effects is fitted next."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+from origami_sim.infer.posterior import Key, Posterior
+from origami_sim.infer.proposals import proposed
+
+DRAG, LOSS, RUB, SCALE = range(4)
+BEST = frozenset({RUB, LOSS, SCALE})
+
+
+def posterior(fitted: dict[Key, float], estimated: dict[Key, float]) -> Posterior:
+    """Fitted sets and others with their log posteriors; nothing is known of single effects, or of what fits gain."""
+    nodes = {k: SimpleNamespace(key=k, instead={}, fit=SimpleNamespace(weights=None)) for k in fitted}
+    estimates = {k: SimpleNamespace(parent=frozenset()) for k in estimated}
+    known = dict(nodes=nodes, estimates=estimates, promise=dict(estimated), total=fitted | estimated)
+    out = Posterior([], cast(Any, None), **cast(Any, known))
+    more = dict(leader=max(fitted, key=lambda k: fitted[k]), imitates=lambda key: False, effects=lambda key: key)
+    more["labels"] = lambda key: tuple(sorted(map(str, key)))
+    more["suspect"] = lambda n: SimpleNamespace(effect=str(n))
+    own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped")
+    return cast(Posterior, SimpleNamespace(**{n: getattr(out, n) for n in own}, **more))
+
+
+def test_a_rival_of_a_smaller_set_is_fitted_with_what_the_best_adds_to_that():
+    """Drag and a loss of the hinge look alike; the scale that is told beside one is told beside the other."""
+    two = {frozenset({RUB, LOSS}): -12.0, frozenset({RUB, DRAG}): -12.5}
+    alike = frozenset({RUB, DRAG, SCALE})
+    out = posterior({BEST: 0.0} | two, {alike: -40.0})
+    assert proposed(out, 1) == alike
+    assert proposed(posterior({BEST: 0.0} | two | {alike: -0.4}, {}), 1) is None
+    worse = posterior({BEST: 0.0, frozenset({RUB, LOSS}): -12.0, frozenset({RUB, DRAG}): -30.0}, {alike: -40.0})
+    assert proposed(worse, 1) is None
+
+
+def test_what_promises_a_part_of_the_posterior_is_fitted():
+    other = frozenset({DRAG})
+    assert proposed(posterior({BEST: 0.0}, {other: -1.0}), 0) == other
+    assert proposed(posterior({BEST: 0.0}, {other: -4.0}), 0) is None
