@@ -21,7 +21,7 @@ def proposed(out: Posterior, n: int) -> Key | None:
     """The n-th set to fit: by turns the most promising one, and one that would do what the best does; None: enough."""
     key = _likely(out)
     if n % 2 or key is None:
-        key = _extended_alike(out) or _alike(out) or _alone(out) or key
+        key = _analogous(out) or _alike(out) or _alone(out) or key
     return key or _within(out)
 
 
@@ -95,22 +95,22 @@ def _alike(out: Posterior) -> Key | None:
     return max((k for k in alike if k in out.estimates), key=lambda k: alike[k], default=None)
 
 
-def _extended_alike(out: Posterior) -> Key | None:
-    """A set to fit that adds to a rival of a smaller set what the best one adds to that, if it may be as probable.
+def _analogous(out: Posterior) -> Key | None:
+    """A set to fit that differs from a rival as the best one differs from another, if it may be as probable.
 
-    Where two laws look alike, a third effect that is told beside one of them is told beside the other: it is thought to
-    gain as much there.
+    Where two laws look alike, a third effect that is told beside one of them is told beside the other: what an effect
+    adds to one set, or gains in the place of another, it is thought to gain in another set of that size.
     """
     best = max(named(out), key=lambda k: out.total[k])
     near, promise = out.total[best] + np.log(UNFITTED), {}
-    for n in best:
-        without = best - {n}
-        if without not in out.nodes:
+    for one in out.nodes:
+        gone, new = one - best, best - one
+        if len(new) != 1 or len(gone) > 1:
             continue
-        for key in out.nodes:
-            other = key | {n}
-            if len(key) == len(without) and n not in key and other in out.estimates:
-                promise[other] = out.total[key] + out.total[best] - out.total[without]
+        for rival in out.nodes:
+            key = (rival - gone) | new
+            if len(rival) == len(one) and gone <= rival and not new & rival and key in out.estimates:
+                promise[key] = out.total[rival] + out.total[best] - out.total[one]
     return max((k for k, p in promise.items() if p >= near), key=lambda k: promise[k], default=None)
 
 

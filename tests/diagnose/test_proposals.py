@@ -6,7 +6,7 @@ from typing import Any, cast
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.proposals import proposed
 
-DRAG, LOSS, RUB, SCALE = range(4)
+DRAG, LOSS, RUB, SCALE, ZERO = range(5)
 BEST = frozenset({RUB, LOSS, SCALE})
 
 
@@ -32,6 +32,16 @@ def test_a_rival_of_a_smaller_set_is_fitted_with_what_the_best_adds_to_that():
     assert proposed(posterior({BEST: 0.0} | two | {alike: -0.4}, {}), 1) is None
     worse = posterior({BEST: 0.0, frozenset({RUB, LOSS}): -12.0, frozenset({RUB, DRAG}): -30.0}, {alike: -40.0})
     assert proposed(worse, 1) is None
+
+
+def test_a_rival_is_fitted_with_what_the_best_has_in_place_of_another_effect():
+    """A zero of the encoder explains less than its scale beside a loss of the hinge, and so beside the drag like it."""
+    two = {frozenset({RUB, LOSS, ZERO}): -8.0, frozenset({RUB, DRAG, ZERO}): -9.0}
+    alike = frozenset({RUB, DRAG, SCALE})
+    assert proposed(posterior({BEST: 0.0} | two, {alike: -40.0}), 1) == alike
+    alone = {frozenset(): -90.0, frozenset({DRAG}): -0.5, frozenset({LOSS}): 0.0}
+    both = frozenset({DRAG, LOSS})
+    assert proposed(posterior(alone, {both: -40.0}), 1) is None, "what looks alike does not add up"
 
 
 def test_what_promises_a_part_of_the_posterior_is_fitted():
