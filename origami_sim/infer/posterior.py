@@ -25,9 +25,9 @@ class Node:
     Attributes:
         key: indices of its suspects. fit: about which everything is linear. evidence: (cells,) log evidence.
         groups: columns of the fit's own effects, then of the others'. others: indices of these.
-        grid: the summed problems by cell. owed: see `judged`. foresight: if the fit leaves coloured noise, until the
-            node is in its place. problems: by size of the gaps, if they are to be stored. wide: whether sets that add
-            to it were judged.
+        grid: the summed problems by cell. owed: see `judged`. tried: noise of the leader that was tried on it.
+        foresight: if the fit leaves coloured noise, until the node is in its place. problems: by size of the gaps, if
+            they are to be stored. wide: whether sets that add to it were judged.
         instead: log posterior of single effects in its place, and of sets with another effect for one of its own, as it
             judges them.
     """
@@ -39,6 +39,7 @@ class Node:
     others: list[int]
     grid: list[Summed | None]
     owed: float = 0.0
+    tried: Weights | None = None
     foresight: Foresight | None = None
     problems: dict[float, Problem] = field(default_factory=dict)
     wide: bool = False

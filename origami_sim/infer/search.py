@@ -241,9 +241,11 @@ def polished(out: Posterior, forward: Predictor) -> bool:
 def _in_the_leaders_noise(out: Posterior, forward: Predictor, prior: np.ndarray) -> None:
     """Judges fitted sets anew that may hold part of the posterior in the noise of the best one."""
     noise = out.nodes[out.leader].fit.weights
+    if noise is None or not noise.colour:
+        return
     for key, node in list(out.nodes.items()):
         own = node.fit.weights
-        if noise is None or own is None or own.like(noise) or not noise.colour:
+        if own is None or own.like(noise) or node.tried is noise:
             continue
         gain = log_evidence(node.fit.reweighted(noise)) - log_evidence(node.fit)
         if gain > OWED and out.total[key] + gain > out.total[out.leader] + np.log(UNFITTED):
@@ -272,8 +274,11 @@ def _leads(out: Posterior, node: Node, prior: np.ndarray) -> bool:
 
 def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, Columns]:
     """A fit judged by its own noise or that of the leader, and the columns of its own and of all further effects."""
-    leading = [out.nodes[out.leader].fit.weights] if out.nodes else []
-    return judged(out, forward, key, *with_own_noise(forward, f, out.hyper, [w for w in leading if w is not None]))
+    leading = out.nodes[out.leader].fit.weights if out.nodes else None
+    own, owed = with_own_noise(forward, f, out.hyper, [leading] if leading is not None else [])
+    node, columns = judged(out, forward, key, own, owed)
+    node.tried = leading
+    return node, columns
 
 
 def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
