@@ -20,7 +20,7 @@ EFFECT = Effect(
     memory=(Memory("bristle"),),
     parameters=(
         Parameter("friction_moment", "Mf", "N m", 0.0, (0.0, math.inf), "moment while sliding", typical=1e-4),
-        Parameter("yield_angle", "s0", "rad", 0.01, (1e-5, 0.03), "turn to sliding; beyond: hysteresis", typical=0.01),
+        Parameter("yield_angle", "s0", "rad", 0.01, (1e-6, 0.03), "turn to sliding; beyond: hysteresis", typical=0.01),
     ),
     fitted=("friction_moment", "yield_angle"),
     stiffness=lambda p: p["friction_moment"] / p["yield_angle"],
