@@ -473,11 +473,12 @@ def settled(forward, f: Fit, most: int = 8) -> tuple[Fit, float]:
     gain one by one (a watchdog, Chamberlain et al. 1982), as long as each misses less than the one before.
     """
     assert f.weights is not None
-    at, best = f, f
-    for n in range(most):
+    at, best, least = f, f, np.inf
+    for n in range(most + 1):
         assert at.linear is not None
         change, moves, hoped = _proposed(forward, at.coordinates, at.theta, at.local, at.blocks, at.linear)
-        if best.cost - hoped < OWED:
+        least = hoped if at is best else least
+        if n == most or best.cost - hoped < OWED:
             break
         theta, local = at.coordinates.values(at.coordinates.of(at.theta) + change), at.local + moves
         line = at.linear.at(residuals(forward, f.hypothesis, theta, local, f.blocks, f.weights))
@@ -485,7 +486,7 @@ def settled(forward, f: Fit, most: int = 8) -> tuple[Fit, float]:
         if not at.cost < (before.cost if n else np.inf):
             break
         best = min(best, at, key=lambda one: one.cost)
-    return best, max(best.cost - promised(forward, best), 0.0)
+    return best, max(best.cost - least, 0.0)
 
 
 def _proposed(

@@ -83,7 +83,7 @@ def place(out: Posterior, node: Node, prior: np.ndarray) -> None:
     singles = _judge(out, node, more, prior, cells, foresee=True)
     ranked = [more[n][-1] for n in np.argsort(-singles)]
     if not key:
-        alone = {k: max(out.total[k], out.promise[k]) for n in node.others if (k := frozenset((n,))) in out.promise}
+        alone = {k: out.promised(k) for n in node.others if (k := frozenset((n,))) in out.promise}
         out.ranked = dict(sorted(alone.items(), key=lambda item: -item[1]))
     pairs = []
     for a, one in enumerate(ranked[:LEADING]):

@@ -140,6 +140,10 @@ class Posterior:
             self._labels[key] = tuple(sorted(self.suspect(n).label for n in key))
         return self._labels[key]
 
+    def promised(self, key: Key) -> float:
+        """Log posterior that a set which was not fitted may have, by the nearest fit."""
+        return max(self.total[key], self.promise[key])
+
     def drop(self, key: Key) -> None:
         """Leaves out what is known of a set that was not fitted."""
         del self.log[key], self.total[key], self.promise[key], self.estimates[key]

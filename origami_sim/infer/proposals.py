@@ -53,11 +53,6 @@ def _likely(out: Posterior) -> Key | None:
     return max(better, key=lambda k: unfitted[k], default=None)
 
 
-def promise_of(out: Posterior, key: Key) -> float:
-    """Log posterior that a set which was not fitted may have, by the nearest fit."""
-    return max(out.total[key], out.promise[key])
-
-
 def most_gained(gains: Sequence[float]) -> float:
     """What the next set may gain over its promise at most, if it is like those before (but for UNFITTED); 0 if none."""
     if not gains:

@@ -25,7 +25,7 @@ from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
 from origami_sim.infer.posterior import Key, Node, Posterior
-from origami_sim.infer.proposals import UNFITTED, in_place_of, named, promise_of, proposed
+from origami_sim.infer.proposals import UNFITTED, in_place_of, named, proposed
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
@@ -154,7 +154,7 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
         occam = log_occam(gain, np.array(change), out.hyper)
         odds = log_prior_of(key, prior, out.hyper) - log_prior_of(none, prior, out.hyper)
         promise = out.total[none] + gain + occam + odds
-        if promise > promise_of(out, key):
+        if promise > out.promised(key):
             out.promise[key], out.begun[key], some = promise, theta, True
             out.ranked[key] = promise
     out.ranked = dict(sorted(out.ranked.items(), key=lambda item: -item[1]))
@@ -177,7 +177,7 @@ def extended(
 
 def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     """Fits a set, and keeps by how much it is better than was thought."""
-    labels, promise, estimate, estimated = out.labels(key), promise_of(out, key), out.estimates[key], out.total[key]
+    labels, promise, estimate, estimated = out.labels(key), out.promised(key), out.estimates[key], out.total[key]
     out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
     swapped = in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
     fitted = _fitted(out, forward, key)

@@ -84,7 +84,7 @@ def test_a_curved_valley_is_followed_to_its_end(narrow):
 
 
 def test_a_fit_goes_on_by_its_derivatives_as_far_as_steps_come_true():
-    """A whole step across a bend first misses 10^6 times as much; what cannot be simulated is still owed."""
+    """A whole step across a bend first misses 10^5 times as much; what cannot be simulated is still owed."""
     begun = fit(valley := Valley(100.0), Hypothesis(), Weights(np.ones(1)), theta=np.array([-3.0, 9.0]), most=0)
     simulated = valley.simulated
     found, owed = settled(valley, begun)
