@@ -29,7 +29,8 @@ class Free:
         owner: NOMINAL for a setting of the model, else the effect. name: the setting or parameter.
         start: where fits begin. scale: a change that is noticeable. lower, upper: physical bounds.
         spread: standard deviation of what was known before; infinite if nothing was.
-        logarithmic: whether it is a positive scale, of whose logarithm scale and spread are; see `Coordinates`.
+        power: of its coordinate: 1 is the number itself, 1/2 its root, 0 its logarithm; scale and spread of these two
+            are those of the coordinate, see `Coordinates`.
         entities: entities of the effect's family that share the number; None for all. recording: likewise (index).
         aligned: whether it says how recorder or supply are aligned, named "effect.parameter"; see `Subject.beside`.
     """
@@ -45,7 +46,7 @@ class Free:
     entities: tuple[int, ...] | None = None
     aligned: bool = False
     recording: int | None = None
-    logarithmic: bool = False
+    power: float = 1.0
 
     @property
     def label(self) -> str:

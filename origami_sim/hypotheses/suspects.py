@@ -198,8 +198,10 @@ def _free(effect: str, name: str, entities) -> Free:
     assert p.typical is not None
     first = get(effect).parameter(get(effect).fitted[0])
     scale = abs(p.typical) or abs(first.typical or 1.0)
+    ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-") and not p.threshold
     # an angle may be next to nothing, as in Coulomb's law, where its logarithm would go on for ever
-    ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-", "rad") and not p.threshold
+    power = 1.0 if not ratio else 0.5 if p.unit == "rad" else 0.0
+    plausible = {1.0: PLAUSIBLE * scale, 0.5: 2.0 * (np.sqrt(PLAUSIBLE) - 1.0), 0.0: np.log(PLAUSIBLE)}[power]
     return Free(
         effect,
         name,
@@ -208,9 +210,9 @@ def _free(effect: str, name: str, entities) -> Free:
         scale=1.0 if ratio else scale,
         lower=p.bounds[0],
         upper=p.bounds[1],
-        spread=np.inf if name == first.name else np.log(PLAUSIBLE) if ratio else PLAUSIBLE * scale,
+        spread=np.inf if name == first.name else float(plausible),
         entities=entities,
-        logarithmic=ratio,
+        power=power,
     )
 
 

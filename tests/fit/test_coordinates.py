@@ -1,4 +1,4 @@
-"""Numbers are fitted by their departures, and positive scales by those of their logarithms."""
+"""Numbers are fitted by their departures, positive scales by those of their logarithms, angles of yield by roots."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,8 @@ from origami_sim.hypotheses.suspects import _free
 from tests.fit.test_least_squares import made
 
 LENGTH = Free("", "length", "m", 0.2, 0.01, 0.1, 0.4, 0.02)
-TIME = Free("law", "time", "s", 0.5, 1.0, 1e-6, np.inf, 2.0, logarithmic=True)
+TIME = Free("law", "time", "s", 0.5, 1.0, 1e-6, np.inf, 2.0, power=0.0)
+ANGLE = Free("law", "angle", "rad", 0.01, 1.0, 1e-6, 0.03, 4.0, power=0.5)
 
 
 def test_coordinates_and_numbers_are_each_others_inverse_within_the_bounds():
@@ -25,14 +26,19 @@ def test_coordinates_and_numbers_are_each_others_inverse_within_the_bounds():
     assert both.values(both.of(theta)) == pytest.approx(theta)
     assert both.values(np.array([99.0, -99.0])) == pytest.approx([0.4, 1e-6]), "not beyond the bounds"
     assert both.low == pytest.approx([-10.0, np.log(2e-6)]) and both.high[1] == np.inf
+    root = Coordinates([ANGLE])
+    assert root.of(np.array([0.0025])) == pytest.approx([-1.0]) and root.values(np.array([-1.0])) == pytest.approx(
+        [0.0025]
+    )
+    assert root.values(np.array([-9.0])) == pytest.approx([1e-6]) and root.low == pytest.approx([-1.98])
     assert Coordinates([]).of(np.zeros(0)).shape == (0,)
 
 
 def test_slopes_are_derivatives_of_the_numbers():
-    both, theta = Coordinates([LENGTH, TIME]), np.array([0.22, 3.0])
+    both, theta = Coordinates([LENGTH, TIME, ANGLE]), np.array([0.22, 3.0, 0.002])
     at = both.of(theta)
-    for k in range(2):
-        step = 1e-6 * (np.arange(2) == k)
+    for k in range(3):
+        step = 1e-6 * (np.arange(3) == k)
         assert both.slopes(theta)[k] == pytest.approx((both.values(at + step) - both.values(at - step))[k] / 2e-6)
 
 
@@ -76,7 +82,7 @@ def test_a_time_constant_is_found_that_is_far_from_where_it_begins(time):
 
 
 def test_positive_scales_beside_strengths_are_fitted_by_their_logarithms():
-    scales = {(name, p) for name, e in CATALOGUE.items() for p in e.fitted if _free(name, p, None).logarithmic}
+    scales = {(name, p) for name, e in CATALOGUE.items() for p in e.fitted if _free(name, p, None).power == 0.0}
     assert {
         ("crease_relaxation", "time_1"),
         ("stribeck", "fading_speed"),
@@ -85,6 +91,7 @@ def test_positive_scales_beside_strengths_are_fitted_by_their_logarithms():
     for name, number in scales:
         f = _free(name, number, None)
         assert f.start > 0.0 and f.lower >= 0.0 and f.spread == pytest.approx(np.log(PLAUSIBLE)), name
+    assert _free("crease_friction", "yield_angle", None).power == 0.5
     # a strength and an angle may be nothing; thresholds lie within what was recorded; a ratio may be nothing
     absent = {
         ("crease_friction", "friction_moment"),
