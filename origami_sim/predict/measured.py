@@ -86,16 +86,19 @@ def measured(
         rows = [*range(row, row + width)]
         if channel.kind == "marker_2d":  # until it is measured, a picture has a depth
             rows, deep = [*rows, deep], deep + 1
+        turned: list[int] = []
         if get(distort[0]).on_body and channel in marked(recording):
-            rows, axes = [*rows, *range(axes, axes + 9)], axes + 9
+            turned, axes = list(range(axes, axes + 9)), axes + 9
         given = {n: at_channel(parameters, n, index, worlds) for n in distort if _reads(get(n), channel)}
         acting = np.stack([_acts(get(n), by) for n, by in given.items()] or [np.ones(worlds, bool)])
         kinds, kind = np.unique(acting, axis=1, return_inverse=True)
         part = np.empty((len(times), width, worlds))
         for k, on in enumerate(kinds.T):  # a law is asked only about worlds in which it acts
             mine = np.flatnonzero(kind.ravel() == k)
-            reader = _reader(grid, channels[:, rows][:, :, mine], shown[mine], rested=rested)
-            for name, by in compress(given.items(), on):
+            laws = list(compress(given.items(), on))
+            seen = [*rows, *turned] if any(get(name).on_body for name, _ in laws) else rows
+            reader = _reader(grid, channels[:, seen][:, :, mine], shown[mine], rested=rested)
+            for name, by in laws:
                 reader = _wrapped(get(name), reader, {n: v[mine] for n, v in by.items()})
             part[:, :, mine] = reader(at[:, mine])[:, :width]
         parts.append(part)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Subject, diagnose
-from origami_sim.diagnose.arrange import starting
+from origami_sim.diagnose.arrange import arranged, starting
+from origami_sim.diagnose.options import Options
+from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
@@ -65,6 +68,25 @@ def test_a_marker_beside_its_place_is_the_measurement(lift, down, words):
     for axis, truth in (("x", lift), ("z", down)):
         n = numbers[f"marker_offset.offset_{axis}"]
         assert n.value == pytest.approx(truth, abs=2e-5) and n.low < truth < n.high
+
+
+def test_a_marker_beside_its_place_and_a_wrong_origin_add_up():
+    """Of the marker that is in its place only the origin is wrong."""
+    recording = filmed(1.5e-3, 0.5e-3)
+    forward, _ = arranged(subject(3), prepared([recording], 200.0), Options())
+    every = suspects(forward.model, [recording], forward.drive)
+    beside, origin = (next(s for s in every if s.effect == e) for e in ("marker_offset", "length_offset"))
+    values = {beside.free: [1e-3, 0.0, 0.0], origin.free: [2e-3, 0.0, 0.0]}
+
+    def predicted(*some: Suspect) -> np.ndarray:
+        given = [f.start for f in forward.subject.nominals]
+        theta = np.array([*given, *(v for s in some for v in values[s.free])])
+        shot = forward.predict(Hypothesis(some), theta[None], np.zeros((1, len(forward.blocks), forward.local)))
+        return np.concatenate([v[0] for v in shot])
+
+    none, both = predicted(), predicted(beside, origin)
+    np.testing.assert_allclose(both - none, predicted(beside) + predicted(origin) - 2.0 * none, atol=1e-12)
+    assert np.all(np.abs(both - none).max(axis=0)[[0, 2]] > 1e-3)
 
 
 @pytest.mark.parametrize("seed", range(6))
