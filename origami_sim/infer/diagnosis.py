@@ -27,7 +27,7 @@ class Number:
 
     Attributes:
         prior, spread: value and standard deviation of what was known before (inf: nothing was); of a positive scale,
-            such as a time constant, the deviation is that of its logarithm.
+            such as a time constant, the deviation is that of its logarithm; see `Coordinates`.
         away: how far it is from there, in standard deviations (nan: nothing was known).
     """
 
