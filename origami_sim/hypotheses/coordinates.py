@@ -2,8 +2,8 @@
 
 What a number does should be linear in its coordinate (Box & Cox 1964, of powers 1, 1/2 and 0). A positive scale, such
 as a time constant, is fitted by its logarithm: what is known of it beforehand is its order of magnitude, and what it
-does changes by factors (a log-normal prior). The angle at which friction yields is fitted by its root: where a swing
-turns back, the time that friction takes to turn as well grows as the root of it.
+does changes by factors (a log-normal prior). An angle that is one, such as that at which friction yields, is fitted by
+its root: where a swing turns back, the time that friction takes to turn as well grows as the root of it.
 """
 
 from collections.abc import Sequence

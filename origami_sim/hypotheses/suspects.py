@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import boxcox
 
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
@@ -201,7 +202,7 @@ def _free(effect: str, name: str, entities) -> Free:
     ratio = p.bounds[0] >= 0.0 and p.unit not in (first.unit, "-") and not p.threshold
     # an angle may be next to nothing, as in Coulomb's law, where its logarithm would go on for ever
     power = 1.0 if not ratio else 0.5 if p.unit == "rad" else 0.0
-    plausible = {1.0: PLAUSIBLE * scale, 0.5: 2.0 * (np.sqrt(PLAUSIBLE) - 1.0), 0.0: np.log(PLAUSIBLE)}[power]
+    plausible = float(boxcox(PLAUSIBLE, power)) if ratio else PLAUSIBLE * scale
     return Free(
         effect,
         name,
@@ -210,7 +211,7 @@ def _free(effect: str, name: str, entities) -> Free:
         scale=1.0 if ratio else scale,
         lower=p.bounds[0],
         upper=p.bounds[1],
-        spread=np.inf if name == first.name else float(plausible),
+        spread=np.inf if name == first.name else plausible,
         entities=entities,
         power=power,
     )

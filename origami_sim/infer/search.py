@@ -38,7 +38,7 @@ STEPS = 24
 """Steps of a fit, at most: it is to end where they gain nothing, so that sets can be compared.
 
 Of two real swings of one arm the same loss by two names, drag and a quadratic one, ended 126 apart in log evidence with
-8 steps, and 0.2 with 24.
+8 steps, and 0.2 with 24. Half and double change no probability of four swings by 0.001.
 """
 
 
