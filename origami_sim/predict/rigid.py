@@ -304,7 +304,7 @@ class RigidRollouts(Rollouts):
         chained = self._chained(r, local)
         if chained is None:
             return {}
-        lasts = len(lasting(worlds)[0]) == sum(size for *_, size in worlds[0][0].memories)
+        lasts = len(lasting(worlds[0][0])) == sum(size for *_, size in worlds[0][0].memories)
 
         def followed(part: list[World], threads: int) -> tuple[np.ndarray, Seen | None]:
             x, turned, kept, ended = self._anew(chained, part, threads)

@@ -418,8 +418,8 @@ class Rollouts(Worlds, ABC):
         It is that of the first world's motion up to there (`_motion`), of which starts are shifted by local [B, L]. All
         nodes are held and carried along it: the laws feel the motion without changing it. Before that they rest. What
         carrying straight from frame to frame does wrong to the first world, whose memory is known, it does to all.
-        What does not fade is that of each world's own motion, where that can be followed and its laws differ from the
-        first one's: an arm that has come to rest against dry friction rests elsewhere if that yields elsewhere.
+        What does not fade is that of each world's own motion, where that can be followed: with dry friction a swing
+        turns elsewhere, and rests elsewhere, if that yields elsewhere or the arm is heavier.
         """
         model = worlds[0][0]
         # also of segments not asked for
@@ -431,20 +431,20 @@ class Rollouts(Worlds, ABC):
         motion = self._motion(r, worlds[0], local)
         if motion is None:
             return None
-        some, of = distinct_memories(worlds)
-        worlds = [worlds[k] for k in some]
+        rows = lasting(model)
+        follows = len(rows) > 0 and bool(motion.memory)
+        some, of = distinct_motions(worlds) if follows else distinct_memories(worlds)
+        worlds, others = [worlds[k] for k in some], range(1, len(some))
         asked = every[every <= max(b.first for b in wanted)]
-        rows, others = lasting(worlds)
-        own = self._own_memories(r, [worlds[k] for k in others], local) if motion.memory and others else {}
+        own = self._own_memories(r, worlds[1:], local) if follows and others else {}
         if not own.keys() >= set(asked.tolist()):
             return {first: memory[:, of] for first, memory in self._carried(r, worlds, motion, asked).items()}
         # of worlds that are followed only what fades is carried
-        along = [k for k in range(len(worlds)) if k not in others or len(rows) < size]
-        out: dict[int, np.ndarray] = {}
+        along, out = [0, *others] if len(rows) < size else [0], dict[int, np.ndarray]()
         for first, carried in self._carried(r, [worlds[k] for k in along], motion, asked).items():
             memory = np.empty((size, len(worlds)))
             memory[:, along] = carried
-            memory[rows[:, None], others] = own[first][rows]
+            memory[rows, 1:] = own[first][rows]
             out[first] = memory[:, of]
         return out
 

@@ -142,17 +142,11 @@ def distinct_memories(worlds: Sequence[World]) -> tuple[list[int], np.ndarray]:
     return [of.index(n) for n in range(len(found))], np.array(of)
 
 
-def lasting(worlds: Sequence[World]) -> tuple[np.ndarray, list[int]]:
-    """Rows of memory that do not fade, and the worlds in which its laws are not those of the first.
-
-    Of laws in which no time passes, such as dry friction.
-    """
-    (model, first), *_ = worlds
+def lasting(model: Model) -> np.ndarray:
+    """Rows of memory that do not fade: of laws in which no time passes, such as dry friction."""
     stays = {e for e, *_ in model.memories if "dt" not in get(e).arguments}
     rows = np.concatenate([np.zeros(0, bool), *(np.full(size, e in stays) for e, _, size in model.memories)])
-    mine = [p for p in first if p[0] in stays]
-    others = [k for k, (_, own) in enumerate(worlds) if any(not np.array_equal(own[p], first[p]) for p in mine)]
-    return np.flatnonzero(rows), others
+    return np.flatnonzero(rows)
 
 
 def distinct_motions(worlds: Sequence[World], *more: np.ndarray | None) -> tuple[list[int], np.ndarray]:

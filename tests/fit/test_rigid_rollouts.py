@@ -118,7 +118,7 @@ def test_a_point_that_was_just_simulated_is_the_same_bytes_among_other_worlds(ti
 
 
 def test_worlds_that_were_followed_are_not_simulated_again(tied, monkeypatch):
-    """Their films are those of segments alone, but for rounding."""
+    """Their films, of friction and of mass that differ, are those of segments alone, but for rounding."""
     friction = next(s for s in suspects(tied.model, tied.recordings, tied.drive) if s.effect == "crease_friction")
     theta = np.array([f.start for f in (*tied.subject.nominals, *friction.free)])
     worlds = np.repeat(theta[None], 3, axis=0)
@@ -136,7 +136,7 @@ def test_worlds_that_were_followed_are_not_simulated_again(tied, monkeypatch):
     found, once = shot(), set(simulated)
     monkeypatch.setattr(tied, "_seen", lambda *_: None)
     anew, every = shot(), set(simulated)
-    assert once == {1} and every == {3}
+    assert once == set() and every == {3}
     for a, b in zip((*found.values, *found.ends[:-1]), (*anew.values, *anew.ends[:-1]), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12)
 
