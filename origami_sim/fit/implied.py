@@ -30,10 +30,11 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Wei
     Noise is told by what a fit leaves, and that by the noise, so that several may suit each other. Beside those that
     follow from white noise and gaps of every size, those that suit other hypotheses (`known`) and the fit's own are
     tried. All are compared by derivatives; in the most probable ones the fit goes on by them, as far as its steps come
-    true: what they promise beyond that counts for nothing.
+    true: what they promise beyond that counts for nothing. A fit that ended in coloured noise of its own goes on in it.
     """
-    found = [*implied(forward, f, hyper)]
-    for noise in known if f.weights is None or not f.weights.colour else (f.weights, *known):
+    assert f.weights is not None
+    found = [] if f.exact and f.weights.colour else [*implied(forward, f, hyper)]
+    for noise in (f.weights, *known) if f.weights.colour else known:
         other = f.reweighted(noise)
         found.append(climbed(forward, other, log_evidence(other), (True,)))
     best, most = (f, 0.0), -np.inf

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.optimize import lsq_linear
 
 from origami_sim.fit.evidence import on_bound
@@ -117,7 +118,8 @@ class Fit:
         if not self.linear.tangent[0].shape[1]:
             return np.zeros((count, count))
         a = np.concatenate([self.linear.eliminated.rows[:, :-1], np.diag(self.coordinates.precision)])
-        return np.linalg.pinv(a.T @ a, rcond=1e-14)
+        root = np.linalg.pinv(a, rcond=1e-7)
+        return root @ root.T
 
     def rms(self) -> np.ndarray:
         """(D,) root mean square of the residuals [SI]; nan where nothing was seen."""
@@ -142,7 +144,7 @@ class Fit:
         assert self.linear is not None and self.weights is not None
         line = self.linear.reweighted(self.weights, new)
         misfit = float(sum(r @ r for r in line.residual))
-        return replace(self, linear=line, misfit=misfit, weights=new, exact=False)
+        return replace(self, linear=line, misfit=misfit, weights=new)
 
 
 def penalty(numbers: Coordinates, theta: np.ndarray) -> float:
@@ -165,6 +167,7 @@ def linearise(
     kept: int = 0,
     residual: list[np.ndarray] | None = None,
     steps: np.ndarray | None = None,
+    axes: np.ndarray | None = None,
 ) -> Linearisation:
     """Residuals and tangents at a point; the derivatives are forward differences, all in one batch of worlds.
 
@@ -173,6 +176,7 @@ def linearise(
         known: derivatives at a near point, by the starts and by the first `kept` numbers, that need not be taken anew.
         residual: whitened residuals at this point, if they are known.
         steps: (k,) those of the first numbers' coordinates that were small enough at a near point.
+        axes: [P, P] changes of coordinates, each a row, to take the derivatives along; None: one after the other.
     """
     count = 0 if fixed else len(free)
     kept = min(kept, count) if known is not None else 0
@@ -185,32 +189,41 @@ def linearise(
         residual = residuals(forward, hypothesis, theta, local, blocks, weights)
     rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
 
+    moves = np.eye(count, len(free))[kept:] * np.append(steps, np.zeros(len(free) - count))
+    if axes is not None and count and not kept:
+        moves = axes.copy()
+
     def differences(some: np.ndarray, starts: int) -> list[np.ndarray]:
-        """Per block, whitened changes [k + starts, r] by steps of some of the numbers, and of the starts."""
+        """Per block, whitened changes [k + starts, r] by moves [k, P] of coordinates, and by steps of the starts."""
         thetas = np.repeat(theta[None], 1 + len(some) + starts, axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
-        moved = numbers.values(numbers.of(theta) + np.append(steps, np.zeros(len(free) - count)))
-        thetas[1 + np.arange(len(some)), some] = moved[some]
+        moved = numbers.values(numbers.of(theta) + some)
+        thetas[1 : 1 + len(some)] = np.where(some != 0.0, moved, theta)
         for i in range(starts):
             locals_[1 + len(some) + i, blocks, i] += nudges[:, i]
         if len(thetas) == 1:
             return [np.zeros((0, r.count)) for r in rows]
         return changed(forward, forward.shoot(hypothesis, thetas, locals_, blocks), weights, blocks)
 
-    changes = differences(np.arange(kept, count), size)
+    changes = differences(moves, size)
     lost = np.flatnonzero(np.any([np.any(~np.isfinite(c[:fresh]), axis=1) for c in changes], axis=0))
     if len(lost):  # numbers of which no model can be built: the other way there may be one
-        steps[kept + lost] *= -1.0
-        for c, new in zip(changes, differences(kept + lost, 0), strict=True):
+        moves[lost] *= -1.0
+        for c, new in zip(changes, differences(moves[lost], 0), strict=True):
             c[lost] = new
     least = small(forward, weights, blocks)
     large = np.sqrt(sum(np.sum(c[:fresh, : r.data] ** 2, axis=1) for c, r in zip(changes, rows, strict=True)))
     bent = np.flatnonzero(np.nan_to_num(large) > least)
     if len(bent):
-        steps[kept + bent] *= 0.5 * least / large[bent]  # so that they need not be halved again nearby
-        for c, new in zip(changes, differences(kept + bent, 0), strict=True):
+        moves[bent] *= 0.5 * least / large[bent][:, None]  # so that they need not be halved again nearby
+        for c, new in zip(changes, differences(moves[bent], 0), strict=True):
             c[bent] = new
-    tangent = [c[:fresh].T / steps[kept:] for c in changes]
+    if axes is None or kept:
+        steps[kept:] = np.diag(moves[:, kept:])
+        tangent = [c[:fresh].T / steps[kept:] for c in changes]
+    else:
+        back = np.linalg.inv(moves).T
+        tangent = [c[:fresh].T @ back for c in changes]
     if known is not None:
         return replace(known.at(residual).beside(tangent, kept), steps=steps)
     slopes, tie = [], []
@@ -222,6 +235,35 @@ def linearise(
         slopes.append(slope)
         tie.append(1.0 / (weights.gap * block.reach) if own.tie and block.reach is not None else None)
     return Linearisation(rows, residual, tangent, slopes, tie, steps)
+
+
+def along(forward: Predictor, numbers: Coordinates, theta: np.ndarray, line: Linearisation) -> np.ndarray:
+    """Changes [P, P] of coordinates, one in each row, to take derivatives along at a point near a linearisation.
+
+    Coordinates one by one, but for principal axes of which priors tell more than the data do: these change by one
+    standard deviation. Along them, as along a mass and all moments of a swing, derivatives by single numbers nearly
+    cancel, and what is left of them is their errors.
+    """
+    at, steps = numbers.of(theta), first_steps(forward, numbers, theta, line.steps)
+    a = np.concatenate([line.eliminated.rows[:, :-1], np.diag(numbers.precision)])
+    size = np.linalg.norm(a, axis=0)
+    inner, weak = np.flatnonzero(size > 0.0), np.zeros((0, len(theta)))
+    while len(inner):
+        _, s, vt = np.linalg.svd(a[:, inner] / size[inner], full_matrices=False)
+        own = vt / np.maximum(s, 1e-12)[:, None] / size[inner]
+        own = own[np.linalg.norm(own * numbers.precision[inner], axis=1) > np.sqrt(0.5)]
+        reach = np.abs(own).max(axis=0, initial=0.0)
+        free = (at[inner] - reach > numbers.low[inner]) & (at[inner] + reach < numbers.high[inner])
+        if free.all():
+            weak = np.zeros((len(own), len(theta)))
+            weak[:, inner] = own
+            break
+        inner = inner[free]
+    if not len(weak):
+        return np.diag(steps)
+    _, _, order = qr(weak / steps, pivoting=True, mode="economic")
+    single = np.sort(order[len(weak) :])
+    return np.concatenate([weak, np.diag(steps)[single]])
 
 
 def small(forward: Predictor, weights: Weights, blocks: Sequence[int]) -> float:
@@ -324,6 +366,7 @@ def fit(
     fixed: bool = False,
     most: int = 8,
     done: float = DONE,
+    rough: float = 0.0,
     known: Linearisation | None = None,
     kept: int = 0,
     begin: Linearisation | None = None,
@@ -338,6 +381,7 @@ def fit(
     Args:
         theta, local: where to begin (default: the starts of the numbers; the blocks' own starts).
         blocks: fit these only. fixed: keep theta and fit the starts only.
+        rough: part of all that is missed which a step has to gain; for fits that are carried on with other weights.
         known: derivatives at a near point with the same weights, of which the first `kept` numbers' hold here too, and
             steps of the first numbers, or of all, that are small enough.
         begin: residuals and all derivatives of the point where the fit begins; `exact` if none is of a point before.
@@ -352,7 +396,8 @@ def fit(
 
     def derived(theta, local, near: Linearisation | None, residual) -> Linearisation:
         steps = line.steps if line else known.steps if known else None
-        also = {"known": near, "kept": kept if near else 0, "residual": residual, "steps": steps}
+        axes = along(forward, numbers, theta, line or begin) if begin and near is None and width else None
+        also = {"known": near, "kept": kept if near else 0, "residual": residual, "steps": steps, "axes": axes}
         return linearise(forward, hypothesis, free, theta, local, blocks, weights, fixed=fixed, **also)
 
     def at(theta, local) -> tuple[float, list[np.ndarray], np.ndarray, np.ndarray]:
@@ -379,7 +424,7 @@ def fit(
         if not all(np.all(np.isfinite(t)) for t in line.tangent):
             return _failed(hypothesis, free, theta, local, blocks, "a derivative is not finite")
         change, moves, hoped = _proposed(forward, numbers, theta, local, blocks, line)
-        enough = max(OWED, done * (best - floor))
+        enough = max(OWED, done * (best - floor), rough * best)
         whole, gain, found = best - hoped, 0.0, None
         if whole < enough and (level > STALE or not width):
             trial, start = numbers.values(numbers.of(theta) + change), local + moves
@@ -443,6 +488,8 @@ def renewed(forward, f: Fit) -> Fit:
     """A fit with all derivatives taken anew where it ended; a fit itself uses them as long as its steps come true."""
     assert f.weights is not None and f.linear is not None
     also = {"residual": f.linear.residual, "steps": f.linear.steps}
+    if len(f.free):
+        also["axes"] = along(forward, f.coordinates, f.theta, f.linear)
     line = linearise(forward, f.hypothesis, f.free, f.theta, f.local, f.blocks, f.weights, **also)
     if not all(np.all(np.isfinite(t)) for t in line.tangent):
         return f

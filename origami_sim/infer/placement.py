@@ -162,11 +162,11 @@ def _judge(
     for n, key in enumerate(keys):
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
-        if key in out.nodes and key and key < node.key and key not in out.renewed:
-            if totals[n] > out.total[key] + OWED:  # its own fit ended early: it goes on from here
-                out.renewed.add(key)
-                out.hoped.pop(out.labels(key), None)
-                forget(out, key)
+        if key in out.nodes and key and key < node.key and key not in out.renewed and n in values:
+            known, _ = out.ahead.get(key, (out.total[key] + OWED, None))
+            if totals[n] > known:  # its own fit ended early
+                near = (len(key ^ node.key), 0.0)
+                out.ahead[key] = totals[n], Estimate(node.key, sets[n], values[n], near, float(gains[n]))
         if key in out.nodes or key in out.failed or n not in values:
             continue
         before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))

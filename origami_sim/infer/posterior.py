@@ -74,12 +74,12 @@ class Posterior:
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
-        renewed: sets that were fitted again, from a fit of a larger one. polished: leaders that were fitted
-            on. begun: numbers from which single effects are fitted, where those are not linear about the
-            refitted model. reconsidered: whether all were tried over their ranges. swapped: by how much single effects
-            were better than they promised in the place of the best set. realised: log Bayes factors of sets over the
-            fit that their estimates are about, as estimated and as fitted, by that fit. rough: whether fits end in many
-            basins, see `basins`.
+        ahead: sets that were fitted and of which a larger one promises more: what, and how. renewed: those that
+            were fitted again for it. polished: leaders that were fitted on. begun: numbers from which single effects
+            are fitted, where those are not linear about the refitted model. reconsidered: whether all were tried over
+            their ranges. swapped: by how much single effects were better than they promised in the place of the best
+            set. realised: log Bayes factors of sets over the fit that their estimates are about, as estimated and as
+            fitted, by that fit. rough: whether fits end in many basins, see `basins`.
     """
 
     signatures: list[Signature]
@@ -96,6 +96,7 @@ class Posterior:
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
     smooth: list[np.ndarray] = field(default_factory=list)
+    ahead: dict[Key, tuple[float, Estimate]] = field(default_factory=dict)
     renewed: set[Key] = field(default_factory=set)
     polished: set[Key] = field(default_factory=set)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)

@@ -24,7 +24,7 @@ from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
-from origami_sim.infer.posterior import Key, Node, Posterior
+from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.proposals import UNFITTED, in_place_of, named, proposed
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
@@ -34,12 +34,8 @@ from origami_sim.predict.spectra import without_idle
 FITS = 16
 """Sets that are fitted at most, before leaders are polished and after."""
 
-STEPS = 24
-"""Steps of a fit, at most: it is to end where they gain nothing, so that sets can be compared.
-
-Of two real swings of one arm the same loss by two names, drag and a quadratic one, ended 126 apart in log evidence with
-8 steps, and 0.2 with 24. Half and double change no probability of four swings by 0.001.
-"""
+ROUGH = 0.01
+"""Part of what is missed by which steps improve the first fit of a set, at least; it is carried on in its own noise."""
 
 
 def search(
@@ -175,6 +171,8 @@ def extended(
     for n in range(most):
         if progress:
             progress(n / most)
+        if _again(out, forward):
+            continue
         key = proposed(out, n)
         if key is None:
             break
@@ -182,12 +180,30 @@ def extended(
     return out
 
 
+def _again(out: Posterior, forward: Predictor) -> bool:
+    """Fits a set anew of which the fit of a larger one promises more, if it may then be best; whether there was one."""
+    least = max(out.total[k] for k in named(out)) + np.log(UNFITTED)
+    early = {k: out.ahead[k][0] for k in named(out) if k in out.ahead and out.ahead[k][0] >= least}
+    if not early:
+        return False
+    key = max(early, key=lambda k: early[k])
+    _, estimate = out.ahead.pop(key)
+    out.renewed.add(key)
+    if estimate.parent in out.nodes:
+        before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate))
+        if not f.failed:
+            node, _ = _node(out, forward, key, f)
+            if node.evidence.max() > before.evidence.max():
+                _add(out, forward, key, f, log_priors(out.signatures))
+    return True
+
+
 def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     """Fits a set, and keeps by how much it is better than was thought."""
     labels, promise, estimate, estimated = out.labels(key), out.promised(key), out.estimates[key], out.total[key]
     out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
     swapped = in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
-    fitted = _fitted(out, forward, key)
+    fitted = _finished(out, forward, _fitted(out, forward, key, estimate))
     if fitted.failed:
         out.failed[key] = fitted.failed
         out.drop(key)
@@ -201,6 +217,25 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)
+
+
+def _finished(out: Posterior, forward: Predictor, f: Fit) -> Fit:
+    """A fit that goes on in its own noise, by derivatives taken there, until these promise nothing more."""
+    if f.failed:
+        return f
+    leading = out.nodes[out.leader].fit.weights
+    own, _ = with_own_noise(forward, f, out.hyper, [leading] if leading is not None else [])
+    on = _to_the_end(forward, own)
+    return own if on.failed else on
+
+
+def _to_the_end(forward: Predictor, f: Fit) -> Fit:
+    """A fit carried on by derivatives that are taken where it is, until these promise nothing."""
+    f = f if f.exact else renewed(forward, f)
+    if f.cost - promised(forward, f) >= OWED:
+        f = carried_on(forward, f)
+        f = f if f.failed or f.exact else renewed(forward, f)
+    return f
 
 
 def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None:
@@ -234,11 +269,12 @@ def polished(out: Posterior, forward: Predictor) -> bool:
         leaders = [k for k, most in reach.items() if most >= least and k not in out.polished]
         if not leaders:
             return some
-        key, some = max(leaders, key=lambda k: reach[k]), True
-        before, f = out.total[key], renewed(forward, out.nodes[key].fit)
-        if f.cost - promised(forward, f) >= OWED:
-            f = carried_on(forward, f)
-            f = f if f.failed or f.exact else renewed(forward, f)
+        key = max(leaders, key=lambda k: reach[k])
+        now = out.nodes[key].fit
+        if now.exact and now.cost - promised(forward, now) < OWED:
+            out.polished.add(key)
+            continue
+        before, f, some = out.total[key], _to_the_end(forward, now), True
         if not f.failed:
             _add(out, forward, key, f, prior)
         if f.failed or out.nodes[key].owed < OWED or out.total[key] < before + OWED:
@@ -288,9 +324,8 @@ def _node(out: Posterior, forward: Predictor, key: Key, f: Fit) -> tuple[Node, C
     return node, columns
 
 
-def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
-    """Fits a set, from where the linear estimate of the nearest fitted one puts it."""
-    estimate = out.estimates[key]
+def _fitted(out: Posterior, forward: Predictor, key: Key, estimate: Estimate) -> Fit:
+    """Fits a set, from where the linear estimate of a fitted one puts it."""
     node = out.nodes[estimate.parent]
     members = members_of(node.fit.hypothesis, out)
     line, count = node.fit.linear, len(forward.subject.nominals)
@@ -322,6 +357,6 @@ def _fitted(out: Posterior, forward: Predictor, key: Key) -> Fit:
         return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), rough)
     # derivatives by the numbers of the model and by starts hardly change with an effect
     known = replace(line.reweighted(node.fit.weights, by), steps=np.concatenate(steps))
-    near = {"known": known, "kept": count, "most": STEPS}
+    near = {"known": known, "kept": count, "rough": ROUGH}
     found = fit(forward, hypothesis, by, theta=np.concatenate(begin), local=parent.local, **near)
     return elsewhere(forward, found, rough)
