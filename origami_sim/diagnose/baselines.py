@@ -1,20 +1,19 @@
 """What methods without physics would do with the same data: a parameter refit, sparse regression, a Gaussian process.
 
 The two that learn a correction learn it from the residual moment of equation error at each crease (`locate.motion`),
-on half of the segments, as a function of that crease's angle and rate. It is then put into the simulator as a table
-and predicts the other half, with the starts adapted exactly as for every hypothesis. Numbers of the model are those of
-the refit without that half.
+outside of each fold, as a function of that crease's angle and rate. It is then put into the simulator as a table and
+predicts that fold, with the starts adapted exactly as for every hypothesis. Numbers of the model are those of the refit
+without that fold.
 """
 
 import copy
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import product
 
 import numpy as np
 
-from origami_sim.diagnose.held_out import steps_without
+from origami_sim.fit.held_out import folds
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import NOMINAL, Free, Hypothesis, Subject
@@ -49,8 +48,13 @@ LIBRARY: dict[str, Callable] = {
 }
 
 
-def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.ndarray) -> list[Baseline]:
-    """Held-out rms of each baseline [SI], on two halves of the segments learnt on the other half."""
+def baselines(forward: Predictor, fits: Sequence[Fit], weights: Weights, reference: np.ndarray) -> list[Baseline]:
+    """Held-out rms of each baseline [SI], on each fold, learnt on all others.
+
+    Args:
+        fits: the model without any effect, refitted without each fold; none if that failed. reference: (D,) their
+            held-out rms [SI].
+    """
     out = [Baseline("best parameter-only refit", reference.tolist())]
 
     def without(why: str) -> list[Baseline]:
@@ -59,25 +63,24 @@ def baselines(forward: Predictor, base: Fit, weights: Weights, reference: np.nda
 
     if forward.start != "fit" or not len(forward.model.creases):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
-    halves = _halves(forward)
-    if any(not h for h in halves):
-        return without("needs segments in two halves, and frames outside of each")
-    numbers = base.coordinates
-    at = numbers.of(base.theta)
-    told = [replace(base, theta=numbers.values(at + step)) for step in steps_without(base, halves)]
+    parts = folds(forward, range(len(forward.blocks)))
+    if not fits:
+        return without("needs the model refitted without each fold")
+    if len(parts) < 2:
+        return without("needs several segments, and frames outside of each fold")
     each = range(len(forward.recordings))
-    found = shared([partial(motion, forward, f, r) for f in told for r in each])  # type: ignore[arg-type]
+    found = shared([partial(motion, forward, f, r) for f in fits for r in each])  # type: ignore[arg-type]
     moved = [found[k : k + len(each)] for k in range(0, len(found), len(each))]
     if any(m is None for motions in moved for m in motions):
         return without("needs recorded coordinates of every crease, and segments with starts of their own")
-    if any(len(next(_samples(forward, m, 0, h))) < FEWEST for m, h in zip(moved, halves, strict=True)):
-        return without("needs segments in two halves, and frames outside of each")
+    if any(len(next(_samples(forward, m, 0, part))) < FEWEST for m, part in zip(moved, parts, strict=True)):
+        return without("needs several segments, and frames outside of each fold")
     learners = {"sparse regression (STLSQ)": _sparse, "Gaussian process": _process}
-    parts = list(zip(halves, told, moved, strict=True))
-    learnt = iter(shared([partial(_learnt, forward, learn, h, m) for learn in learners.values() for h, _, m in parts]))
+    pairs = list(zip(parts, moved, strict=True))
+    learnt = iter(shared([partial(_learnt, forward, learn, h, m) for learn in learners.values() for h, m in pairs]))
     for name in learners:
         missed, said = [], []
-        for held, known, _ in parts:  # one after the other: of each fit all cores make a part
+        for held, known in zip(parts, fits, strict=True):  # one after the other: of each fit all cores make a part
             tables, words = next(learnt)
             missed.append(_missed(forward, known, tables, held, weights))
             said.append(words)
@@ -109,14 +112,6 @@ def _missed(forward: Predictor, known: Fit, tables, held: list[int], weights: We
         return np.full(len(forward.components), np.nan), np.ones(len(forward.components))
     r = np.concatenate(f.residuals)
     return np.nansum(r**2, axis=0), np.sum(np.isfinite(r), axis=0)
-
-
-def _halves(forward: Predictor) -> list[list[int]]:
-    blocks = np.arange(len(forward.blocks))
-    recordings = np.array([b.recording for b in forward.blocks])
-    if recordings.max() > 0:
-        return [list(map(int, blocks[recordings == r])) for r in range(recordings.max() + 1)]
-    return [list(map(int, part)) for part in np.array_split(blocks, 2)]
 
 
 def _samples(forward: Predictor, motions, k: int, held: list[int]):

@@ -15,15 +15,15 @@ from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
-from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
 from origami_sim.diagnose.meeting import meetings
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
-from origami_sim.diagnose.tables import correlations, patch, suspected, table, traces
+from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
 from origami_sim.effects import get
+from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.fit.predictor import Predictor
@@ -157,7 +157,7 @@ def _diagnosed(
 
     def error(f: Fit) -> tuple[np.ndarray, list[str]]:
         said: list[str] = []
-        return attempt(said, left_out, lambda: held_out(forward, f, weights).rms, nowhere), said
+        return attempt(said, left_out, lambda: estimated(forward, f, weights).rms, nowhere), said
 
     told = shared([partial(error, node.fit) for node in posterior.nodes.values()])
     errors = {key: rms for key, (rms, _) in zip(posterior.nodes, told, strict=True)}
@@ -220,8 +220,17 @@ def _diagnosed(
             "experiments": propose(forward, *explanations(posterior), best.weights or weights, can, progress=progress)
         }
 
+    without: list[Fit] = []  # the model without any effect, refitted without each fold
+
+    def left_out_in_turn() -> dict:
+        without[:] = refitted(forward, base)
+        with_effects = without if best is base else refitted(forward, best)
+        plain, now = (predicted(forward, fits, weights) for fits in (without, with_effects))
+        rms = {"error_refitted": plain.rms.tolist(), "error_after": now.rms.tolist()}
+        return {**rms, "folds": by_fold(forward, given, plain, now)}
+
     def others() -> dict:
-        return {"baselines": baselines(forward, base, weights, errors[frozenset()])}
+        return {"baselines": baselines(forward, without, weights, np.array(out.error_refitted))}
 
     film = None if keep is None else keep.film
 
@@ -241,6 +250,7 @@ def _diagnosed(
         Part("curves", "Correlations could not be told", rest, alone=True),
         Part("curves", "What looks alike could not be told", lambda: alike(shown, base), alone=True),
         *([] if film is None else [Part("replay", "The replay could not be written", replay, alone=True, of=keep)]),
+        Part("held out", "Held-out errors are estimates by one linear step", left_out_in_turn),
         Part("next experiment", "The next experiment could not be told", experiments),
         Part("baselines", "Baselines could not be told", others),
     ]

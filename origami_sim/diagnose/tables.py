@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from origami_sim.fit.held_out import HeldOut, folds
 from origami_sim.fit.least_squares import OWED, Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.diagnosis import Candidate, Correlation, Number, Suspected, Trace
+from origami_sim.infer.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
@@ -19,7 +20,7 @@ def table(
     """All explanations that were fitted, best first, with the reason why each lost.
 
     Args:
-        errors: (D,) held-out error of each fitted set.
+        errors: (D,) held-out error of each fitted set, estimated.
     """
     chance = p.probabilities()
     out = []
@@ -142,6 +143,21 @@ def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, noise: np.ndarr
                     breaks=breaks.tolist(),
                 )
             )
+    return out
+
+
+def by_fold(forward: Predictor, given: Fit, refitted: HeldOut, after: HeldOut) -> list[Fold]:
+    """Errors by part of the data that was left out; none where nothing else was recorded."""
+    parts, out = folds(forward, given.blocks), []
+    before = HeldOut.of(forward, parts, [[given.residuals[n] for n in part] for part in parts])
+    for n, part in enumerate(parts if len(parts) > 1 else []):
+        blocks = [forward.blocks[given.blocks[k]] for k in part]
+        names = list(dict.fromkeys(forward.recordings[b.recording].name for b in blocks))
+        name = ", ".join(names)
+        if len(forward.recordings) == 1:
+            times = forward.recordings[0].times
+            name += f", {times[blocks[0].first]:.4g} to {times[blocks[-1].first] + blocks[-1].times[-1]:.4g} s"
+        out.append(Fold(name, *(e.folds[n].tolist() for e in (before, refitted, after))))
     return out
 
 

@@ -51,7 +51,8 @@ class Candidate:
             measurement.
         effects, sites: of its suspects. numbers: what was fitted.
         probability: posterior. odds: logarithm of the posterior odds over the model without an effect.
-        rms: held-out rms residual by component [SI]. fit: fit % = 100 (1 - NRMSE) by component, on all data.
+        rms: held-out rms residual by component, by one linear step [SI].
+        fit: fit % = 100 (1 - NRMSE) by component, on all data.
         why: why it lost or won. distrust: when not to trust the row, or "". failed: why it could not be fitted, or "".
     """
 
@@ -233,6 +234,21 @@ class Experiment:
 
 
 @dataclass
+class Fold:
+    """A part of the data that was left out of a fit and then predicted: its rms error by component [SI].
+
+    Attributes:
+        name: of the recordings, or the stretch of one. before: of the model as given. refitted, after: with numbers
+            that all other parts tell, without any effect and with those that are named.
+    """
+
+    name: str
+    before: list[float]
+    refitted: list[float]
+    after: list[float]
+
+
+@dataclass
 class Baseline:
     """A method that names no physics, on the same folds: held-out rms by component [SI]."""
 
@@ -255,7 +271,8 @@ class Diagnosis:
         impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
-        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component.
+        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component;
+            estimates by one linear step as long as "held out" is unfinished. folds: the same by part of the data.
         notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
         patch: numbers to write into the calibration: label -> value. changed: effects of it that the model has
             already: their numbers are changes of what it has.
@@ -295,6 +312,7 @@ class Diagnosis:
     isolability_labels: list[str] = field(default_factory=list)
     isolability: list[list[float]] = field(default_factory=list)
     experiments: list[Experiment] = field(default_factory=list)
+    folds: list[Fold] = field(default_factory=list)
     baselines: list[Baseline] = field(default_factory=list)
     unfinished: list[str] = field(default_factory=list)
 

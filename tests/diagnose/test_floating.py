@@ -11,9 +11,9 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options, Subject
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.baselines import _samples, baselines
-from origami_sim.diagnose.held_out import held_out
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
+from origami_sim.fit.held_out import predicted, refitted
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.hypotheses.hypothesis import Hypothesis, apply
 from origami_sim.hypotheses.suspects import suspects
@@ -149,8 +149,9 @@ def test_baselines_of_a_free_device_learn_the_moment_of_its_crease():
     angle, rate, missing = _samples(forward, motions_of(forward, base), 0, [0])
     assert np.ptp(angle) == pytest.approx(np.ptp(made.angles[:, 0, 0]), rel=0.1)
     assert np.polyfit(rate, missing, 1)[0] == pytest.approx(-9.8e-5, rel=0.1)
-    refitted, *others = baselines(forward, base, weights, held_out(forward, base, weights).rms)
-    assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(refitted.rms) for b in others)
+    fits = refitted(forward, base)
+    plain, *others = baselines(forward, fits, weights, predicted(forward, fits, weights).rms)
+    assert all(np.linalg.norm(b.rms) < 0.4 * np.linalg.norm(plain.rms) for b in others)
 
 
 @pytest.mark.filterwarnings("error")

@@ -23,8 +23,8 @@ def section(d: Diagnosis) -> list:
     rows = [_candidate(head, c, d) for c in d.candidates]
     about = (
         "Probability: of exactly these effects there and no others. Log odds: natural logarithm of the posterior odds "
-        "over the model without an effect. Error: root mean square over all channels, on data that were left out of "
-        "the fit."
+        "over the model without an effect. Error: root mean square over all channels, on data that are left out, "
+        "estimated by one linear step from the fit to all."
     )
     if round(d.unfitted, 2) > 0.0:
         about += f" Sets that were estimated and not fitted hold {d.unfitted:.2f}."

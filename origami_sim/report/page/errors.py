@@ -67,7 +67,21 @@ def section(d: Diagnosis) -> list:
         table(head, body, "Error of every model", kind="errors"),
         quiet(note),
         quiet(f"Noise: {', '.join(floor)}.") if has_noise(d) else "",
+        *_by_fold(d, unit),
     ]
+
+
+def _by_fold(d: Diagnosis, unit: str) -> list:
+    """A table of the parts of the data, each predicted with numbers that the others tell."""
+    if not d.folds:
+        return []
+    head = ("Left out, and told by the rest", "as given", "refitted", "now")
+    body = [
+        row(head, f.name, *(figure(times(multiples(d, rms))) for rms in (f.before, f.refitted, f.after)))
+        for f in d.folds
+    ]
+    note = f"Multiples of the {unit}. What the model was given may itself rest on these data."
+    return [table(head, body, "Error by part of the data"), quiet(note)]
 
 
 def _strip(values, total: float, low: float, high: float, kind: str, label: str) -> Html:

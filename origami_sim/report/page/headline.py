@@ -56,7 +56,10 @@ def numbers(d: Diagnosis) -> Html:
         out.append(("Probability", "not stated", "no explanation is believed"))
     if np.isfinite(after):
         again = f"; {number(refitted)} by refitting alone" if np.isfinite(refitted) else ""
-        out.append(("Error", f"{number(before)} → {number(after)}", f"times the {unit}, as given → now{again}"))
+        parts = [v for f in d.folds if np.isfinite(v := multiples(d, f.after))]
+        spread = f"; {number(min(parts))} to {number(max(parts))} by what is left out" if parts else ""
+        said = f"times the {unit} where left out, as given → now{again}{spread}"
+        out.append(("Error", f"{number(before)} → {number(after)}", said))
     else:
         out.append(("Error", "not measured", "nothing could be left out and predicted"))
     out.append(("Compared", "100 %" if d.compared >= 1.0 else percent(known(d.compared)), "of the recorded frames"))
