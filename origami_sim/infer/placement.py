@@ -99,6 +99,7 @@ def forget(out: Posterior, key: Key) -> None:
     """Leaves out a fit of a set, what was estimated by it, and that it was polished: the next one has to be as well."""
     out.nodes.pop(key, None)
     out.polished.discard(key)
+    out.ahead = {k: one for k, one in out.ahead.items() if key not in (k, one[1].parent)}
     for k in [k for k, e in out.estimates.items() if e.parent == key]:
         out.drop(k)
 

@@ -189,12 +189,9 @@ def _again(out: Posterior, forward: Predictor) -> bool:
     key = max(early, key=lambda k: early[k])
     _, estimate = out.ahead.pop(key)
     out.renewed.add(key)
-    if estimate.parent in out.nodes:
-        before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate))
-        if not f.failed:
-            node, _ = _node(out, forward, key, f)
-            if node.evidence.max() > before.evidence.max():
-                _add(out, forward, key, f, log_priors(out.signatures))
+    before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate))
+    if not f.failed and _node(out, forward, key, f)[0].evidence.max() > before.evidence.max():
+        _add(out, forward, key, f, log_priors(out.signatures))
     return True
 
 
