@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from origami_sim.fit.held_out import folds
+from origami_sim.fit.held_out import HeldOut, folds
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import NOMINAL, Free, Hypothesis, Subject
@@ -79,14 +79,15 @@ def baselines(forward: Predictor, fits: Sequence[Fit], weights: Weights, referen
     pairs = list(zip(parts, moved, strict=True))
     learnt = iter(shared([partial(_learnt, forward, learn, h, m) for learn in learners.values() for h, m in pairs]))
     for name in learners:
-        missed, said = [], []
+        rest, said = [], []
         for held, known in zip(parts, fits, strict=True):  # one after the other: of each fit all cores make a part
             tables, words = next(learnt)
-            missed.append(_missed(forward, known, tables, held, weights))
+            rest.append(_predict(forward, known, tables, held, weights))
             said.append(words)
-        squares, seen = zip(*missed, strict=True)
-        rms = np.sqrt(sum(squares) / np.maximum(sum(seen), 1))
-        out.append(Baseline(name, np.atleast_1d(rms).tolist(), said[0]))
+        rms = np.full(len(forward.components), np.nan)  # where it cannot be simulated
+        if not any(f.failed for f in rest):
+            rms = HeldOut.of(forward, parts, [f.residuals for f in rest]).rms
+        out.append(Baseline(name, rms.tolist(), said[0]))
     return out
 
 
@@ -100,18 +101,6 @@ def _learnt(forward: Predictor, learn: Callable, held: list[int], motions) -> tu
         tables.append((grid_a, grid_w, values))
         said.append(text)
     return tables, "; ".join(said)
-
-
-def _missed(forward: Predictor, known: Fit, tables, held: list[int], weights: Weights) -> tuple[np.ndarray, np.ndarray]:
-    """What a learnt correction misses on segments that are held out: squares (D,), and how many.
-
-    Not a number where it cannot be simulated.
-    """
-    f = _predict(forward, known, tables, held, weights)
-    if f is None or f.failed:
-        return np.full(len(forward.components), np.nan), np.ones(len(forward.components))
-    r = np.concatenate(f.residuals)
-    return np.nansum(r**2, axis=0), np.sum(np.isfinite(r), axis=0)
 
 
 def _samples(forward: Predictor, motions, k: int, held: list[int]):
@@ -209,7 +198,7 @@ def _process(a, w, y, grid_a, grid_w):
     return (cross @ alpha).reshape(len(grid_a), len(grid_w)), f"length scale {length:g}, {part:.0%} of the variance"
 
 
-def _predict(forward: Predictor, base: Fit, tables, held: list[int], weights: Weights) -> Fit | None:
+def _predict(forward: Predictor, base: Fit, tables, held: list[int], weights: Weights) -> Fit:
     """Fit of the starts of the held-out segments with the learnt moment in the model."""
     count = len(forward.subject.nominals)
     build = forward.subject.build

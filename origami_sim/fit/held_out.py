@@ -86,10 +86,11 @@ def refitted(forward: Predictor, f: Fit) -> list[Fit]:
     numbers, parts, out = f.coordinates, folds(forward, f.blocks), []
     for part, (step, sharp) in zip(parts, without(f, parts), strict=True):
         rest = [n for n in range(len(f.blocks)) if n not in part]
-        found = replace(f, theta=numbers.values(numbers.of(f.theta) + step))
         if rest and len(f.free):
             found, owed = settled(forward, _among(forward, _known_by(f, sharp), rest))
             found = carried_on(forward, found) if owed >= OWED else found
+        else:
+            found = replace(f, theta=numbers.values(numbers.of(f.theta) + step))
         if found.failed:
             raise InputError(f"a fit without a part of the data fails: {found.failed}")
         out.append(found)

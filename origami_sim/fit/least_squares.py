@@ -190,8 +190,9 @@ def linearise(
     rows = [forward.blocks[b].rows(*link) for b, link in zip(blocks, links(forward, blocks), strict=True)]
 
     moves = np.eye(count, len(free))[kept:] * np.append(steps, np.zeros(len(free) - count))
-    if axes is not None and count and not kept:
-        moves = axes.copy()
+    oblique = axes is not None and not kept
+    if oblique:
+        moves = np.array(axes)
 
     def differences(some: np.ndarray, starts: int) -> list[np.ndarray]:
         """Per block, whitened changes [k + starts, r] by moves [k, P] of coordinates, and by steps of the starts."""
@@ -218,12 +219,12 @@ def linearise(
         moves[bent] *= 0.5 * least / large[bent][:, None]  # so that they need not be halved again nearby
         for c, new in zip(changes, differences(moves[bent], 0), strict=True):
             c[bent] = new
-    if axes is None or kept:
-        steps[kept:] = np.diag(moves[:, kept:])
-        tangent = [c[:fresh].T / steps[kept:] for c in changes]
-    else:
+    if oblique:
         back = np.linalg.inv(moves).T
         tangent = [c[:fresh].T @ back for c in changes]
+    else:
+        steps[kept:] = np.diag(moves[:, kept:])
+        tangent = [c[:fresh].T / steps[kept:] for c in changes]
     if known is not None:
         return replace(known.at(residual).beside(tangent, kept), steps=steps)
     slopes, tie = [], []

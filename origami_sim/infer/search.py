@@ -190,8 +190,10 @@ def _again(out: Posterior, forward: Predictor) -> bool:
     _, estimate = out.ahead.pop(key)
     out.renewed.add(key)
     before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate))
-    if not f.failed and _node(out, forward, key, f)[0].evidence.max() > before.evidence.max():
-        _add(out, forward, key, f, log_priors(out.signatures))
+    if not f.failed:
+        node, effects = _node(out, forward, key, f)
+        if node.evidence.max() > before.evidence.max():
+            _entered(out, forward, node, effects, log_priors(out.signatures))
     return True
 
 
@@ -267,14 +269,13 @@ def polished(out: Posterior, forward: Predictor) -> bool:
         if not leaders:
             return some
         key = max(leaders, key=lambda k: reach[k])
-        now = out.nodes[key].fit
-        if now.exact and now.cost - promised(forward, now) < OWED:
-            out.polished.add(key)
-            continue
-        before, f, some = out.total[key], _to_the_end(forward, now), True
-        if not f.failed:
-            _add(out, forward, key, f, prior)
-        if f.failed or out.nodes[key].owed < OWED or out.total[key] < before + OWED:
+        before, now = out.total[key], out.nodes[key].fit
+        f = _to_the_end(forward, now)
+        if f is not now:
+            some = True
+            if not f.failed:
+                _add(out, forward, key, f, prior)
+        if f is now or f.failed or out.nodes[key].owed < OWED or out.total[key] < before + OWED:
             out.polished.add(key)
 
 
@@ -294,7 +295,11 @@ def _in_the_leaders_noise(out: Posterior, forward: Predictor, prior: np.ndarray)
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
     """Judges a fitted set, and all that add one or two effects to it if it leads, or leads those of its size."""
-    node, effects = _node(out, forward, key, f)
+    _entered(out, forward, *_node(out, forward, key, f), prior)
+
+
+def _entered(out: Posterior, forward: Predictor, node: Node, effects: Columns, prior: np.ndarray) -> None:
+    """Enters a judged set, see `_add`."""
     if _leads(out, node, prior):
         own = OwnColumns(node.fit)
         coloured = node.fit.weights is not None and node.fit.weights.colour

@@ -206,8 +206,8 @@ def test_what_one_stretch_tells_alone_is_not_known_when_it_is_left_out(rubbing):
     ]
     wide = tuple(replace(f, spread=np.inf) for f in base.free)
     left = estimated(forward, replace(base, free=wide, linear=replace(line, residual=asks)), base.weights)
-    missed = np.linalg.norm(left.folds, axis=1)
-    assert len(missed) == 5 and missed[0] > 1.7 * max(missed[1:])
+    squares = np.sum(left.folds**2, axis=1)
+    assert len(squares) == 5 and squares[0] > 3.0 * max(squares[1:])
 
 
 def test_errors_by_simulation_are_those_of_fits_to_all_else(found, rubbing):
@@ -221,7 +221,7 @@ def test_errors_by_simulation_are_those_of_fits_to_all_else(found, rubbing):
     assert all(f.cost < other.cost + OWED and f.blocks == other.blocks for f, other in zip(fits, anew, strict=True))
     errors = predicted(forward, fits, weights)
     assert errors.folds.shape == (5, 2)
-    assert errors.folds == pytest.approx(predicted(forward, anew, weights).folds, rel=0.02)
+    assert errors.folds == pytest.approx(predicted(forward, anew, weights).folds, rel=0.005)
 
 
 def test_a_strength_of_which_one_stretch_alone_tells_is_none_when_that_is_left_out(found, rubbing):
@@ -313,7 +313,7 @@ def test_one_law_by_two_names_is_a_tie():
     found = search(forward, base, screen(forward, every, base, weights), weights)
     total = {found.effects(k): found.total[k] for k in found.nodes}
     drag, loss = (total[frozenset(("crease_friction", name))] for name in ("air_drag", "crease_quadratic_damping"))
-    assert abs(drag - loss) < 1.0 and max(total.values()) == max(drag, loss)
+    assert abs(drag - loss) < 0.6 and max(total.values()) == max(drag, loss)
 
 
 def test_what_friction_remembers_is_of_each_worlds_own_motion():
@@ -327,6 +327,5 @@ def test_what_friction_remembers_is_of_each_worlds_own_motion():
     local = np.zeros((2, len(forward.blocks), forward.local))
     beside = forward.predict(Hypothesis((one,)), np.array([given, heavier]), local)
     alone = forward.predict(Hypothesis((one,)), heavier[None], local[:1])
-    noise = forward.blocks[0].noise
-    assert max(np.abs(b[1] - a[0]).max() for b, a in zip(beside, alone, strict=True)) < 1e-3 * noise
-    assert max(np.abs(b[0] - a[0]).max() for b, a in zip(beside, alone, strict=True)) > noise
+    assert max(np.abs(b[1] - a[0]).max() for b, a in zip(beside, alone, strict=True)) < 1e-12
+    assert max(np.abs(b[0] - a[0]).max() for b, a in zip(beside, alone, strict=True)) > 0.02
