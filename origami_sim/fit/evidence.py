@@ -248,6 +248,28 @@ class Summed:
         far = np.log1p((value / sets.usual) ** 2) + log_usual(sets.usual * norm, hyper)
         return out + np.sum(inside - far, axis=-1), value
 
+    def lost(self, groups: Sequence[Group], lacking: Sequence[int]) -> float:
+        """Squares over the noise that a fit of groups misses more without some of them, all others refitted.
+
+        Numbers that a bound holds stay there.
+        """
+        return self._missed(groups, lacking) - self._missed(groups, ())
+
+    def _missed(self, groups: Sequence[Group], lacking: Sequence[int]) -> float:
+        """Squares that groups miss, priors of their shapes included, without some of them."""
+        columns = [c for g in groups for c in g.columns]
+        at, spread = np.concatenate([g.at for g in groups]), np.concatenate([g.spread for g in groups])
+        strength = np.concatenate([np.arange(len(g.columns)) < g.strengths for g in groups])
+        gone = np.concatenate([np.full(len(g.columns), n in lacking) for n, g in enumerate(groups)])
+        back = np.where(gone & strength, at, 0.0)
+        gram, right, square = self.gram[columns][:, columns], self.gram[columns, -1], self.gram[-1, -1]
+        square = square + back @ (2.0 * right + gram @ back)
+        free = ~(gone | np.isin(columns, at_bounds(groups)))
+        known = np.where(strength, 0.0, 1.0 / spread)[free] ** 2
+        slope = (right + gram @ back)[free] - known * at[free]
+        move, *_ = np.linalg.lstsq(gram[free][:, free] + np.diag(known), slope, rcond=1e-14)
+        return float(square + known @ at[free] ** 2 - slope @ move)
+
 
 def summed(p: Problem, smooth: float, flaws: float, held: Sequence[int] = ()) -> Summed:
     """Sums out flaws and a discrepancy of the channels whose sizes are standard deviations of noise, see `Hyper`.

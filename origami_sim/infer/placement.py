@@ -163,7 +163,7 @@ def _judge(
     for n, key in enumerate(keys):
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
-        if key in out.nodes and key and key < node.key and key not in out.renewed and n in values:
+        if key in out.nodes and key and key < node.key and (key, node.key) not in out.renewed and n in values:
             known, _ = out.ahead.get(key, (out.total[key] + OWED, None))
             if totals[n] > known:  # its own fit ended early
                 near = (len(key ^ node.key), 0.0)

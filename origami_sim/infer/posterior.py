@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import logsumexp
+from scipy.stats import chi2
 
 from origami_sim.fit.evidence import Group, Problem, Summed
 from origami_sim.fit.hyper import HYPER, Hyper
@@ -16,6 +17,9 @@ from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.screen import Signature
 
 Key = frozenset[int]
+
+SURE = 0.95
+"""Probability with which a strength is told from zero, as by its stated interval."""
 
 
 @dataclass(eq=False)
@@ -74,12 +78,12 @@ class Posterior:
             about.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
-        ahead: sets that were fitted and of which a larger one promises more: what, and how. renewed: those that
-            were fitted again for it. polished: leaders that were fitted on. begun: numbers from which single effects
-            are fitted, where those are not linear about the refitted model. reconsidered: whether all were tried over
-            their ranges. swapped: by how much single effects were better than they promised in the place of the best
-            set. realised: log Bayes factors of sets over the fit that their estimates are about, as estimated and as
-            fitted, by that fit. rough: whether fits end in many basins, see `basins`.
+        ahead: sets that were fitted and of which a larger one promises more: what, and how. renewed: sets that
+            were fitted again for it, with that larger one. polished: leaders that were fitted on. begun: numbers from
+            which single effects are fitted, where those are not linear about the refitted model. reconsidered: whether
+            all were tried over their ranges. swapped: by how much single effects were better than they promised in
+            the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
+            as estimated and as fitted, by that fit. rough: whether fits end in many basins, see `basins`.
     """
 
     signatures: list[Signature]
@@ -97,7 +101,7 @@ class Posterior:
     store: bool = False
     smooth: list[np.ndarray] = field(default_factory=list)
     ahead: dict[Key, tuple[float, Estimate]] = field(default_factory=dict)
-    renewed: set[Key] = field(default_factory=set)
+    renewed: set[tuple[Key, Key]] = field(default_factory=set)
     polished: set[Key] = field(default_factory=set)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
@@ -161,6 +165,27 @@ class Posterior:
     def effects(self, key: Key) -> frozenset[str]:
         """What acts in a set, wherever it does."""
         return frozenset(self.suspect(n).effect for n in key)
+
+    def told(self, key: Key) -> frozenset[str]:
+        """Effects of a set, without those whose strengths its fit does not tell from zero: a Wald test.
+
+        A set is judged beside a discrepancy that its fit lacks. Where that is large, an effect may be probable which
+        the fit hardly has: of it there is no strength to say.
+        """
+        node, every = self.nodes.get(key), self.effects(key)
+        if node is None or not key:
+            return every
+        gaps = len(self.hyper.cells) // len(self.hyper.gaps)  # the first cell of each gap has the least discrepancy
+        cell = node.grid[gaps * int(np.argmax(node.evidence[::gaps]))]
+        own = node.groups[: len(key)]
+        effects = [s.effect for s in node.fit.hypothesis.suspects]
+        idle = set()
+        for effect in every if cell is not None else ():
+            mine = [n for n, e in enumerate(effects) if e == effect]
+            strengths = sum(own[n].strengths for n in mine)
+            if cell.lost(own, mine) < chi2.ppf(SURE, strengths):
+                idle.add(effect)
+        return every - idle
 
     def suspect(self, n: int) -> Suspect:
         return self.signatures[n].suspect

@@ -188,8 +188,9 @@ def _again(out: Posterior, forward: Predictor) -> bool:
         return False
     key = max(early, key=lambda k: early[k])
     _, estimate = out.ahead.pop(key)
-    out.renewed.add(key)
-    before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate))
+    out.renewed.add((key, estimate.parent))
+    noise = out.nodes[estimate.parent].fit.weights
+    before, f = out.nodes[key], _finished(out, forward, _fitted(out, forward, key, estimate), noise)
     if not f.failed:
         node, effects = _node(out, forward, key, f)
         if node.evidence.max() > before.evidence.max():
@@ -218,12 +219,16 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     _without_idle_branches(out, forward, key)
 
 
-def _finished(out: Posterior, forward: Predictor, f: Fit) -> Fit:
-    """A fit that goes on in its own noise, by derivatives taken there, until these promise nothing more."""
+def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None = None) -> Fit:
+    """A fit that goes on in its own noise, by derivatives taken there, until these promise nothing more.
+
+    Args:
+        noise: that of another fit, which is tried beside the leader's.
+    """
     if f.failed:
         return f
-    leading = out.nodes[out.leader].fit.weights
-    own, _ = with_own_noise(forward, f, out.hyper, [leading] if leading is not None else [])
+    known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
+    own, _ = with_own_noise(forward, f, out.hyper, known)
     on = _to_the_end(forward, own)
     return own if on.failed else on
 

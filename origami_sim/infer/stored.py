@@ -130,7 +130,7 @@ class Stored:
             for s, side, status in self.suspects
         ]
         out = Posterior(signatures, Weights(np.ones(1)), hyper)
-        out.failed, out.renewed = dict.fromkeys(self.failed, ""), set(self.nodes)
+        out.failed = dict.fromkeys(self.failed, "")
         prior = log_priors(signatures, hyper)
         for key, node in self.nodes.items():
             judge_by = place if key in self.wide else enter

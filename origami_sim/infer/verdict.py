@@ -61,8 +61,9 @@ class Decision:
     Attributes:
         word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
         credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
-            named, or of them. chance: posterior of the sets that may be named, see `considered`. foreign: that a law
-            which the catalogue lacks is imitated by them.
+            named, or of them. chance: posterior of the sets that may be named, see `considered`. classes: the same of
+            their effects, without those that are not told from nothing. foreign: that a law which the catalogue lacks
+            is imitated by them.
     """
 
     word: str
@@ -72,6 +73,7 @@ class Decision:
     tie: bool
     probability: float
     chance: dict[Key, float]
+    classes: dict[frozenset[str], float]
     foreign: float
 
 
@@ -96,7 +98,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     foreign = p.hyper.foreign(laws(beside[0] if beside else lead)) if lead else imitated(p, chance, named)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
-        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, foreign)
+        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, classes, foreign)
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
@@ -139,9 +141,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         return budgets[key]
 
     d = decide(p, budgeted)
-    chance = d.chance
+    chance, classes = d.chance, d.classes
     more_laws = len(chance) < len(p.total)  # only some may be named
-    classes = by_effects(p, chance)
     best = p.nodes[d.best].fit
     left = crease_of_the_rest(forward, best, p.hyper) if d.lead and _shows(budgeted(d.best).rest) else ""
     shown, explained = widened(p, d.best), _explained(budgeted(d.best), left)
@@ -281,17 +282,17 @@ def odds_of_numbers(given: Fit, base: Fit) -> float:
 
 
 def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], float]:
-    """Posterior of each set of effects, wherever they act."""
+    """Posterior of each set of effects, wherever they act, without those that are not told from nothing."""
     out: dict[frozenset[str], float] = {}
     for key, value in chance.items():
-        c = p.effects(key)
+        c = p.told(key)
         out[c] = out.get(c, 0.0) + value
     return out
 
 
 def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
     """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
-    mine = [(value, c) for key, value in chance.items() if (c := p.effects(key)) in classes]
+    mine = [(value, c) for key, value in chance.items() if (c := p.told(key)) in classes]
     total = sum(value for value, _ in mine)
     return sum(value * p.hyper.foreign(laws(c)) for value, c in mine) / total if total else 0.0
 

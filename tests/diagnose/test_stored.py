@@ -68,7 +68,7 @@ def test_other_hyperparameters_give_what_the_fits_give_with_them(kept, changed):
     _, stored, forward, p = kept
     hyper = replace(HYPER, **changed)
     direct = Posterior(p.signatures, p.weights, hyper)
-    direct.failed, direct.renewed = dict(p.failed), set(p.nodes)
+    direct.failed = dict(p.failed)
     prior = log_priors(p.signatures, hyper)
     for key, node in p.nodes.items():
         again, _ = judged(direct, forward, key, node.fit, node.owed)

@@ -7,13 +7,14 @@ from typing import cast
 import numpy as np
 import pytest
 
+from origami_sim.fit.evidence import Group, Summed
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share
 from origami_sim.infer.diagnosis import Acting, Curve, Place
-from origami_sim.infer.posterior import Estimate, Posterior, realised_part
+from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.verdict import credible, decide, in_all, undecided
 from origami_sim.infer.words import joined, said, say, title
@@ -175,6 +176,21 @@ def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
     p.log = {key: np.where(HYPER.clean, log, -np.inf) for key, log in p.total.items()}
     p.nodes = cast(dict, dict.fromkeys(p.total))
     return p
+
+
+@pytest.mark.parametrize(("deviations", "lead"), [(1.5, {"air_drag"}), (5.0, {"air_drag", "crease_friction"})])
+def test_an_effect_whose_strength_is_not_told_from_zero_is_not_named(deviations, lead):
+    """Friction is probable beside drag, as it would explain part of a discrepancy; its fit has hardly any."""
+    p = posterior({("air_drag", "crease_friction"): 0.0, ("air_drag",): -4.0, (): -50.0})
+    at = np.array([30.0, deviations])
+    groups = [Group((k,), 1, at[k : k + 1], 1, np.full(1, np.inf)) for k in range(2)]
+    both = Summed(np.diag([1.0, 1.0, 40.0]), 0.0)  # where the fit ended, in units of what is known of each strength
+    key = frozenset({0, 1})
+    fitted = cast(Fit, SimpleNamespace(hypothesis=Hypothesis(tuple(s.suspect for s in p.signatures))))
+    grid = [both, *[None] * (len(HYPER.cells) - 1)]
+    p.nodes[key] = Node(key, fitted, np.where(HYPER.clean, 0.0, -np.inf), groups, [], grid)
+    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert decided.lead == lead and decided.best == frozenset(n for n, e in enumerate(sorted(lead)))
 
 
 def test_an_effect_at_two_sites_is_named_once():
