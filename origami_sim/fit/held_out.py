@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from origami_sim.fit.weights import Weights, restored
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.recording import Recording
+from origami_sim.threads import shared
 
 FOLDS = 5
 """Folds of a single recording: contiguous stretches, so that neighbours do not give each other away."""
@@ -75,7 +77,7 @@ def estimated(forward: Predictor, f: Fit, alike: Weights) -> HeldOut:
 
 
 def refitted(forward: Predictor, f: Fit) -> list[Fit]:
-    """Fits of the same numbers to all but each fold, by simulation; see `folds`.
+    """Fits of the same numbers to all but each fold, by simulation; see `folds`. They have no residuals.
 
     Strengths have the normal prior of the evidence, at its mode: what only the fold that is left out tells of one is
     not known.
@@ -83,18 +85,24 @@ def refitted(forward: Predictor, f: Fit) -> list[Fit]:
     Raises:
         InputError: a fit without a fold fails.
     """
-    numbers, parts, out = f.coordinates, folds(forward, f.blocks), []
-    for part, (step, sharp) in zip(parts, without(f, parts), strict=True):
-        rest = [n for n in range(len(f.blocks)) if n not in part]
-        if rest and len(f.free):
-            found, owed = settled(forward, _among(forward, _known_by(f, sharp), rest))
-            found = carried_on(forward, found) if owed >= OWED else found
-        else:
-            found = replace(f, theta=numbers.values(numbers.of(f.theta) + step))
-        if found.failed:
-            raise InputError(f"a fit without a part of the data fails: {found.failed}")
-        out.append(found)
-    return out
+    parts = folds(forward, f.blocks)
+    steps, sharp = zip(*without(f, parts), strict=True)
+    known = [_known_by(f, s) for s in sharp]
+    found = shared([partial(_refitted, forward, *one) for one in zip(known, parts, steps, strict=True)])
+    return [replace(new, hypothesis=k.hypothesis, free=k.free) for new, k in zip(found, known, strict=True)]
+
+
+def _refitted(forward: Predictor, f: Fit, part: Sequence[int], step: np.ndarray) -> Fit:
+    """A fit to all but some segments, begun by a step of the coordinates (P,); without what is large."""
+    rest = [n for n in range(len(f.blocks)) if n not in part]
+    if rest and len(f.free):
+        found, owed = settled(forward, _among(forward, f, rest))
+        found = carried_on(forward, found) if owed >= OWED else found
+    else:
+        found = replace(f, theta=f.coordinates.values(f.coordinates.of(f.theta) + step))
+    if found.failed:
+        raise InputError(f"a fit without a part of the data fails: {found.failed}")
+    return replace(found, linear=None, residuals=[])
 
 
 def predicted(forward: Predictor, fits: Sequence[Fit], alike: Weights) -> HeldOut:
@@ -106,13 +114,17 @@ def predicted(forward: Predictor, fits: Sequence[Fit], alike: Weights) -> HeldOu
     Raises:
         InputError: a simulation fails.
     """
-    parts, rest = folds(forward, range(len(forward.blocks))), []
-    for part, f in zip(parts, fits, strict=True):
-        found = fit(forward, f.hypothesis, alike, theta=f.theta, local=f.local, blocks=part, fixed=True)
-        if found.failed:
-            raise InputError(f"what is left out cannot be predicted: {found.failed}")
-        rest.append(found.residuals)
-    return HeldOut.of(forward, parts, rest)
+    parts = folds(forward, range(len(forward.blocks)))
+    jobs = [partial(_predicted, forward, f, alike, part) for part, f in zip(parts, fits, strict=True)]
+    return HeldOut.of(forward, parts, shared(jobs))
+
+
+def _predicted(forward: Predictor, f: Fit, alike: Weights, part: Sequence[int]) -> list[np.ndarray]:
+    """Residuals (n, D) [SI] of some segments with the numbers of a fit."""
+    found = fit(forward, f.hypothesis, alike, theta=f.theta, local=f.local, blocks=part, fixed=True)
+    if found.failed:
+        raise InputError(f"what is left out cannot be predicted: {found.failed}")
+    return found.residuals
 
 
 def _known_by(f: Fit, sharp: np.ndarray) -> Fit:

@@ -33,49 +33,63 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Wei
     true: what they promise beyond that counts for nothing. A fit that ended in coloured noise of its own goes on in it.
     """
     assert f.weights is not None
-    found = [] if f.exact and f.weights.colour else [*implied(forward, f, hyper)]
-    for noise in (f.weights, *known) if f.weights.colour else known:
-        other = f.reweighted(noise)
-        found.append(climbed(forward, other, log_evidence(other), (True,)))
+    found = implied(forward, f, hyper, (f.weights, *known) if f.weights.colour else known)
     best, most = (f, 0.0), -np.inf
-    for log, one in sorted(found, key=lambda each: -each[0]):
+    for log, noise in sorted(found, key=lambda each: -each[0]):
         if log <= most:
             break
-        one, owed = settled(forward, one)
+        one, owed = settled(forward, f.reweighted(noise))
         if (log := log_evidence(one) - 0.5 * owed) > most:
             best, most = (one, owed), log
     return best
 
 
-def implied(forward: Predictor, f: Fit, hyper: Hyper) -> list[tuple[float, Fit]]:
-    """Log evidence of a fit and itself in noise that follows from white noise: no gaps beside the best are better."""
+def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] = ()) -> list[tuple[float, Weights]]:
+    """Log evidence of a fit in noise that it implies, and that noise, from each known one, and from white noise.
+
+    From white noise with gaps of a size and of those beside it, none of which is better.
+    """
     assert f.linear is not None and f.weights is not None
+    others = [(noise, (True,)) for noise in known]
+    if f.exact and f.weights.colour:
+        return _all_climbed(forward, f, others)
     sizes = hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
     place = int(np.argmax(shared([partial(log_evidence, f, gap) for gap in sizes])))
-    fits: dict[int, tuple[float, Fit]] = {}
+    fits: dict[int, tuple[float, Weights]] = {}
+    out: list[tuple[float, Weights]] = []
     while True:
-        for n in range(max(place - 1, 0), min(place + 2, len(sizes))):
-            if n not in fits:
-                fits[n] = at_gap(forward, f, sizes[n])
+        new = [n for n in range(max(place - 1, 0), min(place + 2, len(sizes))) if n not in fits]
+        begin = [white(forward, f.weights.deviation, sizes[n]) for n in new]
+        found = _all_climbed(forward, f, [*((w, (False, True)) for w in begin), *others])
+        fits |= zip(new, found, strict=False)
+        out += found[len(new) :]
+        others = []
         best = max(fits, key=lambda n: fits[n][0])
         if best == place:
-            return list(fits.values())
+            return [*fits.values(), *out]
         place = best
 
 
-def at_gap(forward: Predictor, f: Fit, gap: float) -> tuple[float, Fit]:
-    """Log evidence of a fit with gaps of a size and the most probable noise, and the fit in it.
+def _all_climbed(
+    forward: Predictor, f: Fit, begin: Sequence[tuple[Weights, Sequence[bool]]]
+) -> list[tuple[float, Weights]]:
+    """Log evidence of a fit in the noise that is reached from each of some, see `_climbed`, and that noise."""
+    found = shared([partial(_climbed, forward, f, *one) for one in begin])
+    # where nothing is better it is the same object, which others know it by
+    return [(log, new or noise) for (log, new), (noise, _) in zip(found, begin, strict=True)]
 
-    What a fit leaves is less than the noise, and coloured where that is white, as segments and numbers follow the
-    data. So levels and colours that are read from it are taken only while the evidence grows, white ones first.
+
+def _climbed(forward: Predictor, f: Fit, noise: Weights, kinds: Sequence[bool]) -> tuple[float, Weights | None]:
+    """Log evidence of a fit in the most probable noise that is reached from one, and that noise if it is another.
+
+    What a fit leaves is less than the noise, and coloured where that is white, as segments and numbers follow the data.
+    So levels and colours that are read from it are taken only while they raise the evidence, white ones first.
+
+    Args:
+        kinds: whether colours are read, or levels alone, in turn.
     """
-    assert f.weights is not None
-    begin = f.reweighted(white(forward, f.weights.deviation, gap))
-    return climbed(forward, begin, log_evidence(begin), (False, True))
-
-
-def climbed(forward: Predictor, best: Fit, log: float, kinds: Sequence[bool]) -> tuple[float, Fit]:
-    """Log evidence and fit with noise that is read from what the fit leaves while that raises the evidence."""
+    best, at = f.reweighted(noise), None
+    log = log_evidence(best)
     for coloured in kinds:
         for _ in range(ROUNDS):
             assert best.weights is not None
@@ -83,8 +97,8 @@ def climbed(forward: Predictor, best: Fit, log: float, kinds: Sequence[bool]) ->
             new = best.reweighted(left_by(forward, left, best.weights.gap, coloured=coloured))
             if (found := log_evidence(new)) < log + OWED:
                 break
-            best, log = new, found
-    return log, best
+            best, log, at = new, found, new.weights
+    return log, at
 
 
 def log_evidence(f: Fit, gap: float | None = None) -> float:
