@@ -67,19 +67,24 @@ class Budget:
         return sum(s.share for s in self.shares if s.kind == "rest")
 
 
-def budget(forward: Predictor, given: Fit, base: Fit, best: Fit) -> Budget:
+def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weights | None = None) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
     What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
     all numbers refitted. Noise is what the best explanation leaves once forces that are missing are allowed for, up to
     what the recorder shows; the budget allows for next to none.
+
+    Args:
+        recorder: noise of the recorder, where what the best explanation leaves is none.
     """
     assert best.weights is not None
-    recorder, over, now = recorder_noise(forward, best), over_noise(forward, best), bursts(best)
-    level = np.minimum(best.weights.deviation, recorder)
+    over, now = over_noise(forward, best), bursts(best)
+    level, colour = np.minimum(best.weights.deviation, recorder_noise(forward, best)), best.weights.colour
+    if recorder is not None:
+        level, colour = np.minimum(level, recorder.deviation), recorder.colour
     if now.probability > 0.5:
         level = np.minimum(level, np.maximum(now.level, forward.blocks[0].noise))
-    noise = Weights(level, best.weights.colour, HYPER.least)
+    noise = Weights(level, colour, HYPER.least)
     count = float(sum(forward.blocks[b].seen().sum() for b in best.blocks))
 
     def missed(f: Fit) -> float:

@@ -15,7 +15,10 @@ from origami_sim.infer.posterior import Key, Posterior
 
 def mismatch(p: Posterior, forward: Predictor, given: Fit, base: Fit, key: Key) -> Budget:
     """The budget of a fitted set, and how probable it is that what it leaves is real."""
-    return replace(budget(forward, given, base, p.nodes[key].fit), real=remainder(p, forward, key))
+    f, real = p.nodes[key].fit, remainder(p, forward, key)
+    # what is real is no noise: of that there is what is read where no motion reaches
+    recorder = recorder_weights(forward, f)[-1] if real > 0.5 else None
+    return replace(budget(forward, given, base, f, recorder), real=real)
 
 
 def remainder(p: Posterior, forward: Predictor, key: Key) -> float:

@@ -8,7 +8,8 @@ from test_curves import MOMENT_NOISE, REST, K, coupon, torque
 from test_unlisted import SMALL, searched
 
 from origami_sim.diagnose import diagnose
-from origami_sim.infer.remainder import remainder
+from origami_sim.infer.remainder import mismatch
+from origami_sim.infer.verdict import decide
 from tests.diagnose.strips import record
 
 NOISE = 2e-3
@@ -38,7 +39,10 @@ def test_a_wave_is_real_and_what_a_tracker_averages_is_not(noise, real):
     made, rng = record(noise=1e-6, **SMALL), np.random.default_rng(5)
     noisy = {n: c.values + NOISE * noise(rng, len(c.values)) for n, c in made.channels.items()}
     channels = {n: replace(c, values=noisy[n], noise=NOISE) for n, c in made.channels.items()}
-    forward, _, _, found = searched(replace(made, channels=channels), "air_drag")
+    forward, given, base, found = searched(replace(made, channels=channels), "air_drag")
     assert any(len(c) > 1 for c in found.nodes[frozenset()].fit.weights.colour)
-    assert (remainder(found, forward, frozenset()) > 0.9) == real
-    assert (remainder(found, forward, frozenset()) < 0.5) != real
+    left = mismatch(found, forward, given, base, frozenset())
+    assert (left.real > 0.9) == real
+    assert (left.real < 0.5) != real
+    assert (left.rest > 0.5) == real and left.named == 0.0
+    assert (decide(found, lambda key: left).word == "UNKNOWN") == real
