@@ -105,7 +105,8 @@ def _analogous(out: Posterior) -> Key | None:
         for rival in out.nodes:
             key = (rival - gone) | new
             if len(rival) == len(one) and gone <= rival and not new & rival and key in out.estimates:
-                promise[key] = out.total[rival] + out.total[best] - out.total[one]
+                known = promise.get(key, -np.inf)
+                promise[key] = max(known, out.total[rival] + out.total[best] - out.total[one])
     return max((k for k, p in promise.items() if p >= near), key=lambda k: promise[k], default=None)
 
 

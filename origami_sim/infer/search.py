@@ -204,6 +204,10 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
     swapped = in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
     fitted = _finished(out, forward, _fitted(out, forward, key, estimate))
+    if (within := better_within(out, fitted, key)) is not None:
+        again = _finished(out, forward, continued_from(out, forward, key, within), within.fit.weights)
+        if not again.failed and (fitted.failed or log_evidence(again) > log_evidence(fitted)):
+            fitted = again
     if fitted.failed:
         out.failed[key] = fitted.failed
         out.drop(key)
@@ -217,6 +221,23 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)
+
+
+def better_within(out: Posterior, f: Fit, key: Key) -> Node | None:
+    """The best fitted set within another, if it misses less in its noise: then the fit of the larger went astray."""
+    inside = [node for k, node in out.nodes.items() if k and k < key]
+    best = max(inside, key=lambda node: node.evidence.max(), default=None)
+    if best is None or f.failed or best.fit.weights is None:
+        return best
+    return best if f.reweighted(best.fit.weights).cost > best.fit.cost + OWED else None
+
+
+def continued_from(out: Posterior, forward: Predictor, key: Key, node: Node) -> Fit:
+    """Fits a set from where the fit of one within it ended, in that one's noise."""
+    f, new = node.fit, [out.suspect(n) for n in sorted(key - node.key)]
+    assert f.weights is not None
+    theta = np.concatenate([f.theta, *(np.array([n.start for n in s.free]) for s in new)])
+    return fit(forward, Hypothesis((*f.hypothesis.suspects, *new)), f.weights, theta=theta, local=f.local)
 
 
 def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None = None) -> Fit:
@@ -260,14 +281,14 @@ def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None
 
 
 def polished(out: Posterior, forward: Predictor) -> bool:
-    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether there were any.
+    """Fits leaders on by their own noise, and takes all their derivatives where they end; whether anything changed.
 
     Leaders are the best set, which is believed by what its fit reaches and not by what derivatives promise, and those
     that may be named that hold part of the posterior, or would if all came true that their derivatives promise.
     """
     prior, some = log_priors(out.signatures), False
     while True:
-        _in_the_leaders_noise(out, forward, prior)
+        some |= _in_the_leaders_noise(out, forward, prior)
         least = max(out.total[k] for k in named(out)) + np.log(UNFITTED)
         reach = {k: out.total[k] + 0.5 * out.nodes[k].owed for k in [*named(out), out.leader]}
         leaders = [k for k, most in reach.items() if most >= least and k not in out.polished]
@@ -284,11 +305,11 @@ def polished(out: Posterior, forward: Predictor) -> bool:
             out.polished.add(key)
 
 
-def _in_the_leaders_noise(out: Posterior, forward: Predictor, prior: np.ndarray) -> None:
-    """Judges fitted sets anew that may hold part of the posterior in the noise of the best one."""
-    noise = out.nodes[out.leader].fit.weights
+def _in_the_leaders_noise(out: Posterior, forward: Predictor, prior: np.ndarray) -> bool:
+    """Judges fitted sets anew that may hold part of the posterior in the noise of the best one; whether any was."""
+    noise, some = out.nodes[out.leader].fit.weights, False
     if noise is None or not noise.colour:
-        return
+        return some
     for key, node in list(out.nodes.items()):
         own = node.fit.weights
         if own is None or own.like(noise) or node.tried is noise:
@@ -296,6 +317,8 @@ def _in_the_leaders_noise(out: Posterior, forward: Predictor, prior: np.ndarray)
         gain = log_evidence(node.fit.reweighted(noise)) - log_evidence(node.fit)
         if gain > OWED and out.total[key] + gain > out.total[out.leader] + np.log(UNFITTED):
             _add(out, forward, key, node.fit, prior)
+            some = True
+    return some
 
 
 def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray) -> None:
@@ -304,8 +327,9 @@ def _add(out: Posterior, forward: Predictor, key: Key, f: Fit, prior: np.ndarray
 
 
 def _entered(out: Posterior, forward: Predictor, node: Node, effects: Columns, prior: np.ndarray) -> None:
-    """Enters a judged set, see `_add`."""
-    if _leads(out, node, prior):
+    """Enters a judged set, see `_add`; what was estimated by an earlier fit of it is estimated anew."""
+    before = out.nodes.get(node.key)
+    if (before is not None and before.wide) or _leads(out, node, prior):
         own = OwnColumns(node.fit)
         coloured = node.fit.weights is not None and node.fit.weights.colour
         node.foresight = Foresight.of(forward, node.fit, own, effects, out.hyper) if coloured else None

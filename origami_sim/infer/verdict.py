@@ -282,12 +282,22 @@ def odds_of_numbers(given: Fit, base: Fit) -> float:
 
 
 def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], float]:
-    """Posterior of each set of effects, wherever they act, without those that are not told from nothing."""
+    """Posterior of each set of effects, wherever they act, without those that are not told from nothing.
+
+    With such an effect and without it is one explanation, which counts once, as the more probable of the two.
+    """
     out: dict[frozenset[str], float] = {}
+    with_idle: dict[frozenset[str], float] = {}
     for key, value in chance.items():
         c = p.told(key)
-        out[c] = out.get(c, 0.0) + value
-    return out
+        if c == p.effects(key):
+            out[c] = out.get(c, 0.0) + value
+        else:
+            with_idle[c] = max(with_idle.get(c, 0.0), value)
+    for c, value in with_idle.items():
+        out[c] = max(out.get(c, 0.0), value)
+    total = sum(out.values()) / sum(chance.values())
+    return {c: value / total for c, value in out.items()}
 
 
 def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:

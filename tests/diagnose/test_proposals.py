@@ -44,6 +44,15 @@ def test_a_rival_is_fitted_with_what_the_best_has_in_place_of_another_effect():
     assert proposed(posterior(alone, {both: -40.0}), 1) is None, "what looks alike does not add up"
 
 
+def test_of_all_that_a_rival_is_like_that_counts_which_promises_most():
+    """The same set differs from a second rival, which is far less probable, as the best one does from another."""
+    two = {frozenset({RUB, LOSS}): -1.0, frozenset({RUB, DRAG}): -1.5}
+    with_zero = {frozenset({RUB, LOSS, ZERO}): -2.0, frozenset({RUB, DRAG, ZERO}): -30.0}
+    alike = frozenset({RUB, DRAG, SCALE})
+    for some in (two | with_zero, with_zero | two):
+        assert proposed(posterior({BEST: 0.0} | some, {alike: -40.0}), 1) == alike
+
+
 def test_what_promises_a_part_of_the_posterior_is_fitted():
     other = frozenset({DRAG})
     assert proposed(posterior({BEST: 0.0}, {other: -1.0}), 0) == other

@@ -26,7 +26,7 @@ from origami_sim.infer.placement import forget
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import over_shapes
 from origami_sim.infer.screen import screen
-from origami_sim.infer.search import search
+from origami_sim.infer.search import better_within, continued_from, search
 from origami_sim.recording import Channel, DriveChannel, Recording
 from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import record, subject
@@ -150,6 +150,19 @@ def test_a_set_that_is_likely_never_fits_worse_than_one_that_it_contains(found, 
             if other < key and chance[key] > 0.05:
                 larger, fewer = missed(forward, node.fit), missed(forward, smaller.fit)
                 assert larger <= 1.02 * fewer, (found.label(key), found.label(other))
+
+
+def test_a_fit_that_went_astray_is_begun_again_from_the_best_set_within_it(found, rubbing):
+    """With drag beside the friction that was found, from numbers that have no friction."""
+    forward = rubbing[0]
+    (rubs,) = (k for k in found.nodes if found.label(k) == "crease_friction at crease 1")
+    (drag,) = (n for n, s in enumerate(found.signatures) if s.suspect.label == "air_drag at all panels")
+    node, key = found.nodes[rubs], rubs | {drag}
+    hypothesis = Hypothesis(tuple(found.suspect(n) for n in sorted(key)))
+    astray = fit(forward, hypothesis, node.fit.weights, local=node.fit.local, most=0)
+    assert better_within(found, astray, key) is node
+    again = continued_from(found, forward, key, node)
+    assert again.cost < node.fit.cost + OWED and better_within(found, again, key) is None
 
 
 def test_what_all_creases_do_is_the_sum_of_what_each_does(rubbing):
