@@ -23,6 +23,7 @@ from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
 from origami_sim.effects import get
+from origami_sim.fit.bursts import bursts
 from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
@@ -31,7 +32,6 @@ from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
 from origami_sim.hypotheses.subject import Source, subject_of
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
-from origami_sim.infer.bursts import bursts
 from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.infer.posterior import Posterior, marginals

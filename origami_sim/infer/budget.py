@@ -6,13 +6,13 @@ from math import factorial
 
 import numpy as np
 
+from origami_sim.fit.bursts import bursts
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.bursts import bursts
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.words import pooled
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from origami_sim.infer.bursts import bursts
+from origami_sim.fit.bursts import bursts
 
 RNG = np.random.default_rng(7)
 

@@ -5,6 +5,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
 
 from origami_sim.fit.evidence import Group, Sets, Summed, at_bounds, problem, summed
@@ -211,26 +212,31 @@ def test_a_shape_beside_a_strength_has_its_own_prior():
     assert out == pytest.approx(log + logsumexp(prior - 0.5 * square) + cell, abs=LAPLACE)
 
 
+@pytest.mark.parametrize("asked", [-3.0, 3.0])
 @pytest.mark.parametrize("lacking", [(0,), (1,), (0, 1)])
-def test_what_a_fit_loses_without_effects_is_what_least_squares_loses(lacking):
-    """One effect with a shape, one with another, and a third that a bound holds where it is."""
+def test_what_a_fit_loses_without_effects_is_what_least_squares_loses(lacking, asked):
+    """One effect with a shape, one with another, and a third at its bound, of which data ask for less or for more."""
     toy, spread = Toy([1.0, 5.0, 2.0, 3.0, 1.5]), np.array([np.inf, 0.6])
     at = np.array([1.2, 0.4, 0.1, -0.3, 0.0])
-    residual = toy.drawn(np.random.default_rng(5), at * [1.0, 1.0, 1.5, 1.0, 0.0]) - toy.effects @ at
+    residual = (
+        toy.drawn(np.random.default_rng(5), at * [1.0, 1.0, 1.5, 1.0, 0.0] + asked * np.eye(5)[4]) - toy.effects @ at
+    )
     made = [Group((2 * k, 2 * k + 1), 1, at[2 * k : 2 * k + 2], 0, spread) for k in range(2)]
     made.append(Group((4,), 1, at[4:], 1, spread[:1], np.zeros(1), np.full(1, np.inf)))
 
     def missed(gone):
         """Squares that are left, with numbers, flaws and the discrepancy as what they are: columns with priors."""
-        free = [c for c in range(4) if c // 2 not in gone]
-        known = np.array([0.0, 1.0 / 0.6] * 2)[free]
+        free = [c for c in range(5) if c // 2 not in gone]
+        known = np.array([0.0, 1.0 / 0.6, 0.0, 1.0 / 0.6, 0.0])[free]
         y = residual + toy.effects @ np.where([c // 2 in gone and c % 2 == 0 for c in range(5)], at, 0.0)
         y = y - AWAY[0] * toy.numbers[:, 0]
         a = np.concatenate([toy.effects[:, free], toy.root, toy.numbers[:, 1:]], axis=1)
         prior = np.diag(np.concatenate([known, np.ones(toy.root.shape[1]), np.zeros(1)]))
         far = np.concatenate([-known * at[free], np.zeros(toy.root.shape[1] + 1)])
-        x, *_ = np.linalg.lstsq(np.concatenate([a, prior]), np.concatenate([y, far]))
-        return float(np.sum((y - a @ x) ** 2) + np.sum((far - prior @ x) ** 2))
+        low = np.full(a.shape[1], -np.inf)
+        low[free.index(4)] = 0.0
+        whole, sought = np.concatenate([a, prior]), np.concatenate([y, far])
+        return 2.0 * lsq_linear(whole, sought, (low, np.inf), method="bvls").cost
 
     s = toy.summed(residual)
     assert s.lost(made, lacking) == pytest.approx(missed(lacking) - missed(()), rel=1e-9)
