@@ -177,15 +177,14 @@ class Posterior:
             return every
         gaps = len(self.hyper.cells) // len(self.hyper.gaps)  # the first cell of each gap has the least discrepancy
         cell = node.grid[gaps * int(np.argmax(node.evidence[::gaps]))]
-        own = node.groups[: len(key)]
-        effects = [s.effect for s in node.fit.hypothesis.suspects]
-        idle = set()
-        for effect in every if cell is not None else ():
-            mine = [n for n, e in enumerate(effects) if e == effect]
-            strengths = sum(own[n].strengths for n in mine)
-            if cell.lost(own, mine) < chi2.ppf(SURE, strengths):
-                idle.add(effect)
-        return every - idle
+        own, suspects, out = node.groups[: len(key)], node.fit.hypothesis.suspects, set(every)
+        if cell is None:
+            return every
+        for effect in every:
+            mine = [n for n, s in enumerate(suspects) if s.effect == effect]
+            if cell.lost(own, mine) < chi2.ppf(SURE, sum(own[n].strengths for n in mine)):
+                out.remove(effect)
+        return frozenset(out)
 
     def suspect(self, n: int) -> Suspect:
         return self.signatures[n].suspect
