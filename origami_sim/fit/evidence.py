@@ -36,10 +36,9 @@ still move it, where it ends. The log evidence is then off by the square of that
 rounding does.
 """
 
-
 AT_BOUND = 1e-5
-"""Part of its scale up to which a number lies on a bound. Solvers stay within bounds by 1e-6; what is told from one is
-larger than 0.1. Half and double change nothing.
+"""Part of its scale up to which a number lies on a bound. A solver that stays within bounds ended an exposure 1.2e-9
+from one; all others of two pendulums lie on theirs or are farther than 1e-3. Half and double change nothing.
 """
 
 
