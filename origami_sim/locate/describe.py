@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from origami_sim.effects import get
+from origami_sim.effects.crease_polynomial import EFFECT as MOMENT
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.diagnosis import Acting, Curve, Place
@@ -95,9 +96,11 @@ def _symmetry(c: Curve) -> str:
 def unnamed(forward: Predictor, base: Fit, best: Fit) -> str:
     """What the best explanation does not name, in words; or, where frames do not tell that, what it was to explain.
 
-    They know no memory, and are read as recorded, without what a hypothesis says of the measurement.
+    They know no memory, and are read as recorded, without what a hypothesis says of the measurement. A moment that no
+    law gives is no name.
     """
-    lost = any(get(e).memory or get(e).family == "measurement" for e in best.hypothesis.effects)
+    effects = best.hypothesis.effects
+    lost = any(get(e).memory or get(e).family == "measurement" or e == MOMENT.name for e in effects)
     f, what = (base, "What is missing") if lost else (best, "What is left")
     places, actions = located(forward, f)
     return described(places, actions, what)
