@@ -18,8 +18,8 @@ from origami_sim.infer.screen import Signature
 
 Key = frozenset[int]
 
-SURE = 0.95
-"""Probability with which a strength is told from zero, as by its stated interval."""
+CREDIBLE = 0.95
+"""Probability that what is stated holds: a set of explanations, or that a strength is not zero."""
 
 
 @dataclass(eq=False)
@@ -182,7 +182,7 @@ class Posterior:
             return every
         for effect in every:
             mine = [n for n, s in enumerate(suspects) if s.effect == effect]
-            if cell.lost(own, mine) < chi2.ppf(SURE, sum(own[n].strengths for n in mine)):
+            if cell.lost(own, mine) < chi2.ppf(CREDIBLE, sum(own[n].strengths for n in mine)):
                 out.remove(effect)
         return frozenset(out)
 

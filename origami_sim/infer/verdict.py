@@ -12,13 +12,10 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.intervals import widened
-from origami_sim.infer.posterior import Key, Posterior
+from origami_sim.infer.posterior import CREDIBLE, Key, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
-
-CREDIBLE = 0.95
-"""Probability that the stated set of explanations holds."""
 
 ALONE = 0.8
 """Probability from which one explanation is named alone: to name a wrong one is four times as bad as a tie."""
