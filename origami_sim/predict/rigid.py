@@ -25,7 +25,8 @@ from origami_sim.predict.rollouts import (
 from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid.batch import RigidBatch, Topology, check_inertia
+from origami_sim.solve.rigid.batch import RigidBatch
+from origami_sim.solve.rigid.topology import Topology, check_inertia
 
 FEWEST = 8
 """Frames of a segment, at least: as many as tell its start's rate."""

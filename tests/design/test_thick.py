@@ -24,7 +24,7 @@ from origami_sim.design.thick import GIVE, Edge, meeting
 from origami_sim.errors import InputError
 from origami_sim.model import State, dihedral_angles
 from origami_sim.model.articulation import Articulation
-from origami_sim.solve.rigid.batch import Topology
+from origami_sim.solve.rigid.topology import Topology
 
 MM = 1e-3
 

@@ -7,7 +7,7 @@ of them has to be known. How several supports of rigid bodies share R is not det
 import numpy as np
 
 from origami_sim.model import Model
-from origami_sim.solve.rigid.batch import Topology
+from origami_sim.solve.rigid.topology import Topology
 
 ALONG = 1e-5
 """Part of a radian by which panels are moved along their motion, for differences of what unit rates move."""

@@ -5,7 +5,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid.batch import Topology
+from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import clear_share
 
 STEP = 1e-5

@@ -18,9 +18,9 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve.batch import Batch, Evaluation
-from origami_sim.solve.rigid.batch import Topology
 from origami_sim.solve.rigid.statics import NEUTRAL, closed, loops_kept
 from origami_sim.solve.rigid.statics import STEP as TURN
+from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import clear_share
 from origami_sim.solve.statics.equilibria import equilibrium
 from origami_sim.solve.statics.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
