@@ -43,13 +43,14 @@ def _blows(forward: Rollouts, fit: Fit, block, recording, tracks: list[Track]) -
     start = float(recording.times[block.first] - recording.times[0])
     drive = distorted(model, parameters, forward.drives[block.recording], start + float(block.times[-1]))
     held = drive.held(start + float(block.times[count // 2]))
+    along = forward.articulation.motions[: forward.articulation.shifts, :3]
     found = []
     for t in tracks:
         rate = np.gradient(t.q, step, axis=1)
         gaps = dynamics(forward, model, parameters, held, t.pose, 0.0 * rate)[2]
         found.append((*dynamics(forward, free, given, held, t.pose, rate)[:2], gaps))
     noise = tracks[0].noise
-    near = np.any([touching(gaps, noise[:3].max()) for *_, gaps in found], axis=0)
+    near = np.any([touching(gaps, noise[: len(along)].max()) for *_, gaps in found], axis=0)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
     runs = list(zip(edges[::2], edges[1::2], strict=True))  # from, to (beyond) of frames in contact
     ends = [(0, 0), *runs, (count, count)]
@@ -67,14 +68,15 @@ def _blows(forward: Rollouts, fit: Fit, block, recording, tracks: list[Track]) -
                 late = step * side - when
                 line = np.polyfit(late, (t.q[:, side] - 0.5 * bend[:, None] * late**2).T, 1)[0]
                 rates.append(line)
-            moved.append((inertia[:, :, middle] @ (rates[1] - rates[0]))[:3])
+            moved.append(along.T @ (inertia[:, :, middle] @ (rates[1] - rates[0]))[: len(along)])
         for side in (left, right):
             spread = noise / (step * np.sqrt(np.sum((side - side.mean()) ** 2)))
-            error += found[0][0][:3, :, middle] ** 2 @ spread**2
+            error += along.T**2 @ (found[0][0][: len(along), :, middle] ** 2 @ spread**2)
         error = np.sqrt(error)
         lowest = int(np.argmin(found[0][2][:, first:last].min(axis=1)))
         node = int(model.contacts[lowest][np.argmax(model.contact_weights[lowest])])
-        apart = float(np.linalg.norm((moved[0] - moved[1]) / error))
+        seen = error > 0  # not across the plane to which a device is held
+        apart = float(np.linalg.norm((moved[0] - moved[1])[seen] / error[seen]))
         time = float(recording.times[block.first] + when)
         site = model.name("node", node)
         out.append(Impulse(recording.name, time, site, moved[0].tolist(), moved[1].tolist(), error.tolist(), apart))

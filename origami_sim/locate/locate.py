@@ -118,7 +118,7 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     inertia, free, gaps = dynamics(forward, without, parameters, frozen(drive, grid), pose, rate)
     keep = np.ones(len(grid), bool)
     if arm.floating:
-        keep = ~spread_out(touching(gaps, noise[:3].max()), half)
+        keep = ~spread_out(touching(gaps, noise[: arm.shifts].max()), half)
     keep[:half] = keep[-half:] = False
     if keep.sum() < 4 * half + 2:
         return None

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from origami_sim.model.model import Model, beside, carried_sides, dihedral_angles
+from origami_sim.model.motions import possible
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Articulation:
 
     Attributes:
         creases: (J,) creases of the tree, from the root outwards.
-        floating: whether the root can move; its six coordinates (shift, then turn) then come first.
+        motions: [r, 6] shifts and turns of the root along the axes for unit coordinates, which come first: six where
+            nothing holds it, three where it moves in a plane, none where it is held.
         size: number of coordinates m.
         open: creases outside the tree, which close loops.
         sides: panels left and right of each crease; None: none.
@@ -53,10 +55,10 @@ class Articulation:
         nodes = nodes or [np.arange(len(x))]  # without panels it is one body
         held = ~np.any(model.free, axis=1)
         fixed = [p for p, n in enumerate(nodes) if len(n) and np.all(held[n])]
-        self.floating = not np.any(held)
         root = fixed[0] if fixed else int(np.argmax([len(n) for n in nodes])) if nodes else 0
-        if not fixed and not self.floating:  # held by single nodes: the panel that holds most of them
+        if not fixed and np.any(held):  # held by single nodes: the panel that holds most of them
             root = int(np.argmax([held[n].sum() for n in nodes]))
+        self.motions = np.eye(6)[[] if np.any(held) else _free_axes(x[nodes[root]], model.free[nodes[root]] == 0.0)]
         sides = self._sides(model)
         reached, order, queue = {root}, [], deque([root])
         while queue:
@@ -120,12 +122,23 @@ class Articulation:
         return [(panels[left], panels[right]) for left, right in beside(model.triangles, model.creases).tolist()]
 
     @property
+    def floating(self) -> bool:
+        """Whether the root can move."""
+        return len(self.motions) > 0
+
+    @property
+    def shifts(self) -> int:
+        """Number of coordinates that shift the root; those that turn it follow."""
+        return int(np.any(self.motions[:, :3], axis=1).sum())
+
+    @property
     def size(self) -> int:
-        return 6 * self.floating + len(self.creases)
+        return len(self.motions) + len(self.creases)
 
     def names(self) -> list[str]:
         """Names of the coordinates."""
-        root = [f"{k} {a}" for k in ("shift", "turn") for a in "xyz"] if self.floating else []
+        each = np.array([f"{k} {a}" for k in ("shift", "turn") for a in "xyz"])
+        root = each[np.argmax(self.motions, axis=1)].tolist()
         return root + [self.model.name("crease", int(c)) for c in self.creases]
 
     def reference(self, worlds: int = 1) -> Pose:
@@ -138,10 +151,20 @@ class Articulation:
 
     def moved(self, pose: Pose, by: np.ndarray) -> Pose:
         """The pose after a small displacement [m, W] of the coordinates."""
-        if not self.floating:
+        r = len(self.motions)
+        if not r:
             return replace(pose, angles=pose.angles + by)
-        turn = Rotation.from_rotvec(by[3:6].T).as_matrix()
-        return Pose(turn @ pose.rotation, pose.centre + by[:3].T, pose.angles + by[6:])
+        root = by[:r].T @ self.motions
+        turn = Rotation.from_rotvec(root[:, 3:]).as_matrix()
+        return Pose(turn @ pose.rotation, pose.centre + root[:, :3], pose.angles + by[r:])
+
+    def shift_between(self, base: Pose, pose: Pose) -> np.ndarray:
+        """Small displacement [m, W] of the coordinates from one pose to another; folds change by less than a turn."""
+        angles = pose.angles - base.angles
+        angles -= 2 * np.pi * np.round(angles / (2 * np.pi))
+        turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
+        root = np.concatenate([pose.centre - base.centre, turn], axis=1)
+        return np.concatenate([self.motions @ root.T, angles])
 
     def positions(self, pose: Pose) -> np.ndarray:
         """Node positions [N, W, 3] [m]."""
@@ -184,13 +207,9 @@ class Articulation:
         """Velocities of the nodes for unit rates of the coordinates, [m, N, W, 3]."""
         x = self.positions(pose) if x is None else x
         out = np.zeros((self.size, *x.shape))
-        first = 0
-        if self.floating:
-            for a in range(3):
-                unit = np.eye(3)[a]
-                out[a] = unit
-                out[3 + a] = np.cross(unit, x - pose.centre)
-            first = 6
+        first = len(self.motions)
+        for k, along in enumerate(self.motions):
+            out[k] = along[:3] + np.cross(along[3:], x - pose.centre)
         for joint, (c, _, _, sign) in enumerate(self._joints):
             carried = self._carried[joint]
             out[first + joint, carried] = np.cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
@@ -206,7 +225,7 @@ class Articulation:
             shown: [..., D, m] what changes of the coordinates by 1 m and 1 rad show, in deviations of noise.
         """
         out = np.zeros((*shown.shape[:-2], self.size, self.size)) + np.eye(self.size)
-        rigid = 6 * self.floating
+        rigid = len(self.motions)
         if rigid:
             _, size, along = np.linalg.svd(shown[..., :rigid], full_matrices=False)
             along = along * (size > 1.0)[..., None]
@@ -222,8 +241,7 @@ class Articulation:
         out = {child: np.zeros((self.size, *x.shape[1:])) for _, _, child, _ in self._joints}
         first = self.size - len(self.creases)
         for p, turns in out.items():
-            if self.floating:
-                turns[3:6] = np.eye(3)[:, None]
+            turns[:first] = self.motions[:, None, 3:]
             for joint, (c, _, _, sign) in enumerate(self._joints):
                 if p in self._below[joint]:
                     turns[first + joint] = self._axis(x, c, sign)
@@ -240,3 +258,18 @@ class Articulation:
         _, j, k, _ = self.model.creases[crease]
         axis = x[k] - x[j]
         return sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+
+
+def _free_axes(x: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Of shifts, then turns along the axes, those that a panel at x [n, 3] can make; no node of it is held all round.
+
+    All six where what it can make are no motions along the axes.
+
+    Args:
+        held: [n, 3] along which axes each node is held.
+    """
+    centre, size = x.mean(axis=0), float(np.ptp(x, axis=0).max(initial=0.0)) or 1.0
+    basis = possible((x - centre) / size, held)
+    share = basis.T @ basis
+    aligned = np.allclose(share, np.diag(np.diag(share) > 0.5), atol=1e-9)
+    return np.flatnonzero(np.roll(np.diag(share), 3) > 0.5) if aligned else np.arange(6)

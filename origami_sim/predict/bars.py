@@ -51,7 +51,7 @@ class BarRollouts(Rollouts):
         threads: int | None = None,
     ):
         super().__init__(subject, recordings, start=start, threads=threads)
-        settles = start == "fit" and self.articulation.size > 6 * self.articulation.floating
+        settles = start == "fit" and len(self.articulation.creases) > 0
         self.calm = CALM if settles else 0.0
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, most)

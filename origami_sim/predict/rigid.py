@@ -13,7 +13,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State, node_mass
-from origami_sim.model.articulation import Pose
+from origami_sim.model.articulation import Articulation
 from origami_sim.predict.filming import even, film, film_step, pictured
 from origami_sim.predict.rollouts import (
     Motion,
@@ -130,7 +130,7 @@ class RigidRollouts(Rollouts):
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         self._films: Films = {}
         self._beside: dict[int, Films] = {}  # of what was followed last beside the first world, by recording
-        check_tree(self._tree, self.articulation.floating)
+        check_tree(self._tree, self.articulation)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
 
@@ -397,7 +397,7 @@ class RigidRollouts(Rollouts):
             at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
             own, b = self._arms[key], np.tile(np.arange(count), len(mine))
             pose = own.poses_of(state.x[:, at], state.angles[:, at])
-            out[: arm.size, at] = shift_between(base.select(b), pose, arm.floating)
+            out[: arm.size, at] = arm.shift_between(base.select(b), pose)
             out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
         return out
 
@@ -411,29 +411,18 @@ def of_worlds(shots: Shots, some: list[int]) -> Shots:
     return replace(shots, worlds=[shots.worlds[k] for k in some], local=local, memory=memory)
 
 
-def shift_between(base: Pose, pose: Pose, floating: bool) -> np.ndarray:
-    """Small displacement [m, W] of the coordinates that leads from one pose to another; angles by less than a turn."""
-    from scipy.spatial.transform import Rotation
-
-    angles = turned_by(pose.angles - base.angles)
-    if not floating:
-        return angles
-    turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
-    return np.concatenate([(pose.centre - base.centre).T, turn.T, angles])
-
-
 def turned_by(angles: np.ndarray) -> np.ndarray:
     """Differences of angles by less than a turn."""
     return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
 
 
-def check_tree(tree: Topology, floating: bool) -> None:
-    """Refuses what has other coordinates than the fold angles of a tree and the six of a free root.
+def check_tree(tree: Topology, arm: Articulation) -> None:
+    """Refuses what has other coordinates than folds of a tree and those of a root that is free, or moves in a plane.
 
     Raises:
         InputError: closed loops; a root that is held in part.
     """
     if len(tree.row_node):
         raise InputError("panels that close a loop are predicted with bars", field="panels", allowed="elastic")
-    if len(tree.turns) != 6 * floating:
+    if len(tree.turns) != len(arm.motions):
         raise InputError("a panel that is held in part is predicted with bars", field="panels", allowed="elastic")

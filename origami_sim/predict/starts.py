@@ -50,7 +50,7 @@ def read_start(model: Model, arm: Articulation, recording: Recording, values, no
         now, tangent = channel_tangent(model, arm, recording, pose, level)
         gap = np.where(np.isfinite(level), level - now, 0.0)
         by = arm.inverse(tangent * weight[:, None], sought, 1e-8) @ (gap * weight)
-        size = np.abs(by[3 * arm.floating :]).max(initial=0.0)  # shifts are linear, however long
+        size = np.abs(by[arm.shifts :]).max(initial=0.0)  # shifts are linear, however long
         pose = arm.moved(pose, (by * min(1.0, 1.0 / (size + 1e-12)))[:, None])
         if size < 1e-10:
             break
@@ -88,8 +88,7 @@ def spans(arm: Articulation, model: Model) -> np.ndarray:
     """(m,) how far coordinates may plausibly be off: a radian, or the size of the device [m]."""
     size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
     out = np.ones(arm.size)
-    if arm.floating:
-        out[:3] = size
+    out[: arm.shifts] = size
     return out
 
 

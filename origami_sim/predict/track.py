@@ -1,6 +1,6 @@
 """A recorded motion as that of rigid panels: coordinates of the tree, frame by frame, also of what nothing holds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,6 +25,7 @@ class Track:
     Attributes:
         times: (n,) [s]. pose: n poses. q: [m, n] shifts [m], turns [rad] and folds [rad]; of the turns, which have no
             angle, the small ones from frame to frame, added up. noise: (m,). told: (m,) whether the channels tell it.
+            arm: whose coordinates they are.
     """
 
     times: np.ndarray
@@ -32,15 +33,13 @@ class Track:
     q: np.ndarray
     noise: np.ndarray
     told: np.ndarray
+    arm: Articulation
 
     def at(self, times: np.ndarray, q: np.ndarray) -> Pose:
         """Poses at times (k,) whose coordinates [m, k] are near those of the nearest frames."""
         near = np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
-        pose = self.pose.select(near)
-        if len(q) == len(pose.angles):  # something holds it
-            return Pose(pose.rotation, pose.centre, q)
-        turn = Rotation.from_rotvec((q[3:6] - self.q[3:6, near]).T).as_matrix()
-        return Pose(turn @ pose.rotation, q[:3].T, q[6:])
+        moved = self.arm.moved(self.pose.select(near), q - self.q[:, near])
+        return replace(moved, angles=q[len(self.arm.motions) :])
 
 
 def track(forward, recording: Recording, values: np.ndarray | None = None) -> Track | None:
@@ -84,11 +83,10 @@ def track(forward, recording: Recording, values: np.ndarray | None = None) -> Tr
     told = np.median(np.einsum("nkd,ndk->kn", inverse, scaled), axis=1) > 0.99
     spread = np.sqrt(np.median(np.sum(inverse**2, axis=2), axis=0))
     folds = np.unwrap(pose.angles, axis=1)
-    if not arm.floating:
-        return Track(times, pose, folds, spread, told)
     steps = Rotation.from_matrix(pose.rotation[1:] @ np.swapaxes(pose.rotation[:-1], 1, 2)).as_rotvec()
     turns = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    return Track(times, pose, np.concatenate([pose.centre.T, turns.T, folds]), spread, told)
+    root = arm.motions @ np.concatenate([pose.centre, turns], axis=1).T
+    return Track(times, pose, np.concatenate([root, folds]), spread, told, arm)
 
 
 def followed(forward, index: int) -> Track | None:
@@ -149,6 +147,7 @@ def placed(model: Model, arm: Articulation, recording: Recording, level: np.ndar
     _, size, along = np.linalg.svd(b)
     if size[1] < LINE * size[0]:  # about a line nothing is told: the least turn
         a, b = (b @ along[0] @ a)[None], along[:1]
-    turn = Rotation.align_vectors(a, b)[0].as_matrix()
-    centre = there.mean(0) + turn @ (pose.centre[0] - here.mean(0))
-    return Pose(turn[None], centre[None], pose.angles)
+    turn = Rotation.align_vectors(a, b)[0]
+    shift = there.mean(0) + turn.apply(pose.centre[0] - here.mean(0)) - pose.centre[0]
+    by = arm.motions @ np.concatenate([shift, turn.as_rotvec()])
+    return arm.moved(pose, np.concatenate([by, np.zeros(len(arm.creases))])[:, None])

@@ -127,7 +127,7 @@ def test_a_menu_is_what_the_set_up_can_do():
 def test_nothing_longer_is_asked_of_what_falls_freely():
     forward = RigidRollouts(subject(3), [record(panels=3, duration=1.0, rate=60)], segment=0.5)
     forward.articulation = copy.copy(forward.articulation)
-    forward.articulation.floating = True
+    forward.articulation.motions = np.eye(6)
     words = [t.what for t in menu(forward, replace(Possible(), clamps=()))]
     assert not [w for w in words if "as long" in w or "tilted" in w or "let go" in w or "start from" in w]
 

@@ -16,9 +16,10 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.model.distort import distorted
+from origami_sim.model.motions import screw
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.statics import NEUTRAL, REDUNDANT, STEP
-from origami_sim.solve.rigid.topology import Topology, screw
+from origami_sim.solve.rigid.topology import Topology
 
 Design = tuple[Model, Parameters, Drive]
 
