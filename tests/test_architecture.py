@@ -15,7 +15,7 @@ BESIDE = ("scenes", "calibrations", "studies")
 
 ORDER = (
     *("physics", "drive", "effects", "model", "pattern"),
-    *("solve.kernels", "solve", "solve.rigid", "solve.statics", "solve.motion"),
+    *("solve.kernels", "solve.program", "solve", "solve.rigid", "solve.statics", "solve.motion"),
     *("design", "recording", "device", "observation", "view", "results"),
     *("explore", "folding", "calibrate"),
     *("hypotheses", "fit", "predict", "infer", "locate", "report", "diagnose"),
@@ -140,5 +140,5 @@ def test_stored_predictions_are_of_the_sources_that_predict():
         if module not in reached:
             reached.add(module)
             todo += [m for m in imported(module)[0] | imported(module)[1] if folder_of(m) not in ("view", "report")]
-    assert {"solve.kernels.compose", "effects", "threads", "device.scene"} <= reached
+    assert {"solve.program.compose", "effects", "threads", "device.scene"} <= reached
     assert not sorted(str(FILES[m]) for m in reached if FILES[m] not in digested)

@@ -16,8 +16,8 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
 from origami_sim.solve import skin
 from origami_sim.solve.kernels import plates, sources
-from origami_sim.solve.kernels.compose import BITS, compose
-from origami_sim.solve.kernels.compose_sheets import asks_change
+from origami_sim.solve.program.compose import BITS, compose
+from origami_sim.solve.program.compose_sheets import asks_change
 from origami_sim.threads import default_threads, in_turn
 
 APART = 128

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from origami_sim.model import Model, Parameters, carried_sides
 from origami_sim.solve.kernels import touching
-from origami_sim.solve.kernels.compose_touch import DEEPEST
+from origami_sim.solve.program.compose_touch import DEEPEST
 
 MARGIN = 0.25
 """Distance within which pairs are listed beyond that at which they touch, over the median edge.

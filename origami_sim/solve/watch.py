@@ -19,7 +19,7 @@ from origami_sim.model import Model, Parameters, State, carried_sides
 from origami_sim.model.contact import FRICTION, engaged, may_touch
 from origami_sim.pattern.intersections import crossing_pairs
 from origami_sim.solve.kernels.approach import approach
-from origami_sim.solve.kernels.compose_touch import DEEPEST
+from origami_sim.solve.program.compose_touch import DEEPEST
 from origami_sim.solve.skin import near_pairs, surface, upload
 
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""What runs inside a kernel: the text of the kernels of a set of effects, and the functions that it calls."""
+"""What runs inside a kernel: the functions that its text calls."""

@@ -21,9 +21,6 @@ mat33 = wp.mat33d
 POSE = wp.constant(7)
 """Numbers of the root's pose before the joint angles: place of its centre, then a unit quaternion."""
 
-STAGES = wp.constant(7)
-"""Stages of a step; the last is the first of the next."""
-
 NATURAL = wp.constant(0x7FFFFFFF)
 """Masked with this, an index is seen to be no negative one, and an access is spared that test."""
 
@@ -55,7 +52,11 @@ class Tree:
     joined: wp.array2d(dtype=wp.int32)  # [R, 3] node at which two bodies are joined, the bodies; -1: the ground
     stabilisation: scalar  # rate at which an open loop closes [1/s]
     softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
-    tableau: wp.array2d(dtype=scalar)  # [STAGES + 1, STAGES + 1] time, then weights; the last row is the error's
+    stages: int  # S of a step; the last is the first of the next
+    tableau: wp.array2d(dtype=scalar)  # [S + 1, S + 1] time, then weights; the last row is the error's
+    # [S, S] what weights of damped accelerations are more than those of others, on the diagonal their own; empty where
+    # all are explicit
+    implicit: wp.array2d(dtype=scalar)
     # steps at whose begin a held tree moves on from elsewhere, R of them; what memory and rates were before
     restarts: wp.array(dtype=wp.int32)
     starts: wp.array2d(dtype=scalar)  # [R 2 J, W] coordinates, then rates
@@ -75,8 +76,14 @@ class Tree:
     u: int  # [m]
     y0: int
     u0: int
-    dy: int  # [STAGES, 7 + J]
-    du: int  # [STAGES, m]
+    dy: int  # [S + 1, 7 + J], the last of probes
+    du: int  # [S + 1, m], the last of probes and of the error
+    # where steps are implicit in damping: its matrix, accelerations by it at the stages, the factor of the mass matrix
+    # at the step's begin, and that of the damped one
+    damping: int  # [m, m]
+    damped: int  # [S, m]
+    factor0: int  # [m, m]
+    stiff: int  # [m, m]
     span: int
     # what a step changes besides, to go back to
     hinges: int  # number of hinge angles
@@ -112,9 +119,9 @@ class Tree:
 
 
 PARTS = tuple(
-    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du span angles0 memory0 feet feet0 "
-    "power0 spent turned placed hinge joint omega speed alpha gain force moment torque heavy first second factor "
-    "jacobian solved gram pull".split()
+    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du damping damped factor0 stiff "
+    "span angles0 memory0 feet feet0 power0 spent turned placed hinge joint omega speed alpha gain force moment torque "
+    "heavy first second factor jacobian solved gram pull".split()
 )
 """Parts of a world's stretch, in order."""
 
@@ -430,6 +437,22 @@ def solve_upper(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         for k in range(i + 1, m):
             x = x - at(s, factor + k * m + i) * at(s, target + k)
         s[(target + i) & NATURAL] = x / at(s, factor + i * m + i)
+
+
+@wp.func
+def multiply(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
+    """Multiplies with the matrix [m, m] of a Cholesky factor, in place."""
+    for i in range(m):
+        x = scalar(0.0)
+        for k in range(i, m):
+            x = x + at(s, factor + k * m + i) * at(s, target + k)
+        s[(target + i) & NATURAL] = x
+    for back in range(m):
+        i = m - 1 - back
+        x = scalar(0.0)
+        for k in range(i + 1):
+            x = x + at(s, factor + i * m + k) * at(s, target + k)
+        s[(target + i) & NATURAL] = x
 
 
 @wp.func

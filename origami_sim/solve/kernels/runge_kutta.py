@@ -1,28 +1,32 @@
-"""Steps of rigid panels in a kernel: explicit Runge-Kutta of order five with an error of order four.
+"""Steps of rigid panels in a kernel: Runge-Kutta of order five with an error of order four.
 
-Dormand & Prince 1980: seven stages, of which the last is the first of the next step. A step whose error is too large is
-taken back, with all that it changed.
+Explicit (Dormand & Prince 1980), or implicit in the damping of joints where that would bound the steps (Kennedy &
+Carpenter 2003). The last stage is the first of the next step. A step whose error is too large is taken back, with all
+that it changed.
 """
 
-import numpy as np
 import warp as wp
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.solve.kernels.articulated import NATURAL, POSE, STAGES, Tree, at, copy, scalar, vec3
-
-TABLEAU = np.array(
-    [
-        [0, 0, 0, 0, 0, 0, 0, 0],
-        [1 / 5, 1 / 5, 0, 0, 0, 0, 0, 0],
-        [3 / 10, 3 / 40, 9 / 40, 0, 0, 0, 0, 0],
-        [4 / 5, 44 / 45, -56 / 15, 32 / 9, 0, 0, 0, 0],
-        [8 / 9, 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0, 0],
-        [1, 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0, 0],
-        [1, 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0],
-        [0, 71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
-    ]
+from origami_sim.solve.kernels.articulated import (
+    NATURAL,
+    POSE,
+    Tree,
+    at,
+    copy,
+    factorise,
+    multiply,
+    scalar,
+    solve_lower,
+    solve_upper,
+    vec3,
 )
-"""Times and weights of the stages, and the weights of the error (fifth less fourth order)."""
+
+PROBE = wp.constant(wp.float64(1e-6))
+"""Change of a rate [rad/s], or of a speed over the device's size, from which damping is told.
+
+A crawler takes as long, and goes as far to nine digits, with a hundredth to a hundred times of it.
+"""
 
 
 @wp.func
@@ -78,7 +82,7 @@ def begin(
     s = tree.data
     o = w * tree.width
     for i in range(tree.effects):
-        s[(o + tree.spent + i) & NATURAL] = tree.tableau[STAGES - 1, 1] * power[i, w]
+        s[(o + tree.spent + i) & NATURAL] = tree.tableau[tree.stages - 1, 1] * power[i, w]
         s[(o + tree.power0 + i) & NATURAL] = power[i, w]
     copy(s, o + tree.y0, o + tree.y, POSE + tree.bodies - 1)
     copy(s, o + tree.u0, o + tree.u, tree.rates)
@@ -87,6 +91,99 @@ def begin(
     for i in range(tree.memories):
         s[(o + tree.memory0 + i) & NATURAL] = memory[i, w]
     copy(s, o + tree.feet0, o + tree.feet, 3 * tree.feet_count)
+
+
+@wp.func
+def nudge_of(tree: Tree, k: int, size: scalar):
+    """By how much a rate is changed to see what it is damped with: far more than rounding, far less than it matters."""
+    nudge = PROBE
+    if k < tree.roots:
+        if wp.dot(tree.axes[k], tree.axes[k]) == scalar(0.0):
+            nudge = PROBE * size
+    return nudge
+
+
+@wp.func
+def probe(tree: Tree, k: int, size: scalar, w: int):
+    """Changes a rate at a step's begin a little; the last, beyond all rates, changes none."""
+    s = tree.data
+    o = w * tree.width
+    copy(s, o + tree.u, o + tree.u0, tree.rates)
+    if k < tree.rates:
+        s[(o + tree.u + k) & NATURAL] = at(s, o + tree.u0 + k) + nudge_of(tree, k, size)
+
+
+@wp.func
+def probed(tree: Tree, k: int, size: scalar, w: int):
+    """Column of the damping matrix: the momentum that is lost by a rate, from the change of accelerations.
+
+    Those without any change come first: they are not the last stage's, before which laws remembered less.
+    """
+    s = tree.data
+    o = w * tree.width
+    m = tree.rates
+    change = o + tree.du + tree.stages * m
+    if k == m:
+        copy(s, o + tree.damped, change, m)
+    else:
+        nudge = nudge_of(tree, k, size)
+        for i in range(m):
+            s[(change + i) & NATURAL] = (at(s, o + tree.damped + i) - at(s, change + i)) / nudge
+        multiply(s, o + tree.factor0, change, m)
+        for i in range(m):
+            s[(o + tree.damping + i * m + k) & NATURAL] = at(s, change + i)
+
+
+@wp.func
+def begin_damped(tree: Tree, step: scalar, w: int):
+    """Accelerations by damping at a step's begin, and the factor by which stages find their own.
+
+    Both are of the mass matrix there and of the damping's symmetric part, often of an earlier step: what they leave out
+    is explicit, so that the order stays. A step for which the matrix is not positive definite has no number as error.
+    """
+    s = tree.data
+    o = w * tree.width
+    m = tree.rates
+    stiff = o + tree.stiff
+    for i in range(m):
+        lost = scalar(0.0)
+        for j in range(m):
+            c = scalar(0.5) * (at(s, o + tree.damping + i * m + j) + at(s, o + tree.damping + j * m + i))
+            lost = lost + c * at(s, o + tree.u0 + j)
+            if j <= i:
+                x = step * tree.implicit[1, 1] * c
+                for k in range(j + 1):
+                    x = x + at(s, o + tree.factor0 + i * m + k) * at(s, o + tree.factor0 + j * m + k)
+                s[(stiff + i * m + j) & NATURAL] = x
+        s[(o + tree.damped + i) & NATURAL] = -lost
+    solve_lower(s, o + tree.factor0, o + tree.damped, m)
+    solve_upper(s, o + tree.factor0, o + tree.damped, m)
+    factorise(s, stiff, m, scalar(0.0))
+
+
+@wp.func
+def damp(tree: Tree, stage: int, h: scalar, w: int):
+    """Rates at a stage of a step of h with the damping of joints, implicitly.
+
+    With M = L L^T: (M + a h C) u = M r, of rates r without the stage's own damped acceleration (u - r) / (a h).
+    """
+    s = tree.data
+    o = w * tree.width
+    m = tree.rates
+    u = o + tree.u
+    mine = o + tree.damped + stage * m
+    for i in range(m):
+        x = scalar(0.0)
+        for k in range(stage):
+            x = x + tree.implicit[stage, k] * at(s, o + tree.damped + k * m + i)
+        s[(u + i) & NATURAL] = at(s, u + i) + h * x
+    copy(s, mine, u, m)
+    multiply(s, o + tree.factor0, u, m)
+    solve_lower(s, o + tree.stiff, u, m)
+    solve_upper(s, o + tree.stiff, u, m)
+    for i in range(m):
+        change = at(s, u + i) - at(s, mine + i)
+        s[(mine + i) & NATURAL] = change / (h * tree.implicit[stage, stage])
 
 
 @wp.func
@@ -119,8 +216,10 @@ def carry_over(tree: Tree, work: wp.array2d(dtype=scalar), step: scalar, w: int)
     n = POSE + tree.bodies - 1
     for i in range(tree.effects):
         work[i, w] = work[i, w] + step * at(s, o + tree.spent + i)
-    copy(s, o + tree.dy, o + tree.dy + (STAGES - 1) * n, n)
-    copy(s, o + tree.du, o + tree.du + (STAGES - 1) * tree.rates, tree.rates)
+    copy(s, o + tree.dy, o + tree.dy + (tree.stages - 1) * n, n)
+    copy(s, o + tree.du, o + tree.du + (tree.stages - 1) * tree.rates, tree.rates)
+    if tree.implicit.shape[0] > 0:
+        copy(s, o + tree.factor0, o + tree.factor, tree.rates * tree.rates)
 
 
 @wp.func
@@ -166,7 +265,9 @@ def go(tree: Tree, stage: int, h: scalar, w: int):
     m = tree.rates
     for i in range(m):
         s[(o + tree.u + i) & NATURAL] = at(s, o + tree.u0 + i) + h * weighted(tree, o + tree.du + i, m, stage, stage)
-    if stage == STAGES - 1:
+    if tree.implicit.shape[0] > 0 and stage < tree.stages - 1:
+        damp(tree, stage, h, w)
+    if stage == tree.stages - 1:
         k = o + tree.y + 3
         q = wp.normalize(wp.quatd(at(s, k), at(s, k + 1), at(s, k + 2), at(s, k + 3)))
         for i in range(4):
@@ -183,13 +284,20 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
     n = POSE + tree.bodies - 1
     worst = scalar(0.0)
     for i in range(tree.first_number, n):
-        x = wp.abs(h * weighted(tree, o + tree.dy + i, n, STAGES, STAGES))
+        x = wp.abs(h * weighted(tree, o + tree.dy + i, n, tree.stages, tree.stages))
         if i < 3:
             x = x / size
         worst = larger(worst, x)
     m = tree.rates
+    rates = o + tree.du + tree.stages * m
     for i in range(m):
-        x = wp.abs(h * h * weighted(tree, o + tree.du + i, m, STAGES, STAGES))
+        tree.data[(rates + i) & NATURAL] = h * weighted(tree, o + tree.du + i, m, tree.stages, tree.stages)
+    if tree.implicit.shape[0] > 0:  # what is damped within the step is no error (Shampine & Baca 1984)
+        multiply(tree.data, o + tree.factor0, rates, m)
+        solve_lower(tree.data, o + tree.stiff, rates, m)
+        solve_upper(tree.data, o + tree.stiff, rates, m)
+    for i in range(m):
+        x = wp.abs(h * at(tree.data, rates + i))
         if i < tree.roots:
             if wp.dot(tree.axes[i], tree.axes[i]) == scalar(0.0):
                 x = x / size

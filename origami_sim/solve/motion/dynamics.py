@@ -26,6 +26,8 @@ from origami_sim.solve.oversights import (
 )
 from origami_sim.solve.rigid.batch import TOLERANCE as RIGID
 from origami_sim.solve.rigid.batch import batch_of
+from origami_sim.solve.rigid.damping import overdamped
+from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import PRESSED, too_deep
 from origami_sim.solve.timestep import TimeStep, stable_step
 from origami_sim.solve.watch import Met, continued, watch_of, with_memory
@@ -336,7 +338,12 @@ def _simulated(
         )
     else:
         error = 0.0 if dt is not None else tolerance or RIGID
-        batch = batch_of(model, parameters, applied, state, device=device, threads=threads, tolerance=error)
+        how = {"device": device, "threads": threads}
+        if model.panels == "rigid" and np.any(model.free):
+            tree = Topology(model)
+            damped = dt is None and overdamped(model, parameters, tree, step)
+            how |= {"tolerance": error, "tree": tree, "implicit": damped}
+        batch = batch_of(model, parameters, applied, state, **how)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 

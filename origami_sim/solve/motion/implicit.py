@@ -35,7 +35,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.kernels.averaging import kernel
+from origami_sim.solve.program.averaging import kernel
 from origami_sim.solve.statics.system import STEP, System
 from origami_sim.solve.timestep import stable_step
 

@@ -12,7 +12,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import centred, eccentric
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels import articulated
-from origami_sim.solve.kernels.runge_kutta import TABLEAU
+from origami_sim.solve.rigid.tableaus import EXPLICIT, additive
 from origami_sim.solve.rigid.topology import Topology, check_inertia
 
 TOLERANCE = 1e-10
@@ -36,7 +36,8 @@ class RigidBatch(Batch):
 
     Args:
         model: with `panels` "rigid" (see `bodies.rigid`). tolerance: error of one step [rad]; 0: steps as given.
-        tree: the model's, if it is known. The rest as for `Batch`.
+        tree: the model's, if it is known. implicit: whether steps are implicit in damping, which then does not
+            bound them, see `damping.overdamped`. The rest as for `Batch`.
 
     Raises:
         InputError: panels that are not joined by creases, held in a way that is no rigid motion, without mass or
@@ -52,9 +53,11 @@ class RigidBatch(Batch):
         *,
         tolerance=TOLERANCE,
         tree: "Topology | None" = None,
+        implicit: bool = False,
         **options,
     ):
         self.tree_of = tree or Topology(model)
+        self.implicit = implicit
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
         self._eccentric = eccentric(model, parameters)
@@ -89,7 +92,9 @@ class RigidBatch(Batch):
         tree.joint_of = constant(t.joint_of, wp.int32)
         tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
-        tree.tableau = constant(TABLEAU, wp.float64)
+        tableau, more = additive() if self.implicit else (EXPLICIT, np.zeros((0, 0)))
+        tree.tableau, tree.implicit = constant(tableau, wp.float64), constant(more, wp.float64)
+        tree.stages = stages = len(tableau) - 1
         tree.restarts = constant(np.zeros(0), wp.int32)
         tree.starts = tree.kept = constant(np.zeros((0, 1)), wp.float64)
         self._begun = state.angles[[c for c, _ in t.joints]]
@@ -127,8 +132,12 @@ class RigidBatch(Batch):
                 "steady": 12 * tree.bodies,
                 "y0": 7 + joints,
                 "u0": rates,
-                "dy": 7 * (7 + joints),
-                "du": 7 * rates,
+                "dy": (stages + 1) * (7 + joints),
+                "du": (stages + 1) * rates,
+                "damping": self.implicit * rates**2,
+                "damped": self.implicit * stages * rates,
+                "factor0": self.implicit * rates**2,
+                "stiff": self.implicit * rates**2,
                 "torque": joints,
             },
             **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
@@ -272,12 +281,13 @@ def batch_of(
     among: Sequence[str] = (),
     tolerance: float = TOLERANCE,
     tree: Topology | None = None,
+    implicit: bool = False,
     **options,
 ) -> Batch:
     """A batch of worlds of whichever kind the model's panels ask for.
 
-    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance` and
-    `tree` are of rigid panels, see `RigidBatch`; the rest is as for `Batch`.
+    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance`,
+    `tree` and `implicit` are of rigid panels, see `RigidBatch`; the rest is as for `Batch`.
     """
     if model.panels != "rigid":
         return Batch(model, parameters, drive, state, among=among, **options)
@@ -285,4 +295,5 @@ def batch_of(
         unit = parameters.copy()
         unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
         return Batch(model, unit, drive, state, among=among, **options)
-    return RigidBatch(model, parameters, drive, state, among=among, tolerance=tolerance, tree=tree, **options)
+    of_panels = {"tolerance": tolerance, "tree": tree, "implicit": implicit}
+    return RigidBatch(model, parameters, drive, state, among=among, **of_panels, **options)

@@ -3,7 +3,7 @@
 from contextlib import nullcontext
 from typing import Any
 
-from origami_sim.solve.kernels.compose_sheets import Text
+from origami_sim.solve.program.compose_sheets import Text
 
 DEEPEST = 0.5
 """Share of the distance at which a pair touches by which it may be pressed together; a world that exceeds it stops.

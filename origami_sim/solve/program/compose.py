@@ -16,27 +16,20 @@ import warp as wp
 
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
 from origami_sim.physics import kinematics, magnetostatics
-from origami_sim.solve.kernels import articulated, plates, runge_kutta, sources, templates, touching
-from origami_sim.solve.kernels.compose_rigid import Rigid, is_steady
-from origami_sim.solve.kernels.compose_sheets import Sheets, Text
-from origami_sim.solve.kernels.compose_touch import Touching, pair_value
+from origami_sim.solve.kernels import articulated, plates, runge_kutta, sources, touching
 from origami_sim.solve.kernels.wave import wave
+from origami_sim.solve.program import templates
+from origami_sim.solve.program.compose_rigid import Rigid, is_steady
+from origami_sim.solve.program.compose_sheets import Sheets, Text
+from origami_sim.solve.program.compose_touch import Touching, pair_value
 
 FIELD, GRADIENT, TEMPERATURE, LOAD, ORIGIN, VOLTAGE = 0, 3, 12, 13, 14, 15
 """First drive channel of each quantity; voltages of further electrode groups follow."""
 
 FIXED_SLOTS = (
-    ("inertia", "mass"),
-    ("inertia", "total"),
-    ("plane", "tilt"),
-    ("plane", "azimuth"),
-    ("plane", "height"),
-    ("plane", "reach"),
-    ("drive", "offset"),
-    ("drive", "amplitude"),
-    ("drive", "angular_frequency"),
-    ("drive", "phase"),
-    ("drive", "scale"),
+    *(("inertia", name) for name in ("mass", "total")),
+    *(("plane", name) for name in ("tilt", "azimuth", "height", "reach")),
+    *(("drive", name) for name in ("offset", "amplitude", "angular_frequency", "phase", "scale")),
 )
 """Parameters that every model has besides those of its effects."""
 

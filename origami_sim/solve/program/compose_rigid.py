@@ -3,7 +3,7 @@
 from typing import Any
 
 from origami_sim.effects import Effect
-from origami_sim.solve.kernels.compose_sheets import Text
+from origami_sim.solve.program.compose_sheets import Text
 
 
 def is_steady(effect: Effect) -> bool:

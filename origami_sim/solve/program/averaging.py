@@ -5,7 +5,7 @@ import functools
 import warp as wp
 
 from origami_sim.effects import DISTORTIONS, get
-from origami_sim.solve.kernels import compose
+from origami_sim.solve.program import compose
 
 _HEAD = """
 @wp.kernel(enable_backward=False)

@@ -156,7 +156,7 @@ def rigid({arguments}
         asked = tree.corners
     if {nodal}:
         asked = tree.moving.shape[0]
-    final = int(articulated.STAGES - 1)
+    final = int(tree.stages - 1)
     anew = int(0)
     # one pass more than steps: at first only the accelerations are found
     begin = int(0)
@@ -166,6 +166,7 @@ def rigid({arguments}
         clock = scalar(0.0)
         until = scalar(wp.inf)  # when a hinge reverses
         going = int(1)
+        stale = int(1)  # the damping that steps are implicit in is found once in a frame, and after a step that failed
         still = int(0)  # a pass that finds accelerations and takes no time
         if s < 0:
             still = int(1)
@@ -190,12 +191,25 @@ def rigid({arguments}
                 step = scalar(0.0)
                 first_stage = final
             runge_kutta.begin(tree, angles, memory, power, w)
-            for stage in range(first_stage, final + 1):
-                if still == 0:
-                    runge_kutta.go(tree, stage, step, w)
-                h = tree.tableau[stage, 0] * step
+            probes = int(0)
+            if tree.implicit.shape[0] > 0 and still == 0 and stale == 1:
+                probes = tree.rates + 1
+                stale = int(0)
+            for stage in range(first_stage - probes, final + 1):
+                h = scalar(0.0)
+                weighs = scalar(0.0)
+                slot = int(stage)
+                if stage < first_stage:
+                    slot = int(tree.stages)
+                    runge_kutta.probe(tree, first_stage - 1 - stage, size, w)
+                else:
+                    if still == 0:
+                        if stage == first_stage and tree.implicit.shape[0] > 0:
+                            runge_kutta.begin_damped(tree, step, w)
+                        runge_kutta.go(tree, stage, step, w)
+                    h = tree.tableau[stage, 0] * step
+                    weighs = tree.tableau[final, 1 + stage]
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
-                weighs = tree.tableau[final, 1 + stage]
                 last = stage == final
                 articulated.pose(tree, w)
                 laid = asked
@@ -204,7 +218,9 @@ def rigid({arguments}
                 articulated.place(tree, X, V, F, laid, w)
 {body}
                 articulated.gather(tree, F, X, asked, w)
-                articulated.accelerate(tree, stage, w)
+                articulated.accelerate(tree, slot, w)
+                if stage < first_stage:
+                    runge_kutta.probed(tree, first_stage - 1 - stage, size, w)
             allowed = tolerance
             if tolerance == scalar(0.0):
                 allowed = scalar(1.0)  # a step as given only may not turn anything by radians more than it should
@@ -224,6 +240,7 @@ def rigid({arguments}
                     longer = runge_kutta.lengthen(tree, step, error / allowed, cut, w)
                 still = int(0){halt}
             else:
+                stale = int(1)
                 runge_kutta.go_back(tree, angles, memory, power, w)
                 if not (error <= allowed):
                     longer = scalar(0.0)
