@@ -52,9 +52,9 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
         rough = [np.diff(r, 2, axis=0) / np.sqrt(6.0) for r in f.residuals if len(r) > 2]
         level = np.sqrt(np.nanmean(np.concatenate(rough) ** 2, axis=0)) if rough else noise
         return [of(own.deviation), of(np.maximum(np.nan_to_num(level), noise))]
-    longest = max(joined(forward, f), key=len)
-    times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(longest))
-    found = shared([partial(infer, times, column, stated=float(n)) for column, n in zip(longest.T, noise, strict=True)])
+    whole = np.concatenate(joined(forward, f))  # one recorder: what recordings leave follows on each other
+    times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(whole))
+    found = shared([partial(infer, times, column, stated=float(n)) for column, n in zip(whole.T, noise, strict=True)])
     level = np.maximum([n.deviation for n in found], noise)
     return [of(own.deviation), of(level, tuple(n.colour for n in found))]
 

@@ -1,0 +1,32 @@
+"""Noise of a recorder, told by what fits leave of all recordings."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from origami_sim.fit.recorder import recorder_weights
+from origami_sim.fit.weights import Weights
+
+
+def left_over(seed: int, recordings: int):
+    """A fit that leaves noise of unit deviation, smoothed over three frames, in recordings of 145 frames each."""
+    rng = np.random.default_rng(seed)
+    rows = [np.convolve(rng.normal(size=147), [1, 2, 1], "valid")[:, None] / np.sqrt(6.0) for _ in range(recordings)]
+    blocks = [
+        SimpleNamespace(recording=n, first=0, noise=np.full(1, 0.3), times=np.arange(145) / 120.0)
+        for n in range(recordings)
+    ]
+    weights = Weights(np.ones(1), (np.ones(1),), 4, 0.0)
+    return SimpleNamespace(curve=False, blocks=blocks), SimpleNamespace(
+        weights=weights, blocks=list(range(recordings)), residuals=rows
+    )
+
+
+def test_all_recordings_tell_the_level_of_a_smoothing_tracker():
+    """A third of it was read from neighbouring frames: the more is left over, the less that counts."""
+    error = {}
+    for n in (1, 4):
+        found = [recorder_weights(*left_over(seed, n))[1] for seed in range(12)]
+        assert all(w.colour[0][1] > 0.3 for w in found)
+        error[n] = np.abs(np.mean([w.deviation[0] for w in found]) - 1.0)
+    assert error[4] < 0.05 and error[4] < 0.6 * error[1]
