@@ -217,15 +217,15 @@ class Static(Curves):
     """Predictions for curves by load step (`recording.by_step`): chains of equilibria.
 
     Every world follows its own equilibria from step to step (see `solve.settling`). A step begins where the world was,
-    moved as the nominal model moves there. Memory advances along the path, each step taking as long as nothing relaxes
-    any more.
+    moved as the nominal model moves there, with that model's tangent. Memory advances along the path, each step taking
+    as long as nothing relaxes any more.
     """
 
     def __init__(
         self, subject: Subject, recordings: Sequence[Recording], *, pieces: int = PIECES, threads: int | None = None
     ):
         super().__init__(subject, recordings, pieces=pieces, threads=threads)
-        self._nominal: dict[int, np.ndarray] = {}
+        self._nominal: dict[int, tuple[np.ndarray, list]] = {}
 
     def _other(self) -> Curves:
         out = super()._other()
@@ -236,20 +236,25 @@ class Static(Curves):
     def _curve(self, r: int, worlds):
         if r not in self._nominal:
             start = self.world(Hypothesis(), np.array([f.start for f in self.subject.nominals]), ())
-            self._nominal[r] = np.stack([s.x[:, 0] for s in self._chain(r, [start], None)[0]])
-        states, alive = self._chain(r, worlds, self._nominal[r])
+            states, _, tangents = self._chain(r, [start])
+            self._nominal[r] = np.stack([s.x[:, 0] for s in states]), tangents
+        states, alive, _ = self._chain(r, worlds, *self._nominal[r])
         drives = [joined(self._resting(r, *world)) for world in worlds] if measures_force(self.recordings[r]) else None
         return channels_of(self.recordings[r], worlds, states, alive, drives)
 
     # --- equilibria
 
-    def _chain(self, r: int, worlds, path: np.ndarray | None) -> tuple[list[State], np.ndarray]:
-        """States of all worlds, step by step, and whether an equilibrium was found [n, K]."""
+    def _chain(self, r: int, worlds, path: np.ndarray | None = None, tangents: Sequence = ()) -> tuple:
+        """States of all worlds, step by step, whether an equilibrium was found [n, K], and tangents of the first.
+
+        Args:
+            path: [n, N, 3] of the nominal model. tangents: its factors, step by step.
+        """
         model = worlds[0][0]
         steps, count = len(self.recordings[r].times), len(worlds)
         state = State.at_rest(model, count, position=np.stack([m.position for m, _ in worlds], axis=1), placed=True)
         alive = np.ones(count, bool)
-        states, found = [], []
+        states, found, kept = [], [], []
         before = model.position
         drives = self._resting(r, model, Parameters.join([p for _, p in worlds]))
         every = per_world(drives[0], levels(drives[0], 0.0, count))
@@ -261,10 +266,13 @@ class Static(Curves):
                 guess += (path[k] - before)[:, None]
                 before = path[k]
             level = levels(drives[k], 0.0, count)
+            if tangents:
+                search.begin_with(tangents[k])
             state, alive = search.settle(level, state, guess, alive, dt=HOLD, time=0.0)
             states.append(state)
             found.append(alive)
-        return states, np.stack(found)
+            kept.append(search.tangent)
+        return states, np.stack(found), kept
 
     # --- equation error
 

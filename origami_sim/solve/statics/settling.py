@@ -135,6 +135,15 @@ class Settling(ABC):
         self.held = Held(self.model, parameters, per_world(drive, self.levels), state, among=among, threads=every)
         self._copied: dict[int, Held] = {}
 
+    @property
+    def tangent(self):
+        """Factors of a tangent with which the first world begins its next step; None without any."""
+        return self._kept[0]
+
+    def begin_with(self, tangent) -> None:
+        """Lets all worlds begin their next step with a tangent of another search."""
+        self._kept = [tangent] * len(self._kept)
+
     def settle(
         self,
         level: np.ndarray,
