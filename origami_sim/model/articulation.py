@@ -160,8 +160,9 @@ class Articulation:
 
     def shift_between(self, base: Pose, pose: Pose) -> np.ndarray:
         """Small displacement [m, W] of the coordinates from one pose to another; folds change by less than a turn."""
-        angles = pose.angles - base.angles
-        angles -= 2 * np.pi * np.round(angles / (2 * np.pi))
+        angles = turned_by(pose.angles - base.angles)
+        if not self.floating:
+            return angles
         turn = Rotation.from_matrix(pose.rotation @ np.swapaxes(base.rotation, 1, 2)).as_rotvec()
         root = np.concatenate([pose.centre - base.centre, turn], axis=1)
         return np.concatenate([self.motions @ root.T, angles])
@@ -258,6 +259,11 @@ class Articulation:
         _, j, k, _ = self.model.creases[crease]
         axis = x[k] - x[j]
         return sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+
+
+def turned_by(angles: np.ndarray) -> np.ndarray:
+    """Differences of angles by less than a turn."""
+    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
 
 
 def _free_axes(x: np.ndarray, held: np.ndarray) -> np.ndarray:

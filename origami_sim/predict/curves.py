@@ -244,7 +244,9 @@ class Static(Curves):
 
     # --- equilibria
 
-    def _chain(self, r: int, worlds, path: np.ndarray | None = None, tangents: Sequence = ()) -> tuple:
+    def _chain(
+        self, r: int, worlds, path: np.ndarray | None = None, tangents: Sequence = ()
+    ) -> tuple[list[State], np.ndarray, list]:
         """States of all worlds, step by step, whether an equilibrium was found [n, K], and tangents of the first.
 
         Args:

@@ -29,4 +29,4 @@ def test_all_recordings_tell_the_level_of_a_smoothing_tracker():
         found = [recorder_weights(*left_over(seed, n))[1] for seed in range(12)]
         assert all(w.colour[0][1] > 0.3 for w in found)
         error[n] = np.abs(np.mean([w.deviation[0] for w in found]) - 1.0)
-    assert error[4] < 0.05 and error[4] < 0.6 * error[1]
+    assert error[4] < 0.05 and error[4] < 0.3 * error[1]

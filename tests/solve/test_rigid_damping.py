@@ -59,16 +59,16 @@ def test_steps_that_are_implicit_in_damping_are_of_order_five():
 
 
 def test_an_overdamped_chain_creeps_as_lagranges_equations_say(monkeypatch):
-    """Decay rates of 1e5/s, over steps of up to 10 ms."""
+    """Decay rates of up to 6e4/s, over steps of up to 10 ms."""
     slow(monkeypatch)
     model, parameters = damped([5.0, 3.0])
     assert overdamped(model, parameters, Topology(model), 0.01)
     run = simulate(model, parameters, duration=1.0, rate=100.0, state=folded(model, [1.2, 0.7]))
     expected = double_pendulum(model, parameters, [1.2, 0.7], run.times, (5.0, 3.0))
-    assert np.abs(run.creases[1:, :, 0] - expected[1:]).max() < 1e-9
+    assert np.abs(run.creases[1:, :, 0] - expected[1:]).max() < 5e-11
     batch = RigidBatch(model, parameters, Drive(), folded(model, [1.2, 0.7]), tolerance=0.0, implicit=True)
-    batch.advance(100, 0.01, np.inf)  # given steps, a thousand times longer than explicit ones may be
-    assert np.abs(batch.state().angles[:, 0] - expected[-1]).max() < 1e-8
+    batch.advance(100, 0.01, np.inf)  # given steps, 190 times longer than explicit ones may be
+    assert np.abs(batch.state().angles[:, 0] - expected[-1]).max() < 1e-9
 
 
 def test_steps_are_implicit_only_where_viscosity_would_bound_them():
@@ -125,7 +125,7 @@ def test_feet_hold_and_slide_the_same_with_implicit_steps():
         ends.append(batch.state().x[:, 0])
     moved = np.abs(ends[0] - state.x[:, 0]).max()
     assert moved > 1e-3
-    assert np.abs(ends[1] - ends[0]).max() < 1e-3 * moved
+    assert np.abs(ends[1] - ends[0]).max() < 3e-4 * moved
 
 
 def test_the_gpu_follows_the_cpu(cuda):
@@ -140,4 +140,4 @@ def test_the_gpu_follows_the_cpu(cuda):
             batch = RigidBatch(model, parameters, Drive(), state, tolerance=tolerance, implicit=True, device=device)
             batch.advance(40, 0.01, np.inf)
             ends.append(batch.state().x)
-        assert np.abs(ends[0] - ends[1]).max() < 1e-6
+        assert np.abs(ends[0] - ends[1]).max() < 1e-7

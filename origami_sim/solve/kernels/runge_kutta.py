@@ -162,6 +162,16 @@ def begin_damped(tree: Tree, step: scalar, w: int):
 
 
 @wp.func
+def slow_down(tree: Tree, rates: int, w: int):
+    """Rates r as damping leaves them in a stage, (M + a h C)^-1 M r, in place."""
+    s = tree.data
+    o = w * tree.width
+    multiply(s, o + tree.factor0, rates, tree.rates)
+    solve_lower(s, o + tree.stiff, rates, tree.rates)
+    solve_upper(s, o + tree.stiff, rates, tree.rates)
+
+
+@wp.func
 def damp(tree: Tree, stage: int, h: scalar, w: int):
     """Rates at a stage of a step of h with the damping of joints, implicitly.
 
@@ -178,9 +188,7 @@ def damp(tree: Tree, stage: int, h: scalar, w: int):
             x = x + tree.implicit[stage, k] * at(s, o + tree.damped + k * m + i)
         s[(u + i) & NATURAL] = at(s, u + i) + h * x
     copy(s, mine, u, m)
-    multiply(s, o + tree.factor0, u, m)
-    solve_lower(s, o + tree.stiff, u, m)
-    solve_upper(s, o + tree.stiff, u, m)
+    slow_down(tree, u, w)
     for i in range(m):
         change = at(s, u + i) - at(s, mine + i)
         s[(mine + i) & NATURAL] = change / (h * tree.implicit[stage, stage])
@@ -293,9 +301,7 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
     for i in range(m):
         tree.data[(rates + i) & NATURAL] = h * weighted(tree, o + tree.du + i, m, tree.stages, tree.stages)
     if tree.implicit.shape[0] > 0:  # what is damped within the step is no error (Shampine & Baca 1984)
-        multiply(tree.data, o + tree.factor0, rates, m)
-        solve_lower(tree.data, o + tree.stiff, rates, m)
-        solve_upper(tree.data, o + tree.stiff, rates, m)
+        slow_down(tree, rates, w)
     for i in range(m):
         x = wp.abs(h * at(tree.data, rates + i))
         if i < tree.roots:

@@ -7,7 +7,7 @@ of them has to be known. How several supports of rigid bodies share R is not det
 import numpy as np
 
 from origami_sim.model import Model
-from origami_sim.solve.rigid.topology import Topology
+from origami_sim.solve.rigid.topology import Topology, mass_matrix
 
 ALONG = 1e-5
 """Part of a radian by which panels are moved along their motion, for differences of what unit rates move."""
@@ -45,7 +45,7 @@ def support_of_all(model: Model, mass: np.ndarray, x: np.ndarray, v: np.ndarray,
     step = ALONG / max(1.0, float(np.abs(u).max(initial=0.0)))
     ends = [tree.moved(x, sign * step * u) for sign in (1.0, -1.0)] if moving else [x, x]
     turning = np.einsum("mnwa,mw->nwa", tree.rates(ends[0]) - tree.rates(ends[1]), u) / (2.0 * step)
-    heavy = np.einsum("mnwa,n,knwa->wmk", by, mass, by)
+    heavy = mass_matrix(by, mass)
     right = np.einsum("mnwa,nwa->wm", by, force - mass[:, None, None] * turning)
     out = np.empty((x.shape[1], 3))
     for w in range(x.shape[1]):

@@ -267,6 +267,11 @@ def _on_line(model: Model, c: int, other: int) -> bool:
     return bool(np.linalg.norm(away, axis=1).max() < 1e-9 * np.linalg.norm(b - a))
 
 
+def mass_matrix(by: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Mass matrices [W, m, m] of nodes of mass (N,) [kg] with velocities [m, N, W, 3] for unit rates."""
+    return np.einsum("mnwa,n,knwa->wmk", by, mass, by)
+
+
 def check_inertia(model: Model, tree: Topology, x: np.ndarray, mass: np.ndarray) -> None:
     """Refuses a panel that turns without inertia.
 
@@ -277,7 +282,7 @@ def check_inertia(model: Model, tree: Topology, x: np.ndarray, mass: np.ndarray)
         InputError: names the panel.
     """
     by = tree.rates(x[:, None])[:, :, 0]
-    heavy = np.einsum("mna,n,mna->m", by, mass, by)
+    heavy = np.einsum("mna,n,mna->m", by, mass, by)  # only its diagonal: this is asked of every world
     light = np.flatnonzero(heavy <= 1e-15 * heavy.max(initial=0.0))
     if len(light):
         k = int(light[0]) - len(tree.turns)

@@ -213,7 +213,7 @@ class Settling(ABC):
     def _shared(self, x: np.ndarray, wanted: np.ndarray) -> tuple[list, np.ndarray]:
         """Factors as of `_factors`, of the first of these worlds, which serve those that lie close to it as well.
 
-        Worlds of derivatives differ by little: equilibria are found ten times as fast as with tangents of their own.
+        Worlds of derivatives differ by little: equilibria are found two to eight times as fast as with their own.
         """
         first = int(np.argmax(wanted))
         close = wanted & (np.abs(x - x[:, [first]]).max(axis=(0, 2)) < self.far * self.size)
