@@ -312,7 +312,7 @@ def predictable(forward: Rollouts, growth: float = GROWTH) -> float:
     local = np.zeros((2 * half + 1, len(forward.blocks), 2 * half))
     size = spans(forward.articulation, forward.model)
     for b, block in enumerate(forward.blocks):
-        nudges = 1e-6 * np.concatenate([size, forward.usual_rates(block.recording)])
+        nudges = 1e-6 * np.concatenate([size, forward.readings.usual_rates(block.recording)])
         local[1:, b][np.diag_indices(2 * half)] = nudges
     theta = np.array([f.start for f in forward.subject.nominals])
     predicted = forward.predict(Hypothesis(), [theta] * (2 * half + 1), local)

@@ -12,7 +12,8 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.channels import stacked
 from origami_sim.predict.filming import film
-from origami_sim.predict.rollouts import Rollouts, Shots, Simulated
+from origami_sim.predict.rollouts import Rollouts
+from origami_sim.predict.shots import Shots, Simulated
 from origami_sim.recording import Recording
 from origami_sim.solve.timestep import gradient_norms, stable_step
 
@@ -68,7 +69,7 @@ class BarRollouts(Rollouts):
         if most is not None and len(firsts) > most:
             firsts = firsts[np.round(np.linspace(0, len(firsts) - 1, most)).astype(int)]
         if self.start == "fit":
-            told = [self.tells(recording, values, noise, int(first)) for first in firsts]
+            told = [self.readings.tells(recording, values, noise, int(first)) for first in firsts]
             firsts = firsts[told] if any(told) else firsts
         return [self.segment(index, int(first), frames) for first in firsts]
 
@@ -104,7 +105,7 @@ class BarRollouts(Rollouts):
     def _filmed(self, shots: Shots) -> Simulated:
         recording, model = self.recordings[shots.recording], shots.model or shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
-        drive, state, step = self._driven(shots, model, parameters), self._state(shots), shots.step
+        drive, state, step = self.driven(shots, model, parameters), self.state(shots), shots.step
         pace = shots.pace or stable_step(model, parameters).dt
         substeps = max(1, int(np.ceil(step / pace * (1 - 1e-12))))
         raw: list[np.ndarray] = []
@@ -112,10 +113,10 @@ class BarRollouts(Rollouts):
         if calm:
             quiet, damped = calmed(model, parameters)
             finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
-            batch = self._batch(quiet, damped, drive, _with_effects(state, quiet), threads=shots.threads)
+            batch = self.batch(quiet, damped, drive, _with_effects(state, quiet), threads=shots.threads)
             raw += film(batch, recording, calm + 1, finer, step)
             state = _with_effects(batch.state(), model, step=calm * substeps)
-        batch = self._batch(model, parameters, drive, state, threads=shots.threads)
+        batch = self.batch(model, parameters, drive, state, threads=shots.threads)
         begin = state.x.copy() if self.start == "rest" else None
         left = shots.frames - sum(map(len, raw))
         raw += film(batch, recording, left, substeps, step, first=not calm, begin=begin)

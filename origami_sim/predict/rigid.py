@@ -2,26 +2,31 @@
 
 from collections import ChainMap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from origami_sim.drive import Drive
-from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State, node_mass
-from origami_sim.model.articulation import Articulation, turned_by
-from origami_sim.predict.filming import even, film, film_step, pictured
-from origami_sim.predict.rollouts import (
-    Motion,
-    Rollouts,
-    Shots,
-    Simulated,
-    joined_poses,
+from origami_sim.model.articulation import Articulation
+from origami_sim.predict.chained import (
+    FINEST,
+    Films,
+    Seen,
+    chained_segments,
+    channels_of,
+    films_of,
+    followed_worlds,
+    motion_of,
 )
+from origami_sim.predict.filming import film
+from origami_sim.predict.memories import Motion, in_parts
+from origami_sim.predict.rollouts import Rollouts
+from origami_sim.predict.shots import Shots, Simulated, joined_poses, of_worlds
 from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
@@ -48,63 +53,8 @@ that chatter end 0.02 to 0.2 mm off (a device of 40 mm), with ten times more 0.1
 1.6 to 2.1 times as long, 0.004 to 0.05 mm.
 """
 
-FINEST = 1e-4
-"""Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
-
-Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
-"""
-
-
 POINTS = 8
 """Motions that are kept: those of the last points that a fit tried."""
-
-
-Films = dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]]
-"""Films of segments [frames, D + k] and where they arrive [1 or 3, L], by all that they depend on.
-
-Blocks and drives are kept, so that no other gets their number.
-"""
-
-
-@dataclass(frozen=True, eq=False)
-class Chained:
-    """Segments of a recording, each tied to the next.
-
-    Attributes:
-        recording: its index. blocks: (B). local: [1, B, L] shifts of their starts, or None. angles, rates: [B, m] where
-            they begin. begins: (B + 1,) frames at which they do, and the end. step: between frames [s]. dt: alike,
-            where blocks do not last as long.
-    """
-
-    recording: int
-    blocks: list[Block]
-    local: np.ndarray | None
-    angles: np.ndarray
-    rates: np.ndarray
-    begins: list[int]
-    step: float
-    dt: float
-
-    def shots(self, worlds: list[World], some: Sequence[int] = (0,), **also) -> Shots:
-        """Rollouts of worlds that begin with some blocks."""
-        local = None if self.local is None else np.repeat(self.local[:, some], len(worlds), axis=0)
-        blocks = [self.blocks[n] for n in some]
-        given = {"late": None, "memory": None, "frames": 0, "ends": 0} | also
-        return Shots(self.recording, blocks, worlds, local=local, step=self.step, **given)
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """What channels see of worlds that go on from segment to segment.
-
-    Attributes:
-        first: [D + k, W, B] where segments begin. later: [F, D + k, W] from frame to frame.
-        arrived: [B - 1, L, W] where those end that are tied to the next.
-    """
-
-    first: np.ndarray
-    later: np.ndarray
-    arrived: np.ndarray
 
 
 class RigidRollouts(Rollouts):
@@ -153,11 +103,11 @@ class RigidRollouts(Rollouts):
         firsts = np.arange(0, count, -(-count // pieces))  # of equal length, but for the last
         firsts = np.append(firsts[count - firsts >= min(FEWEST, count)], count)
         if self.start == "fit":
-            self.read_starts(index, firsts[:-1].tolist())
+            self.readings.read(index, firsts[:-1].tolist())
         out = [self.segment(index, int(a), int(b - a)) for a, b in pairwise(firsts)]
         if not tied or self.start != "fit":
             return out
-        usual = self.usual_rates(index)
+        usual = self.readings.usual_rates(index)
         for n, (block, after) in enumerate(pairwise(out)):
             lasting = float(recording.times[after.first] - recording.times[block.first])
             # a force that is missing by chance changes rates, and coordinates by their integral
@@ -193,11 +143,11 @@ class RigidRollouts(Rollouts):
         if shots.late is not None:
             return Simulated(*self._simulated(shots))
         films, every = ChainMap(self._films, self._beside.get(shots.recording, {})), range(len(shots.worlds))
-        known = [k for k in every if all(key in films for key in self._film_keys(shots, k))]
+        known = [k for k in every if all(key in films for key in self.film_keys(shots, k))]
         new = [k for k in every if k not in known]
         made: dict[int, tuple[np.ndarray, np.ndarray | None]] = {}
         for k in known:
-            found = [films[key] for key in self._film_keys(shots, k)]
+            found = [films[key] for key in self.film_keys(shots, k)]
             ends = [end for *_, end in found if end is not None]
             made[k] = np.stack([film for *_, film, _ in found], axis=2), np.stack(ends, axis=2) if ends else None
         if new:
@@ -211,7 +161,7 @@ class RigidRollouts(Rollouts):
             raw_first, end = made[0]
             first = [
                 (key, raw_first[:, :, n].copy(), None if end is None else end[:, :, n].copy())
-                for n, key in enumerate(self._film_keys(shots, 0))
+                for n, key in enumerate(self.film_keys(shots, 0))
             ]
         return Simulated(raw, np.concatenate(ends, axis=2) if ends else None, first)
 
@@ -222,7 +172,7 @@ class RigidRollouts(Rollouts):
         while len(self._films) > POINTS * len(self.blocks):
             del self._films[next(iter(self._films))]
 
-    def _film_keys(self, shots: Shots, k: int) -> Iterator[tuple]:
+    def film_keys(self, shots: Shots, k: int) -> Iterator[tuple]:
         """For each block, all that a film of a world depends on."""
         (model, parameters), local, memory = shots.worlds[k], shots.local, shots.memory
         drive = id(self.drives[shots.recording])
@@ -243,9 +193,9 @@ class RigidRollouts(Rollouts):
     def _simulated(self, shots: Shots) -> tuple[np.ndarray, np.ndarray | None]:
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
-        state = self._state(shots)
-        drive = self._driven(shots, model, parameters)
-        batch = self._batch(model, parameters, drive, state, tolerance=self.blur, threads=shots.threads)
+        state = self.state(shots)
+        drive = self.driven(shots, model, parameters)
+        batch = self.batch(model, parameters, drive, state, tolerance=self.blur, threads=shots.threads)
         if isinstance(batch, RigidBatch):
             batch.finest = FINEST
         begun, arrived, raw = 0, [], []
@@ -264,18 +214,18 @@ class RigidRollouts(Rollouts):
             ends[..., lost] = np.nan
         return out, ends
 
-    def _batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
+    def batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         # lengths do not change how panels hang together
-        return super()._batch(model, parameters, drive, state, tree=self._tree, implicit=self._overdamped, **options)
+        return super().batch(model, parameters, drive, state, tree=self._tree, implicit=self._overdamped, **options)
 
-    def _motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
-        """See `Rollouts._motion`: of tied segments the motion of the world itself, one segment after the other.
+    def motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
+        """See `Rollouts.motion`: of tied segments the motion of the world itself, one segment after the other.
 
         A point of a fit is asked for again where derivatives are taken there.
         """
-        chained = self._chained(r, local)
+        chained = chained_segments(self, r, local)
         if chained is None:
-            return super()._motion(r, world, local)
+            return super().motion(r, world, local)
         begins = tuple((b.first, b.lasting, b.times[-1]) for b in chained.blocks)
         (model, parameters), drive = world, self.drives[r]
         starts = (
@@ -287,111 +237,31 @@ class RigidRollouts(Rollouts):
         if key not in self._moved:
             if len(self._moved) >= POINTS:
                 del self._moved[next(iter(self._moved))]
-            found = self._followed(chained, world)
-            self._moved[key] = drive, super()._motion(r, world, local) if found is None else found
+            found = motion_of(self, chained, world)
+            self._moved[key] = drive, super().motion(r, world, local) if found is None else found
         motion = self._moved[key][1]
         self._films.update(motion.films if motion is not None else {})
         return motion
 
-    def _chained(self, r: int, local: np.ndarray | None) -> Chained | None:
-        """The segments of a recording, of which each begins where the one before ends; None if they do not."""
-        numbers = [n for n, b in enumerate(self.blocks) if b.recording == r]
-        blocks = [self.blocks[n] for n in numbers]
-        if self.articulation.floating or self.start != "fit" or any(b.reach is None for b in blocks[:-1]):
-            return None
-        m, shifts = self.articulation.size, np.zeros((len(blocks), self.local)) if local is None else local[numbers]
-        angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)])
-        rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)])
-        step = film_step(self.recordings[r].times)
-        lasting = [b.lasting if b.reach is not None else float(b.times[-1]) for b in blocks]
-        begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
-        regular = all(even(step, t, n) == step for t, n in zip(lasting, np.diff(begins).tolist(), strict=True))
-        dt = step if regular else sum(lasting) / begins[-1]
-        return Chained(r, blocks, None if local is None else shifts[None], angles, rates, begins, step, dt)
-
-    def _own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
-        """See `Rollouts._own_memories`: each world's segments begin where those of the first do.
+    def own_memories(self, r: int, worlds: list[World], local: np.ndarray | None) -> dict[int, np.ndarray]:
+        """See `Rollouts.own_memories`: each world's segments begin where those of the first do.
 
         Their films are known then, too, where nothing is remembered that fades.
         """
-        chained = self._chained(r, local)
+        chained = chained_segments(self, r, local)
         if chained is None:
             return {}
         lasts = len(lasting(worlds[0][0])) == sum(size for *_, size in worlds[0][0].memories)
 
         def followed(part: list[World], threads: int) -> tuple[np.ndarray, Seen | None]:
-            x, turned, kept, ended = self._anew(chained, part, threads)
-            return kept, self._seen(chained, part, x, turned, ended) if lasts else None
+            x, turned, kept, ended = followed_worlds(self, chained, part, threads)
+            return kept, channels_of(self, chained, part, x, turned, ended) if lasts else None
 
         self._beside[r], each = {}, []
-        for part, (kept, seen) in self._in_parts(worlds, followed):
-            self._beside[r] |= self._films_of(chained, part, kept, seen)
+        for part, (kept, seen) in in_parts(self, worlds, followed):
+            self._beside[r] |= films_of(self, chained, part, kept, seen)
             each.append(kept)
         return {b.first: memory for b, memory in zip(chained.blocks, np.concatenate(each, axis=2), strict=True)}
-
-    def _anew(
-        self, chained: Chained, worlds: list[World], threads: int = 1
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Worlds that go on from segment to segment, see `film_anew`."""
-        r, count = chained.recording, len(worlds)
-        shots = chained.shots(worlds, frames=len(self.recordings[r].times))
-        (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
-        begin = State.at_rest(model, count, position=self._state(shots).x, placed=True)
-        begin.memory[:] = self._rested(r, worlds, 0, begin.x[:, :1], threads)[-1].memory
-        drive = self._driven(shots, model, parameters)
-        batch = self._batch(model, parameters, drive, begin, tolerance=self.blur, threads=threads)
-        assert isinstance(batch, RigidBatch)
-        batch.finest = FINEST
-        starts = [np.repeat(a[:, :, None], count, axis=2) for a in (chained.angles, chained.rates)]
-        return batch.film_anew(chained.begins[-1], chained.dt, chained.begins[:-1], *starts)
-
-    def _followed(self, chained: Chained, world: World) -> Motion | None:
-        """The motion of a world from segment to segment, with films of the segments; None: unstable."""
-        x, turned, kept, ended = self._anew(chained, [world])
-        if not np.all(np.isfinite(x)):
-            return None
-        memory = {b.first: then[:, 0] for b, then in zip(chained.blocks, kept, strict=True)}
-        path = np.concatenate([self._state(chained.shots([world])).x[None, :, 0], x[:, :, 0]])
-        seen = self._seen(chained, [world], x, turned, ended)
-        return Motion(path, memory, self._films_of(chained, [world], kept, seen))
-
-    def _seen(
-        self, chained: Chained, worlds: list[World], x: np.ndarray, turned: np.ndarray, ended: np.ndarray
-    ) -> Seen | None:
-        """What channels see of worlds that were followed: what they do of segments alone, but for rounding.
-
-        None where these take steps, and see the drive at instants, of their own.
-        """
-        recording, blocks, (model, _) = self.recordings[chained.recording], chained.blocks, worlds[0]
-        steady = all(s.constant for s in self.drives[chained.recording].signals.values())
-        if chained.dt != chained.step or not steady or any(get(e).family == "drive" for e in model.effects):
-            return None
-        starts = self._state(chained.shots(worlds, range(len(blocks))))
-        first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
-        angles = turned[np.array(chained.begins[1:-1], int) - 1][:, self.articulation.creases]
-        shift = turned_by(angles - np.stack([b.pose.angles for b in blocks])[1:])
-        rates = ended[1:] - np.stack([b.rates for b in blocks])[1:, :, None]
-        later = pictured(model, recording, x, turned)
-        return Seen(first.reshape(-1, len(worlds), len(blocks)), later, np.concatenate([shift, rates], axis=1))
-
-    def _films_of(self, chained: Chained, worlds: list[World], kept: np.ndarray, seen: Seen | None) -> Films:
-        """Films of the segments of worlds that were followed; none of those that are unstable."""
-        if seen is None:
-            return {}
-        begins, drive = chained.begins, self.drives[chained.recording]
-        stable = np.flatnonzero(np.isfinite(seen.later).all(axis=(0, 1))).tolist()
-        kinds: dict[tuple[int, bool], list[int]] = {}
-        for n, (block, frames) in enumerate(zip(chained.blocks, np.diff(begins).tolist(), strict=True)):
-            kinds.setdefault((frames, block.reach is not None), []).append(n)
-        films: Films = {}
-        for (frames, tied), mine in kinds.items():
-            memory = kept[mine].transpose(1, 2, 0).reshape(kept.shape[1], -1)
-            shots = chained.shots(worlds, mine, memory=memory, frames=frames + 1, ends=frames * tied)
-            for k in stable:
-                for n, key in zip(mine, self._film_keys(shots, k), strict=True):
-                    raw = np.concatenate([seen.first[None, :, k, n], seen.later[begins[n] : begins[n + 1], :, k]])
-                    films[key] = chained.blocks[n], drive, raw, seen.arrived[None, n, :, k] if tied else None
-        return films
 
     def _arrived(self, shots: Shots, state: State) -> np.ndarray:
         """[L, K B] where rollouts are, as shifts of the starts of the blocks that are tied to theirs."""
@@ -412,15 +282,6 @@ class RigidRollouts(Rollouts):
             out[: arm.size, at] = arm.shift_between(base.select(b), pose)
             out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
         return out
-
-
-def of_worlds(shots: Shots, some: list[int]) -> Shots:
-    """Rollouts of some worlds, none of which is late."""
-    memory = shots.memory
-    if memory is not None:
-        memory = memory.reshape(len(memory), len(shots.worlds), -1)[:, some].reshape(len(memory), -1)
-    local = None if shots.local is None else shots.local[some]
-    return replace(shots, worlds=[shots.worlds[k] for k in some], local=local, memory=memory)
 
 
 def check_tree(tree: Topology, arm: Articulation) -> None:

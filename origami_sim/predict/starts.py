@@ -1,14 +1,18 @@
 """Where a segment of a recording starts: coordinates and rates read from its channels, and how well they are known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation, Pose
-from origami_sim.predict.channels import angle_mask, channel_values
+from origami_sim.predict.channels import angle_mask, channel_values, stacked
 from origami_sim.predict.track import placed
 from origami_sim.recording import Recording
+from origami_sim.threads import shared
 
 CAREFUL = 6.0
 """A rate that was read from a recording is known within so many of its standard deviations.
@@ -21,6 +25,9 @@ POSSIBLE = 2.0
 
 NEAR = 4
 """Frames from where a segment begins within which its start has to be seen."""
+
+READ = 30
+"""Starts that one core reads while others read others: some 50 ms of work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +45,64 @@ class Reading:
     error: np.ndarray
     shown: np.ndarray
     tangent: np.ndarray
+
+
+class Readings:
+    """What recordings say about the state at frames, each read once.
+
+    Args:
+        model, arm: the device and its coordinates. recordings: of it.
+    """
+
+    def __init__(self, model: Model, arm: Articulation, recordings: Sequence[Recording]):
+        self.model, self.arm, self.recordings = model, arm, recordings
+        self._found: dict[tuple[int, int], Reading] = {}
+        self._usual: dict[int, np.ndarray] = {}
+
+    def at(self, index: int, frame: int) -> Reading:
+        """The state at a frame of a recording."""
+        self.read(index, [frame])
+        return self._found[index, frame]
+
+    def read(self, index: int, frames: Sequence[int]) -> None:
+        """Reads the state at frames of a recording, where that has not been done, into `readings`."""
+        recording = self.recordings[index]
+        values, noise = stacked(recording)
+        new = [k for k in frames if (index, k) not in self._found]
+
+        def read(part: list[int]) -> list[Reading]:
+            return [read_start(self.model, self.arm, recording, values, noise, k) for k in part]
+
+        found = shared([partial(read, new[k : k + READ]) for k in range(0, len(new), READ)])
+        self._found.update(zip(((index, k) for k in new), chain.from_iterable(found), strict=True))
+
+    def usual_rates(self, index: int) -> np.ndarray:
+        """(m,) root mean square of the rates of the coordinates in a recording, where channels tell them.
+
+        What no channel tells is taken to move as fast as what they do tell, a radian as a device's size.
+        """
+        if index not in self._usual:
+            arm, count = self.arm, len(self.recordings[index].times)
+            picked = np.unique(np.linspace(0, count - 1, 24).astype(int)).tolist()
+            self.read(index, picked)
+            found = [self._found[index, k] for k in picked]
+            size = spans(arm, self.model)
+            rates = np.stack([np.where(np.isfinite(f.error), f.rates, np.nan) for f in found]) / size
+            squares = np.array([np.mean(r[np.isfinite(r)] ** 2) if np.any(np.isfinite(r)) else np.nan for r in rates.T])
+            most = np.nanmax(squares) if np.any(np.isfinite(squares)) else 1.0
+            self._usual[index] = np.sqrt(np.where(np.isfinite(squares), squares, most)) * size
+        return self._usual[index]
+
+    def tells(self, recording: Recording, values, noise, first: int) -> bool:
+        """Whether what was seen near a frame tells all coordinates that the channels can tell."""
+        near = np.isfinite(values[max(0, first - NEAR) : first + NEAR + 1]).any(axis=0)
+        ever = np.isfinite(values).any(axis=0)
+        if np.array_equal(near, ever):
+            return True
+        pose = self.arm.reference()
+        _, tangent = channel_tangent(self.model, self.arm, recording, pose, values[first])
+        by = tangent / noise[:, None]
+        return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
 
 
 def read_start(model: Model, arm: Articulation, recording: Recording, values, noise, first: int) -> Reading:

@@ -21,7 +21,8 @@ from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
 from origami_sim.pattern import strip
-from origami_sim.predict import cache, rollouts
+from origami_sim.predict import cache, chained, memories, rollouts
+from origami_sim.predict import rigid as predicted
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Channel, Recording
@@ -87,7 +88,8 @@ def test_predictions_are_the_same_bytes_on_any_number_of_threads(tied, monkeypat
     made = []
     for threads, processes in ((1, 1), (2, 1), (5, 1), (1, 2), (1, 4)):
         monkeypatch.setattr(tied, "threads", threads)
-        monkeypatch.setattr(rollouts, "sharing", lambda processes=processes: processes)
+        for module in (rollouts, memories):
+            monkeypatch.setattr(module, "sharing", lambda processes=processes: processes)
         for known in (tied._moved, tied._films, tied._beside):
             known.clear()
         made.append(tied.shoot(h, thetas, np.zeros((3, len(tied.blocks), tied.local))))
@@ -134,7 +136,8 @@ def test_worlds_that_were_followed_are_not_simulated_again(tied, monkeypatch):
         return tied.shoot(Hypothesis((friction,)), worlds, local)
 
     found, once = shot(), set(simulated)
-    monkeypatch.setattr(tied, "_seen", lambda *_: None)
+    for module in (chained, predicted):
+        monkeypatch.setattr(module, "channels_of", lambda *_: None)
     anew, every = shot(), set(simulated)
     assert once == set() and every == {3}
     for a, b in zip((*found.values, *found.ends[:-1]), (*anew.values, *anew.ends[:-1]), strict=True):

@@ -14,7 +14,8 @@ from origami_sim.errors import InputError
 from origami_sim.explore import Way, angle, find
 from origami_sim.explore.gradients import gradient
 from origami_sim.model import State
-from origami_sim.predict.rollouts import Motion, Rollouts
+from origami_sim.predict.memories import Motion
+from origami_sim.predict.rollouts import Rollouts
 from origami_sim.solve.watch import Met, watch_of
 
 MM = 1e-3
