@@ -153,9 +153,12 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
             inside = np.clip(columns[:, c], grid[0], grid[-1])
             out[:, :, mine] = part(inside)
             outside = columns[:, c] - inside
-            for n in np.flatnonzero(outside if not rested else outside > 0):
-                rate, bend = (part(inside[n : n + 1], order)[0] for order in (1, 2))
-                out[n][:, mine] += outside[n] * rate + 0.5 * outside[n] ** 2 * bend
+            late = outside > 0
+            beyond = np.flatnonzero(outside if not rested else late)
+            if len(beyond):  # often thousands of times: only the rate and the bend of both ends are asked for
+                rate, bend = (part(grid[[0, -1]], order)[late[beyond].astype(int)] for order in (1, 2))
+                by = outside[beyond, None, None]
+                out[np.ix_(beyond, np.arange(out.shape[1]), mine)] += by * rate + 0.5 * by**2 * bend
         return out
 
     return at
