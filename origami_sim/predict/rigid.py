@@ -175,17 +175,8 @@ class RigidRollouts(Rollouts):
     def film_keys(self, shots: Shots, k: int) -> Iterator[tuple]:
         """For each block, all that a film of a world depends on."""
         (model, parameters), local, memory = shots.worlds[k], shots.local, shots.memory
-        drive = id(self.drives[shots.recording])
-        world = (
-            drive,
-            shots.recording,
-            shots.step,
-            shots.frames,
-            shots.ends,
-            shots.clocked,
-            model.hash,
-            parameters.hash,
-        )
+        asked = (shots.recording, shots.step, shots.frames, shots.ends, shots.clocked)
+        world = (id(self.drives[shots.recording]), *asked, model.hash, parameters.hash)
         for n, b in enumerate(shots.blocks):
             start = b"" if local is None else local[k, n].tobytes()
             yield *world, id(b), start, b"" if memory is None else memory[:, k * len(shots.blocks) + n].tobytes()
