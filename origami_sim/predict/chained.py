@@ -20,12 +20,6 @@ from origami_sim.solve.rigid.batch import RigidBatch
 if TYPE_CHECKING:
     from origami_sim.predict.rigid import RigidRollouts
 
-FINEST = 1e-4
-"""Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
-
-Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
-"""
-
 Films = dict[tuple, tuple[Block, Drive, np.ndarray, np.ndarray | None]]
 """Films of segments [frames, D + k] and where they arrive [1 or 3, L], by all that they depend on.
 
@@ -103,7 +97,6 @@ def followed_worlds(
     drive = forward.driven(shots, model, parameters)
     batch = forward.batch(model, parameters, drive, begin, tolerance=forward.blur, threads=threads)
     assert isinstance(batch, RigidBatch)
-    batch.finest = FINEST
     starts = [np.repeat(a[:, :, None], count, axis=2) for a in (chained.angles, chained.rates)]
     return batch.film_anew(chained.begins[-1], chained.dt, chained.begins[:-1], *starts)
 

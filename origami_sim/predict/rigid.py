@@ -14,7 +14,6 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.predict.chained import (
-    FINEST,
     Films,
     Seen,
     chained_segments,
@@ -48,9 +47,16 @@ differences, where steps of their own made intervals fifty times too narrow.
 TOUCHING = 1e-7
 """The same of devices that touch the ground, whose derivatives are as uncertain with 1e-8 as with 1e-6.
 
-Friction holds a little earlier or later in a nudged world: they are off by 1 to 15 %, at times by half and more. Feet
-that chatter end 0.02 to 0.2 mm off (a device of 40 mm), with ten times more 0.1 to 0.4 mm, with a tenth, which takes
-1.6 to 2.1 times as long, 0.004 to 0.05 mm.
+Friction holds a little earlier or later in a nudged world: they are off by 1 to 15 %, at times by half and more; with
+1e-11 and a third of the nudge they differ by 1 to 6 % on two crawlers, so smaller steps alone mend little. Feet that
+chatter end 0.02 to 0.2 mm off (a device of 40 mm), with ten times more 0.1 to 0.4 mm, with a tenth, which takes 1.6 to
+2.1 times as long, 0.004 to 0.05 mm.
+"""
+
+FINEST = 1e-4
+"""Part of a frame below which a rollout's step may not fall: a hypothesis that is so stiff is given up.
+
+Rollouts take one to ten steps per frame; a tenth of it lets a wrong hypothesis take ten times as long.
 """
 
 POINTS = 8
@@ -187,8 +193,6 @@ class RigidRollouts(Rollouts):
         state = self.state(shots)
         drive = self.driven(shots, model, parameters)
         batch = self.batch(model, parameters, drive, state, tolerance=self.blur, threads=shots.threads)
-        if isinstance(batch, RigidBatch):
-            batch.finest = FINEST
         begun, arrived, raw = 0, [], []
         stops = [shots.ends + n for n in ((0, 1, 2) if shots.clocked else (1,))] if shots.ends else []
         for frame in stops:
@@ -207,7 +211,11 @@ class RigidRollouts(Rollouts):
 
     def batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:
         # lengths do not change how panels hang together
-        return super().batch(model, parameters, drive, state, tree=self._tree, implicit=self._overdamped, **options)
+        known = {"tree": self._tree, "implicit": self._overdamped}
+        out = super().batch(model, parameters, drive, state, **known, **options)
+        if isinstance(out, RigidBatch):
+            out.finest = FINEST
+        return out
 
     def motion(self, r: int, world: World, local: np.ndarray | None) -> Motion | None:
         """See `Rollouts.motion`: of tied segments the motion of the world itself, one segment after the other.

@@ -18,10 +18,10 @@ class Shots:
     Attributes:
         recording: their index. blocks: (B). worlds: (K). late: [K, B] by how much later than its clock a block begins
             [s]; None: none of all is. local: [K, B, L] shifts of starts, or None. memory: [M, K B] of laws, or None.
-            step: between frames [s]. frames: of each rollout. ends:
-            the frame at which the next blocks begin; 0: none is tied to them. clocked: whether a clock runs fast or
-            slow, so that they begin a little before or after that frame. begun: times at which these and all others of
-            their kind begin [s]; None: these alone. threads: see `Batch`.
+            step: between frames [s]. frames: of each rollout. ends: the frame at which the next blocks begin; 0: none
+            is tied to them. clocked: whether a clock runs fast or slow, so that they begin a little before or after
+            that frame. begun: times at which these and all others of their kind begin [s]; None: these alone.
+            threads: see `Batch`.
         model: of the first of all worlds that were asked for together. pace: longest step of the solver with which all
             of these are stable [s]; None: not asked.
     """
@@ -84,7 +84,7 @@ def joined_poses(poses: Sequence[Pose]) -> Pose:
 
 
 def joined(several: list[tuple]) -> tuple:
-    """What `_roll` returns for a part of the blocks, of all worlds, from what it returned for some of these each."""
+    """What `Rollouts._roll` gives of all worlds in a part of the blocks, from what it gave of some worlds each."""
     if len(several) == 1:
         return several[0]
     made = np.concatenate([values for values, *_ in several], axis=1)
