@@ -1,15 +1,14 @@
 """The budget of the mismatch: what it goes to, between the model as given and nothing but noise."""
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import combinations
-from math import factorial
 
 import numpy as np
 
 from origami_sim.fit.bursts import bursts
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
-from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
@@ -45,12 +44,14 @@ class Budget:
         shares: add up to one; none if nothing is missed. over: error that is left, over the recorder's noise (root mean
             square over the components). pushed: probability that forces act now and then, see
             `bursts`. real: that what is left is no noise of the recorder, see `remainder`.
+        beyond: share that effects of the catalogue explain and numbers of the model alone would not.
     """
 
     shares: list[Share]
     over: float
     pushed: float = 0.0
     real: float = 0.0
+    beyond: float = 0.0
 
     @property
     def named(self) -> float:
@@ -70,11 +71,13 @@ class Budget:
 def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weights | None = None) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
-    What each of several effects explains is the mean over the orders in which they may be added (Shapley 1953), with
-    all numbers refitted. Noise is what the best explanation leaves once forces that are missing are allowed for, up to
-    what the recorder shows; the budget allows for next to none.
+    What a fit explains is divided between the numbers of the model and the effects in proportion to what is lost without
+    each, all others refitted (proportional marginal variance decomposition, Feldman 2005, Groemping 2007). So numbers
+    get nothing that an effect needs not, also where they could have imitated it without. Noise is what the best explanation leaves once forces
+    that are missing are allowed for, up to what the recorder shows; the budget allows for next to none.
 
     Args:
+        given, base, best: fits of the model as given, of its numbers alone, and of the best explanation.
         recorder: noise of the recorder, where what the best explanation leaves is none.
     """
     assert best.weights is not None
@@ -94,21 +97,21 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weigh
         return float(left @ left) + f.penalty
 
     first, second, last = missed(given), missed(base), missed(best)
-    numbers, gain, rest = max(first - second, 0.0), max(second - last, 0.0), max(last - count, 0.0)
-    total = numbers + gain + rest
+    gain, rest = max(first - last, 0.0), max(last - count, 0.0)
+    total = gain + rest
     if total <= 0.0:
         return Budget([], over, now.probability)
-    out = [Share("numbers of the model", "numbers", numbers / total)] if numbers > 0.0 else []
-    suspects = best.hypothesis.suspects
-    parts = _parts(best, noise) if len(suspects) > 1 else np.ones(len(suspects))
-    for s, part in zip(suspects, parts, strict=True):
-        share = gain * part / total
+    numbers, *parts = gain / total * _parts(best, noise)
+    out = [Share("numbers of the model", "numbers", numbers)] if numbers > 0.0 else []
+    for s, share in zip(best.hypothesis.suspects, parts, strict=True):
         if s.effect == UNLISTED:
             out.append(Share(f"not named, at {s.site}", "rest", share))
         else:
             out.append(Share(s.label, "measurement" if s.kind == "measurement" else "effect", share))
     out.append(Share("not named", "rest", rest / total))
-    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now.probability)
+    named = not any(s.effect == UNLISTED for s in best.hypothesis.suspects)
+    beyond = max(second - last, 0.0) / total if named else 0.0
+    return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now.probability, beyond=beyond)
 
 
 def over_noise(forward: Predictor, f: Fit) -> float:
@@ -117,41 +120,45 @@ def over_noise(forward: Predictor, f: Fit) -> float:
 
 
 def _parts(f: Fit, noise: Weights) -> np.ndarray:
-    """Of what several effects explain together, the part of each, linearised at the fit."""
+    """Of what a fit explains, the parts (1 + n,) of the numbers of the model and of each effect, linearised at the fit."""
     line = f.reweighted(noise).linear
     assert line is not None
-    own = len(f.free) - len(f.hypothesis.free)
-    ends = np.cumsum([own, *(len(s.free) for s in f.hypothesis.suspects)])
-    n = len(f.hypothesis.suspects)
-    cost = {s: _without(f, line, [k for k in range(n) if k not in s], ends) for s in _subsets(n)}
-    out = np.zeros(n)
-    for k in range(n):
-        for s in _subsets(n):
-            if k in s:
-                continue
-            weight = factorial(len(s)) * factorial(n - len(s) - 1) / factorial(n)
-            out[k] += weight * max(cost[s] - cost[tuple(sorted((*s, k)))], 0.0)
-    return out / out.sum() if out.sum() > 0 else np.full(n, 1.0 / n)
+    rows = np.linalg.qr(line.eliminated.rows, mode="r")  # their Gram matrix is all that matters
+    ends = np.cumsum([0, len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
+    least = _missed(f, rows, ends, ())
+    return needed(len(ends) - 1, lambda lacking: _missed(f, rows, ends, lacking) - least)
 
 
-def _subsets(n: int) -> list[tuple[int, ...]]:
-    return [s for k in range(n + 1) for s in combinations(range(n), k)]
+def needed(n: int, lost: Callable[[tuple[int, ...]], float]) -> np.ndarray:
+    """Parts (n,) of a whole, in proportion to what is lost without each: the ratio potential (Ortmann 2000).
+
+    Args:
+        lost: what is lost without some of the parts, whatever the others can do in their place.
+    """
+    every, potential = tuple(range(n)), {(): 1.0}
+    least = 1e-9 * lost(every)  # so that of several that replace each other, each gets something
+    for lacking in (s for k in range(1, n + 1) for s in combinations(every, k)):
+        fewer = [1.0 / potential[tuple(m for m in lacking if m != k)] for k in lacking]
+        potential[lacking] = max(lost(lacking), least, 1e-300) / np.sum(fewer)
+    out = np.array([potential[every] / potential[tuple(m for m in every if m != k)] for k in every])
+    return out / out.sum()
 
 
-def _without(f: Fit, line: Linearisation, lacking: list[int], ends: np.ndarray) -> float:
-    """Squares that are missed without some effects, all other numbers refitted."""
-    at = f.coordinates.of(f.theta)
-    gone = np.zeros(len(f.free), bool)
+def _missed(f: Fit, rows: np.ndarray, ends: np.ndarray, lacking: Collection[int]) -> float:
+    """Squares that are missed without some parts of a fit, all other numbers refitted.
+
+    Args:
+        rows: [., P + 1] of its tangent and residual. ends: where the numbers of each part begin, and the last ends.
+    """
+    at, gone = f.coordinates.of(f.theta), np.zeros(len(f.free), bool)
     for k in lacking:
         gone[ends[k] : ends[k + 1]] = True
     strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
+    strong |= {id(n) for n in f.free[: ends[1]]}
     back = np.where(gone & [id(n) in strong for n in f.free], at, 0.0)
-    whole = line.eliminated.rows
-    tangent, left = whole[:, :-1], whole[:, -1] + whole[:, :-1] @ back
     prior = f.coordinates.precision
-    away = -prior * at
-    a = np.concatenate([tangent[:, ~gone], np.diag(prior)[:, ~gone]])
-    y = np.concatenate([left, np.where(gone, 0.0, away)])
+    a = np.concatenate([rows[:, :-1][:, ~gone], np.diag(prior)[:, ~gone]])
+    y = np.concatenate([rows[:, -1] + rows[:, :-1] @ back, np.where(gone, 0.0, -prior * at)])
     x, *_ = np.linalg.lstsq(a, y, rcond=1e-12)
     rest = y - a @ x
     return float(rest @ rest)

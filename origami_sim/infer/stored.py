@@ -183,7 +183,7 @@ class Stored:
             nodes.append(
                 {"members": members, "others": others, "groups": told, "shares": shares, "gaps": list(problems)}
                 | {"wide": key in self.wide, "over": found.over}
-                | {"pushed": found.pushed, "real": found.real}
+                | {"pushed": found.pushed, "real": found.real, "beyond": found.beyond}
             )
             for k, r in enumerate(problems.values()):
                 upper = np.triu_indices(len(r.gram))
@@ -245,8 +245,8 @@ class Stored:
                 size, constant = arrays[f"{n}.{k}.size"], float(arrays[f"{n}.{k}.constant"])
                 problems[float(gap)] = Reduced(gram, cross, size, constant)
             nodes[key] = list(node["members"]), groups, list(node["others"]), problems
-            real = {k: node.get(k, 0.0) for k in ("pushed", "real")}
-            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], **real)
+            more = {k: node.get(k, 0.0) for k in ("pushed", "real", "beyond")}
+            budgets[key] = Budget([Share(*s) for s in node["shares"]], node["over"], **more)
         suspects = [(_suspect(s), side, status) for s, side, status in about["suspects"]]
         failed = [frozenset(k) for k in about["failed"]]
         wide = frozenset(frozenset(n["members"]) for n in about["nodes"] if n["wide"])

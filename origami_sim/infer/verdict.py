@@ -101,7 +101,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
         return as_("UNTESTABLE", 1.0)
     missing = max(left.pushed, left.real, float(np.sum(p.cells(best)[~p.hyper.clean])))
     real = UNLISTED in lead or left.over > FAR or missing > ALONE
-    if left.rest > left.named and real:
+    if left.rest > left.beyond and real:
         return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])

@@ -41,7 +41,9 @@ def stored(strengths, seed: int = 0, rows: int = 200) -> Stored:
         ]
         nodes[frozenset(own)] = own, groups, others, {HYPER.gaps[0]: Reduced.of(whole)}
         budgets[frozenset(own)] = Budget(
-            [Share("effects", "effect", 0.9 if own else 0.0), Share("not named", "rest", 0.1)], 1.0
+            [Share("effects", "effect", 0.9 if own else 0.0), Share("not named", "rest", 0.1)],
+            1.0,
+            beyond=0.9 if own else 0.0,
         )
     every = [(suspect(e), 0, "") for e in EFFECTS]
     return Stored(every, HYPER.gaps, nodes, [], budgets, "ADEQUATE", 1.0, frozenset(nodes))

@@ -12,7 +12,7 @@ from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.infer.budget import Budget, Share
+from origami_sim.infer.budget import Budget, Share, needed
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
@@ -29,6 +29,24 @@ def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to
     assert named == [a, b] and total == pytest.approx(0.96)
     assert credible({ab: 0.6, a: 0.4})[0] == [ab, a], "of the two the simpler one is another explanation"
     assert credible({none: 0.6, a: 0.4})[0] == [none, a]
+
+
+def test_what_a_fit_explains_goes_to_the_parts_that_it_needs():
+    """Least squares of three columns: what does not overlap gets its squares, what another can replace nothing."""
+    y = np.array([3.0, 2.0, 1.0, 0.0])
+
+    def parts(columns):
+        def missed(lacking=()):
+            x = np.delete(columns, lacking, axis=1)
+            return float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2))
+
+        return needed(columns.shape[1], lambda lacking: missed(lacking) - missed())
+
+    assert parts(np.eye(4)[:, :3]) == pytest.approx(np.array([9.0, 4.0, 1.0]) / 14.0)
+    imitates = np.column_stack([y, y + [0.0, 0.0, 0.0, 1.0]])  # the second fits nearly as well, and is not needed
+    assert parts(imitates) == pytest.approx([1.0, 0.0], abs=1e-6)
+    assert parts(np.column_stack([y, y])) == pytest.approx([0.5, 0.5])
+    assert parts(np.column_stack([y])) == pytest.approx([1.0])
 
 
 def test_words_are_those_of_a_physicist():
@@ -98,7 +116,7 @@ def test_unknown_is_what_leaves_more_than_it_names_and_leaves_something_real(nam
     p.total = {frozenset(): -20.0, frozenset({0}): 0.0}
     p.nodes = cast(dict, dict.fromkeys(p.total))
     parts = ("numbers", 1.0 - named - rest), ("effect", named), ("rest", rest)
-    budget = Budget([Share(kind, kind, share) for kind, share in parts], over)
+    budget = Budget([Share(kind, kind, share) for kind, share in parts], over, beyond=named)
     assert decide(p, lambda key: budget).word == word
 
 
@@ -131,7 +149,7 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
     p = posterior({three: 0.0, three[:2]: -1500.0, three[1:]: -1520.0, three[:1]: -1600.0, (): -2000.0})
     p.realised = {frozenset(): [(5.0, 2.0)]}
     shares = [Share("", "effect", 1.0 - left), Share("", "rest", left)]
-    decided = decide(p, lambda key: Budget(shares, 1.0 + 10.0 * left))
+    decided = decide(p, lambda key: Budget(shares, 1.0 + 10.0 * left, beyond=1.0 - left))
     assert decided.word == word and decided.lead == set(three[:2])
     if word == "SEVERAL":
         assert decided.probability == pytest.approx(1.0 / 1.28)
