@@ -131,6 +131,18 @@ class Signal:
         return max(sampled, *(np.size(a) for a in arrays))
 
 
+    def each(self) -> list["Signal"]:
+        """The signals of its worlds, one of each."""
+        count = self.worlds
+        names = ("offset", "amplitude", "frequency", "phase", "scale")
+        numbers = [np.broadcast_to(getattr(self, n), count).tolist() for n in names]
+        values = [self.values] * count
+        if self.values is not None and self.values.ndim == 2:
+            values = list(np.broadcast_to(self.values, (len(self.values), count)).T)
+        parts = [dict(zip(names, mine, strict=True)) for mine in zip(*numbers, strict=True)]
+        return [replace(self, **part, values=v) for part, v in zip(parts, values, strict=True)]
+
+
 Value = float | str | np.ndarray | Signal
 """What a channel is given: a number, a quantity ("50 mT"), one number per world, or a signal."""
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from origami_sim.drive import Drive, series
 
@@ -60,10 +61,23 @@ def at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
 def lagging(times: np.ndarray, values: np.ndarray, lag: np.ndarray) -> np.ndarray:
     """First-order lag of sampled values [n, W] with time constants [W] [s], exact for values linear between samples."""
     lag = np.maximum(lag, 1e-9)
-    out = np.empty(np.broadcast_shapes(values.shape, (1, len(lag))))
-    out[0] = values[0]
     h = np.diff(times)[:, None]
     decay, behind = np.exp(-h / lag), np.diff(values, axis=0) / h * lag  # of what falls behind a ramp
-    for n, (left, begun, ended) in enumerate(zip(decay, values[:-1] - behind, values[1:] - behind, strict=True)):
-        out[n + 1] = ended + (out[n] - begun) * left
+    out = np.empty(np.broadcast_shapes(values.shape, (1, len(lag))))
+    out[0], out[1:] = values[0], values[1:] - behind - (values[:-1] - behind) * decay
+    below = np.append(-decay, np.zeros_like(decay[:1]), axis=0)
+    for column, own in zip(out.T, below.T, strict=True):
+        column[:] = solve_banded((1, 0), np.stack([np.ones_like(own), own]), column, check_finite=False)
     return out
+
+
+def clipped(begin: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """A number [W] that is clipped between bounds [n, W], one after the other: its values [n, W].
+
+    Clips that follow each other are one clip, so that all are found by doubling (Blelloch 1990).
+    """
+    low, high, far = low.copy(), high.copy(), 1
+    while far < len(low):
+        low[far:], high[far:] = (np.clip(bound[:-far], low[far:], high[far:]) for bound in (low, high))
+        far *= 2
+    return np.clip(begin, low, high)

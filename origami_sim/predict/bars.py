@@ -105,7 +105,7 @@ class BarRollouts(Rollouts):
     def _filmed(self, shots: Shots) -> Simulated:
         recording, model = self.recordings[shots.recording], shots.model or shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
-        drive, state, step = self.driven(shots, model, parameters), self.state(shots), shots.step
+        drive, state, step = self.driven(shots), self.state(shots), shots.step
         pace = shots.pace or stable_step(model, parameters).dt
         substeps = max(1, int(np.ceil(step / pace * (1 - 1e-12))))
         raw: list[np.ndarray] = []

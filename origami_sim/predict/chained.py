@@ -94,7 +94,7 @@ def followed_worlds(
     (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
     begin = State.at_rest(model, count, position=forward.state(shots).x, placed=True)
     begin.memory[:] = rested(forward, r, worlds, 0, begin.x[:, :1], threads)[-1].memory
-    drive = forward.driven(shots, model, parameters)
+    drive = forward.driven(shots)
     batch = forward.batch(model, parameters, drive, begin, tolerance=forward.blur, threads=threads)
     assert isinstance(batch, RigidBatch)
     starts = [np.repeat(a[:, :, None], count, axis=2) for a in (chained.angles, chained.rates)]

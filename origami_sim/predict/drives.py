@@ -1,10 +1,14 @@
 """Drives as they were recorded, sampled finely enough, and as they are seen from several starts."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from origami_sim.drive import SAMPLES_PER_SECOND, Drive, Signal, series
 from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters
+from origami_sim.model.distort import distorted
 from origami_sim.recording import Recording, by_component
 from origami_sim.recording.placed import surrounded
 
@@ -54,27 +58,58 @@ def refined(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return fine, CubicSpline(times, values)(fine)
 
 
-def shifted(drive: Drive, starts: np.ndarray, duration: float, repeat: int, among: np.ndarray | None = None) -> Drive:
-    """The drive seen from several starts [s], one world for each; the set of worlds is repeated.
+def reaching(
+    model: Model, each: Sequence[Parameters], given: Drive, starts: np.ndarray, duration: float, among=None
+) -> Drive:
+    """The drive that reaches worlds in rollouts from several starts [world, start].
+
+    What distorts it acts on the whole recording, so that a lag or hysteresis remembers what was before a start.
 
     Args:
-        among: starts of all worlds for which it is sampled alike (default: of these).
+        each: parameters of the worlds (K). starts: (B,) or, of each world its own, [K, B] [s]. duration: of a rollout [s].
+            among: starts of all rollouts for which it is sampled alike (default: of these).
     """
-    among = starts if among is None else among.ravel()
-    if not np.any(among):
+    among = starts if among is None else among
+    whole = distorted(model, Parameters.join(each), given, float(np.max(among)) + duration)
+    return shifted(whole, starts, duration, len(each), among, given)
+
+
+def shifted(
+    drive: Drive, starts: np.ndarray, duration: float, worlds: int, among=None, commanded: Drive | None = None
+) -> Drive:
+    """The drive seen from several starts [s], one rollout for each [world, start].
+
+    Args:
+        starts: (B,) or [worlds, B]. among: starts of all rollouts for which it is sampled alike (default: of these).
+            commanded: before it was distorted, whose bends it keeps.
+    """
+    among = starts if among is None else among
+    count = starts.shape[-1]
+    if not np.any(among) and (count == 1 or drive.worlds == 1):
         return drive
     changed = {}
     for name, s in drive.signals.items():
-        if s.times is None and not np.any(s.amplitude):
+        if name == "origin":
             continue
-        wave = Signal(offset=s.offset, amplitude=s.amplitude, frequency=s.frequency, phase=s.phase)
-        local = wave.sampled(duration) if np.any(s.amplitude) else np.array([0.0, duration])
-        if s.times is not None:
-            local = np.unique(np.concatenate([local, _knots(s.times, among, duration)]))
-        values = np.stack([np.broadcast_to(np.squeeze(s(local + t0)), local.shape) for t0 in starts], axis=1)
-        changed[name] = series(local, np.tile(values, (1, repeat)))
-    age = np.squeeze(drive.signals["origin"](0.0))
-    return drive.replace(**changed, origin=age + np.tile(starts, repeat))
+        if s.constant:
+            if np.size(s.offset) > 1:
+                changed[name] = np.repeat(s.offset, count)
+            continue
+        given = s if commanded is None else commanded[name]
+        wave = Signal(amplitude=given.amplitude, frequency=given.frequency, phase=given.phase)
+        sampled = np.any(given.amplitude) or s.times is not given.times
+        local = wave.sampled(duration) if sampled else np.array([0.0, duration])
+        if given.times is not None:
+            local = np.unique(np.concatenate([local, _knots(given.times, among.ravel(), duration)]))
+        each = s.each()
+        own = np.broadcast_to(starts, (len(each), count)) if starts.ndim == 1 else starts
+        each *= len(own) // len(each)
+        columns = [np.broadcast_to(one(local + t0), local.shape) for one, t in zip(each, own, strict=True) for t0 in t]
+        values = np.stack(columns, axis=1)
+        changed[name] = series(local, np.tile(values, (1, worlds * count // values.shape[1])))
+    age = np.ravel(drive.signals["origin"](0.0))
+    ages = (np.broadcast_to(age, worlds)[:, None] + starts).ravel()
+    return drive.replace(**changed, origin=ages)
 
 
 def _knots(times: np.ndarray, starts: np.ndarray, duration: float) -> np.ndarray:

@@ -10,9 +10,8 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State
-from origami_sim.model.distort import distorted
 from origami_sim.predict.begun import begins
-from origami_sim.predict.drives import shifted
+from origami_sim.predict.drives import reaching
 from origami_sim.predict.worlds import World, distinct_memories, distinct_motions, lasting
 from origami_sim.threads import T, default_threads, shared, sharing
 
@@ -128,7 +127,7 @@ def rested(
     times = forward.recordings[r].times - forward.recordings[r].times[0]
     step = float(np.median(np.diff(times)))
     span = float(times[-1] - times[frame]) + step
-    drive = distorted(model, parameters, shifted(forward.drives[r], times[[frame]], span, len(worlds)), span)
+    drive = reaching(model, [p for _, p in worlds], forward.drives[r], times[[frame]], span)
     held = replace(model, free=np.zeros_like(model.free))
     state = State.at_rest(held, len(worlds), position=np.repeat(x, len(worlds), axis=1))
     one = {"supports": model, "threads": threads}

@@ -191,7 +191,7 @@ class RigidRollouts(Rollouts):
         recording, model = self.recordings[shots.recording], shots.worlds[0][0]
         parameters = Parameters.join([p for _, p in shots.worlds], repeat=len(shots.blocks))
         state = self.state(shots)
-        drive = self.driven(shots, model, parameters)
+        drive = self.driven(shots)
         batch = self.batch(model, parameters, drive, state, tolerance=self.blur, threads=shots.threads)
         begun, arrived, raw = 0, [], []
         stops = [shots.ends + n for n in ((0, 1, 2) if shots.clocked else (1,))] if shots.ends else []

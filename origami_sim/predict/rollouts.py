@@ -14,10 +14,9 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
-from origami_sim.model.distort import distorted
 from origami_sim.predict.begun import with_begins
 from origami_sim.predict.channels import angle_mask, stacked
-from origami_sim.predict.drives import drive_of, shifted
+from origami_sim.predict.drives import drive_of, reaching
 from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.predict.memories import Motion, memories
@@ -265,16 +264,14 @@ class Rollouts(Worlds, ABC):
     def _keep(self, r: int, blocks: Sequence[Block], first: list[tuple[tuple, np.ndarray, np.ndarray | None]]) -> None:
         """Keeps what rollouts of the first world did in blocks of a recording, see `Simulated.first`."""
 
-    def driven(self, shots: Shots, model: Model, parameters: Parameters) -> Drive:
+    def driven(self, shots: Shots) -> Drive:
         """The drive that reaches every rollout."""
         recording, span = self.recordings[shots.recording], shots.frames * shots.step
         begins = recording.times[[b.first for b in shots.blocks]] - recording.times[0]
         given = self.drives[shots.recording]
         if shots.late is not None:
-            drive = shifted(given, (begins + shots.late).ravel(), span, 1, shots.begun)
-        else:
-            drive = shifted(given, begins, span, len(shots.worlds), shots.begun)
-        return distorted(model, parameters, drive, span)
+            begins = begins + shots.late
+        return reaching(shots.worlds[0][0], [p for _, p in shots.worlds], given, begins, span, shots.begun)
 
     def state(self, shots: Shots) -> State:
         """The starts of all rollouts [world, block]."""

@@ -14,7 +14,7 @@ from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Parameters
 from origami_sim.predict.bars import BarRollouts
-from origami_sim.predict.drives import refined, shifted
+from origami_sim.predict.drives import reaching, refined, shifted
 from origami_sim.predict.measured import lateness
 from origami_sim.predict.starts import local_line, seen_first
 from origami_sim.recording import Recording
@@ -178,6 +178,30 @@ def test_a_drive_seen_from_several_starts_keeps_its_bends():
     drive = Drive(field=(0, 0, ramp(0.2, 1.0)))
     seen = shifted(drive, many, 0.11, 1)["field_z"](at[:, None])
     assert np.abs(seen - [[drive["field_z"](t + t0) for t0 in many] for t in at]).max() < 1e-4
+
+
+def test_what_distorts_a_drive_remembers_what_was_before_a_start():
+    """A field that is switched off at 1 s, late or lagging: segments that begin just after it still feel it."""
+    switched = series(np.array([0.0, 0.999, 1.0, 3.0]), np.array([0.02, 0.02, 0.0, 0.0]))
+    model, parameters = hanging(3)
+    model = model.with_effects("drive_delay", "field_lag")
+    each = [parameters.for_model(model) for _ in range(3)]
+    each[1].set("drive_delay", "delay", 0.05)
+    each[2].set("field_lag", "lag", 0.1)
+    starts, at = np.array([0.5, 1.02, 1.2]), np.linspace(0.0, 0.3, 301)
+    drive = Drive(field=(0, 0, switched))
+    seen = reaching(model, each, drive, starts, 0.3)["field_z"](at[:, None]).reshape(301, 3, 3)
+    late = np.stack([switched(at + t0 - 0.05) for t0 in starts], axis=1)
+    lagging = np.stack([0.02 * np.exp(-np.maximum(at + t0 - 1.0, 0.0) / 0.1) for t0 in starts], axis=1)
+    assert np.abs(seen[:, 0] - np.stack([switched(at + t0) for t0 in starts], axis=1)).max() < 1e-12
+    assert np.abs(seen[:, 1] - late)[:, [0, 2]].max() < 1e-12 and seen[0, 1, 1] == pytest.approx(0.02)
+    assert np.mean(np.abs(seen[:, 1] - late)) < 1e-5  # its bends lie between samples
+    assert np.abs(seen[:, 2] - lagging).max() < 2e-4  # switched off within 1 ms
+    own = starts + np.array([[0.0], [0.01], [0.02]])  # worlds that are seen by clocks of their own
+    seen = reaching(model, each, drive, own, 0.3)["field_z"](at[:, None]).reshape(301, 3, 3)
+    lagging = np.stack([0.02 * np.exp(-np.maximum(at + t0 - 1.0, 0.0) / 0.1) for t0 in own[2]], axis=1)
+    assert np.abs(seen[:, 2] - lagging).max() < 2e-4
+    assert np.abs(seen[:, 0] - np.stack([switched(at + t0) for t0 in own[0]], axis=1)).max() < 1e-12
 
 
 def test_experiments_hold_a_drive_and_turn_the_set_up_upside_down():
