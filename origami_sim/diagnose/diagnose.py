@@ -139,7 +139,7 @@ def _diagnosed(
     lap("screen")
     tell("search", 0.0)
     store, lead = keep is not None and keep.store, lambda part: tell("search", part)
-    how = {"given": given, "calm": calm, "progress": lead, "most": o.fits // 2, "store": store}
+    how = {"given": given, "calm": calm, "progress": lead, "most": o.fits, "store": store}
     posterior = search(forward, base, signatures, weights, **how)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)

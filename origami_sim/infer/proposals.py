@@ -22,7 +22,7 @@ def proposed(out: Posterior, n: int) -> Key | None:
     key = _likely(out)
     if n % 2 or key is None:
         key = _analogous(out) or _alike(out) or _alone(out) or key
-    return key or _within(out)
+    return key or _equivalent(out) or _within(out)
 
 
 def named(out: Posterior) -> list[Key]:
@@ -108,6 +108,29 @@ def _analogous(out: Posterior) -> Key | None:
                 known = promise.get(key, -np.inf)
                 promise[key] = max(known, out.total[rival] + out.total[best] - out.total[one])
     return max((k for k, p in promise.items() if p >= near), key=lambda k: promise[k], default=None)
+
+
+def _equivalent(out: Posterior) -> Key | None:
+    """A set to fit with another effect for one of the best's that the refitted model, in its noise, cannot tell from it.
+
+    A late drive and a late clock do the same to what rests at first. About the refitted model this shows; where a clock
+    is 12 ms late already, a drive that is just beginning to be does something else.
+    """
+    none, best = out.nodes[frozenset()], out.nodes[max(named(out), key=lambda k: out.total[k])]
+    fitted, lost, bound = {out.effects(k) for k in out.nodes}, {}, -2.0 * np.log(UNFITTED)
+    place, cell = dict(zip(none.others, none.groups, strict=True)), none.grid[0]
+    values = dict(zip(map(id, best.fit.free), best.fit.theta, strict=True))
+    for n in best.key & place.keys():
+        one, columns = out.signatures[n], list(place[n].columns)
+        change = [(values.get(id(f), f.start) - f.start) / z for f, z in zip(one.suspect.strengths, one.size, strict=True)]
+        for other, group in place.items():
+            key, its = (best.key - {n}) | {other}, list(group.columns)
+            if cell is None or key not in out.estimates or out.effects(key) in fitted:
+                continue
+            does, alike = (cell.gram[rows][:, columns] @ change for rows in (columns, its))
+            if change @ does > bound:  # else it does not see it at all
+                lost[key] = change @ does - alike @ np.linalg.lstsq(cell.gram[its][:, its], alike, rcond=1e-12)[0]
+    return min((k for k in lost if lost[k] < bound), key=lambda k: lost[k], default=None)
 
 
 def _within(out: Posterior) -> Key | None:

@@ -32,7 +32,7 @@ from origami_sim.infer.unlisted import anywhere, beside
 from origami_sim.predict.spectra import without_idle
 
 FITS = 16
-"""Sets that are fitted at most, before leaders are polished and after."""
+"""Sets that are fitted at most, and as many if others are more probable then: without a fit none can be named."""
 
 ROUGH = 0.01
 """Part of what is missed by which steps improve the first fit of a set, at least; it is carried on in its own noise."""
@@ -63,10 +63,12 @@ def search(
         _begun(out, forward, calm)
     elif given is not None and strained(base):
         _about_given(out, forward, base, given)
-    extended(out, forward, progress=progress, most=most)
+    count = extended(out, forward, range(most), progress=progress)
     while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
-        extended(out, forward, progress=progress, most=most)
-    while (key := out.most_probable) not in out.nodes:  # what is named has to be fitted, however many were
+        count = extended(out, forward, range(count, most), progress=progress)
+    for _ in range(most):  # what is named has to be fitted, however many were
+        if (key := out.most_probable) in out.nodes:
+            break
         _tried(out, forward, key)
     beyond_the_catalogue(out, forward)
     return out
@@ -165,19 +167,23 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
 
 
 def extended(
-    out: Posterior, forward: Predictor, *, progress: Callable[[float], None] | None = None, most: int = FITS
-) -> Posterior:
-    """Fits sets until none that has not been fitted holds much of the posterior."""
-    for n in range(most):
+    out: Posterior, forward: Predictor, places: range, *, progress: Callable[[float], None] | None = None
+) -> int:
+    """Fits sets, the n-th of a search in each place, until none that has not been fitted holds much of the posterior.
+
+    Returns:
+        the place that comes next.
+    """
+    for n in places:
         if progress:
-            progress(n / most)
+            progress(n / places.stop)
         if _again(out, forward):
             continue
         key = proposed(out, n)
         if key is None:
-            break
+            return n
         _tried(out, forward, key)
-    return out
+    return places.stop
 
 
 def _again(out: Posterior, forward: Predictor) -> bool:

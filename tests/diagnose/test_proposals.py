@@ -3,6 +3,9 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
+import pytest
+
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.proposals import proposed
 
@@ -12,12 +15,20 @@ BEST = frozenset({RUB, LOSS, SCALE})
 
 def posterior(fitted: dict[Key, float], estimated: dict[Key, float]) -> Posterior:
     """Fitted sets and others with their log posteriors; nothing is known of single effects, or of what fits gain."""
-    nodes = {k: SimpleNamespace(key=k, instead={}, fit=SimpleNamespace(weights=None)) for k in fitted}
+    fitted = {frozenset(): -1e6} | fitted
+    frees = {n: SimpleNamespace(start=0.0) for n in range(5)}
+    nodes = {}
+    for k in fitted:
+        fit = SimpleNamespace(weights=None, free=[frees[n] for n in sorted(k)], theta=np.full(len(k), 3.0))
+        nodes[k] = SimpleNamespace(key=k, instead={}, fit=fit, others=[], groups=[], grid=[None])
     estimates = {k: SimpleNamespace(parent=frozenset()) for k in estimated}
     known = dict(nodes=nodes, estimates=estimates, promise=dict(estimated), total=fitted | estimated)
     out = Posterior([], cast(Any, None), **cast(Any, known))
     more = dict(leader=max(fitted, key=lambda k: fitted[k]), imitates=lambda key: False, effects=lambda key: key)
     more["labels"] = lambda key: tuple(sorted(map(str, key)))
+    more["signatures"] = [
+        SimpleNamespace(suspect=SimpleNamespace(strengths=(f,)), size=np.ones(1)) for f in frees.values()
+    ]
     more["suspect"] = lambda n: SimpleNamespace(effect=str(n))
     own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped")
     return cast(Posterior, SimpleNamespace(**{n: getattr(out, n) for n in own}, **more))
@@ -51,6 +62,20 @@ def test_of_all_that_a_rival_is_like_that_counts_which_promises_most():
     alike = frozenset({RUB, DRAG, SCALE})
     for some in (two | with_zero, with_zero | two):
         assert proposed(posterior({BEST: 0.0} | some, {alike: -40.0}), 1) == alike
+
+
+@pytest.mark.parametrize(("cosine", "same"), [(0.999, True), (0.9, False)])
+def test_what_the_refitted_model_cannot_tell_from_the_best_is_fitted_in_its_place(cosine, same):
+    """Of a signature of 10 deviations, 3 times as strong, another explains all but 1.8 squares, or all but 171."""
+    late = frozenset({DRAG, SCALE})
+    out = posterior({frozenset({RUB, SCALE}): 0.0}, {late: -5e4, frozenset({RUB, ZERO}): -5e4})
+    none = cast(Any, out.nodes[frozenset()])
+    none.others, none.groups = [DRAG, RUB, SCALE, ZERO], [SimpleNamespace(columns=(n,)) for n in range(4)]
+    gram = 100.0 * np.array([[1.0, cosine], [cosine, 1.0]])
+    seen = np.zeros((5, 5))  # with a column of the residual
+    seen[:2, :2], seen[2:4, 2:4] = gram, 1e-4 * gram  # it does not see a scale, nor a zero
+    none.grid = [SimpleNamespace(gram=seen)]
+    assert proposed(out, 0) == (late if same else None)
 
 
 def test_what_promises_a_part_of_the_posterior_is_fitted():
