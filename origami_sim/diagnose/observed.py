@@ -217,6 +217,7 @@ def switched(recording: Recording) -> list[str]:
             notes.append(
                 f"The drive '{name}' of '{recording.name}' is switched between two rows, first after "
                 f"{times[rows[0]]:.6g} s, and taken as a ramp of {quantity(wide, 's')} from one to the other: what is "
-                "found as a lag or a delay of that size may be this. A log at a higher rate (file = ...) tells when."
+                "found as a lag or a delay of that size may be this."
+                + ("" if drive.times is not None else " A log at a higher rate (file = ...) tells when.")
             )
     return notes

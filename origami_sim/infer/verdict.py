@@ -236,14 +236,15 @@ def unnamed_verdict(
     """
     over = over_noise(forward, base)
     if unknown:
-        text = f"The refitted model misses the recordings by {over:.2f} times the noise"
+        now, anew = bursts(base), len(forward.blocks) > len(forward.recordings)
+        text = f"The refitted model{', begun anew in every stretch,' if anew else ''} misses the recordings by "
+        text += f"{over:.2f} times the noise"
         if over < FAR:
-            now = bursts(base)
             text = f"What the refitted model leaves, {over:.2f} times the noise, is more than noise: forces that it "
             text += "lacks act on the device"
-            if now.probability > 0.5:
-                missed = f"{now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as the others"
-                text = f"{text} now and then: {missed}"
+        if now.probability > 0.5:
+            missed = f"{now.share:.0%} of the stretches are missed by {now.times:.1f} times as much as the others"
+            text = f"{text} now and then: {missed}"
         return "UNKNOWN", f"{text}, and nothing in the catalogue explains it.", []
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
