@@ -130,7 +130,6 @@ class Signal:
         sampled = self.values.shape[1] if self.values is not None and self.values.ndim == 2 else 1
         return max(sampled, *(np.size(a) for a in arrays))
 
-
     def each(self) -> list["Signal"]:
         """The signals of its worlds, one of each."""
         count = self.worlds

@@ -71,10 +71,11 @@ class Budget:
 def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weights | None = None) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
-    What a fit explains is divided between the numbers of the model and the effects in proportion to what is lost without
-    each, all others refitted (proportional marginal variance decomposition, Feldman 2005, Groemping 2007). So numbers
-    get nothing that an effect needs not, also where they could have imitated it without. Noise is what the best explanation leaves once forces
-    that are missing are allowed for, up to what the recorder shows; the budget allows for next to none.
+    What a fit explains is divided between the numbers of the model and the effects, in proportion to what is lost
+    without each, all others refitted (proportional marginal variance decomposition, Feldman 2005, Groemping 2007). So
+    numbers that stayed where they were get nothing, also where they could have imitated an effect. Noise is what the
+    best explanation leaves once forces that are missing are allowed for, up to what the recorder shows; the budget
+    allows for next to none.
 
     Args:
         given, base, best: fits of the model as given, of its numbers alone, and of the best explanation.
@@ -120,7 +121,7 @@ def over_noise(forward: Predictor, f: Fit) -> float:
 
 
 def _parts(f: Fit, noise: Weights) -> np.ndarray:
-    """Of what a fit explains, the parts (1 + n,) of the numbers of the model and of each effect, linearised at the fit."""
+    """Of what a fit explains, the parts (1 + n,) of the model's numbers and of each effect, linearised at the fit."""
     line = f.reweighted(noise).linear
     assert line is not None
     rows = np.linalg.qr(line.eliminated.rows, mode="r")  # their Gram matrix is all that matters
@@ -135,7 +136,8 @@ def needed(n: int, lost: Callable[[tuple[int, ...]], float]) -> np.ndarray:
     Args:
         lost: what is lost without some of the parts, whatever the others can do in their place.
     """
-    every, potential = tuple(range(n)), {(): 1.0}
+    every = tuple(range(n))
+    potential: dict[tuple[int, ...], float] = {(): 1.0}
     least = 1e-9 * lost(every)  # so that of several that replace each other, each gets something
     for lacking in (s for k in range(1, n + 1) for s in combinations(every, k)):
         fewer = [1.0 / potential[tuple(m for m in lacking if m != k)] for k in lacking]

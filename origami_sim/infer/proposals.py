@@ -111,7 +111,7 @@ def _analogous(out: Posterior) -> Key | None:
 
 
 def _equivalent(out: Posterior) -> Key | None:
-    """A set to fit with another effect for one of the best's that the refitted model, in its noise, cannot tell from it.
+    """A set to fit with another effect for one of the best's, if the refitted model cannot tell them in its noise.
 
     A late drive and a late clock do the same to what rests at first. About the refitted model this shows; where a clock
     is 12 ms late already, a drive that is just beginning to be does something else.
@@ -122,10 +122,10 @@ def _equivalent(out: Posterior) -> Key | None:
     values = dict(zip(map(id, best.fit.free), best.fit.theta, strict=True))
     for n in best.key & place.keys():
         one, columns = out.signatures[n], list(place[n].columns)
-        change = [(values.get(id(f), f.start) - f.start) / z for f, z in zip(one.suspect.strengths, one.size, strict=True)]
+        change = np.array([values.get(id(f), f.start) - f.start for f in one.suspect.strengths]) / one.size
         for other, group in place.items():
             key, its = (best.key - {n}) | {other}, list(group.columns)
-            if cell is None or key not in out.estimates or out.effects(key) in fitted:
+            if cell is None or other in best.key or key not in out.estimates or out.effects(key) in fitted:
                 continue
             does, alike = (cell.gram[rows][:, columns] @ change for rows in (columns, its))
             if change @ does > bound:  # else it does not see it at all

@@ -66,8 +66,8 @@ def reaching(
     What distorts it acts on the whole recording, so that a lag or hysteresis remembers what was before a start.
 
     Args:
-        each: parameters of the worlds (K). starts: (B,) or, of each world its own, [K, B] [s]. duration: of a rollout [s].
-            among: starts of all rollouts for which it is sampled alike (default: of these).
+        each: parameters of the worlds (K). starts: (B,) or, of each world its own, [K, B] [s]. duration: of a rollout
+            [s]. among: starts of all rollouts for which it is sampled alike (default: of these).
     """
     among = starts if among is None else among
     whole = distorted(model, Parameters.join(each), given, float(np.max(among)) + duration)

@@ -43,7 +43,7 @@ def test_what_a_fit_explains_goes_to_the_parts_that_it_needs():
         return needed(columns.shape[1], lambda lacking: missed(lacking) - missed())
 
     assert parts(np.eye(4)[:, :3]) == pytest.approx(np.array([9.0, 4.0, 1.0]) / 14.0)
-    imitates = np.column_stack([y, y + [0.0, 0.0, 0.0, 1.0]])  # the second fits nearly as well, and is not needed
+    imitates = np.column_stack([y, y + np.eye(4)[3]])  # the second fits nearly as well, and is not needed
     assert parts(imitates) == pytest.approx([1.0, 0.0], abs=1e-6)
     assert parts(np.column_stack([y, y])) == pytest.approx([0.5, 0.5])
     assert parts(np.column_stack([y])) == pytest.approx([1.0])
