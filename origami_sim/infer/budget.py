@@ -124,7 +124,7 @@ def _parts(f: Fit, noise: Weights) -> np.ndarray:
     """Of what a fit explains, the parts (1 + n,) of the model's numbers and of each effect, linearised at the fit."""
     line = f.reweighted(noise).linear
     assert line is not None
-    rows = np.linalg.qr(line.eliminated.rows, mode="r")  # their Gram matrix is all that matters
+    rows = np.asarray(np.linalg.qr(line.eliminated.rows, mode="r"))  # their Gram matrix is all that matters
     ends = np.cumsum([0, len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
     least = _missed(f, rows, ends, ())
     return needed(len(ends) - 1, lambda lacking: _missed(f, rows, ends, lacking) - least)
