@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from origami_sim.drive import SAMPLES_PER_SECOND, Drive, Signal, series
+from origami_sim.drive import Drive, Signal, series
+from origami_sim.drive.starts import shifted
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
 from origami_sim.model.distort import distorted
@@ -72,54 +73,3 @@ def reaching(
     among = starts if among is None else among
     whole = distorted(model, Parameters.join(each), given, float(np.max(among)) + duration)
     return shifted(whole, starts, duration, len(each), among, given)
-
-
-def shifted(
-    drive: Drive, starts: np.ndarray, duration: float, worlds: int, among=None, commanded: Drive | None = None
-) -> Drive:
-    """The drive seen from several starts [s], one rollout for each [world, start].
-
-    Args:
-        starts: (B,) or [worlds, B]. among: starts of all rollouts for which it is sampled alike (default: of these).
-            commanded: before it was distorted, whose bends it keeps.
-    """
-    among = starts if among is None else among
-    count = starts.shape[-1]
-    if not np.any(among) and (count == 1 or drive.worlds == 1):
-        return drive
-    changed = {}
-    for name, s in drive.signals.items():
-        if name == "origin":
-            continue
-        if s.constant:
-            if np.size(s.offset) > 1:
-                changed[name] = np.repeat(s.offset, count)
-            continue
-        given = s if commanded is None else commanded[name]
-        wave = Signal(amplitude=given.amplitude, frequency=given.frequency, phase=given.phase)
-        sampled = np.any(given.amplitude) or s.times is not given.times
-        local = wave.sampled(duration) if sampled else np.array([0.0, duration])
-        if given.times is not None:
-            local = np.unique(np.concatenate([local, _knots(given.times, among.ravel(), duration)]))
-        each = s.each()
-        own = np.broadcast_to(starts, (len(each), count)) if starts.ndim == 1 else starts
-        each *= len(own) // len(each)
-        columns = [np.broadcast_to(one(local + t0), local.shape) for one, t in zip(each, own, strict=True) for t0 in t]
-        values = np.stack(columns, axis=1)
-        changed[name] = series(local, np.tile(values, (1, worlds * count // values.shape[1])))
-    age = np.ravel(drive.signals["origin"](0.0))
-    ages = (np.broadcast_to(age, worlds)[:, None] + starts).ravel()
-    return drive.replace(**changed, origin=ages)
-
-
-def _knots(times: np.ndarray, starts: np.ndarray, duration: float) -> np.ndarray:
-    """Where a series bends within a duration from any of the starts; a fine grid if that were many more places."""
-    rate = min(4.0 / float(np.min(np.diff(times))), SAMPLES_PER_SECOND)
-    most = max(64, int(np.ceil(rate * duration)))
-    begins = np.unique(starts)
-    if len(begins) <= most:
-        within = [times[slice(*np.searchsorted(times, (t0, t0 + duration)))] - t0 for t0 in begins]
-        exact = np.unique(np.round(np.concatenate(within), 8))
-        if len(exact) <= most:
-            return exact[(exact > 0.0) & (exact < duration)]
-    return np.linspace(0.0, duration, most + 1)

@@ -10,11 +10,12 @@ from origami_sim.diagnose.arrange import starting, steady
 from origami_sim.diagnose.menu import menu
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
+from origami_sim.drive.starts import shifted
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Parameters
 from origami_sim.predict.bars import BarRollouts
-from origami_sim.predict.drives import reaching, refined, shifted
+from origami_sim.predict.drives import reaching, refined
 from origami_sim.predict.measured import lateness
 from origami_sim.predict.starts import local_line, seen_first
 from origami_sim.recording import Recording
