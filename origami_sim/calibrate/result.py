@@ -264,4 +264,4 @@ def _toml(value) -> str:
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(_toml(float(v)) for v in value) + "]"
-    return repr(float(f"{float(value):.15g}"))  # no digits that only a sum of rounded numbers has
+    return repr(float(value))

@@ -1,4 +1,4 @@
-"""Drives as they were recorded, sampled finely enough, and as they are seen from several starts."""
+"""Drives as they were recorded, sampled finely enough, and as they reach rollouts from several starts."""
 
 from collections.abc import Sequence
 
