@@ -69,15 +69,3 @@ def lagging(times: np.ndarray, values: np.ndarray, lag: np.ndarray) -> np.ndarra
     for column, own in zip(out.T, below.T, strict=True):
         column[:] = solve_banded((1, 0), np.stack([np.ones_like(own), own]), column, check_finite=False)
     return out
-
-
-def clipped(begin: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """A number [W] that is clipped between bounds [n, W], one after the other: its values [n, W].
-
-    Clips that follow each other are one clip, so that all are found by doubling (Blelloch 1990).
-    """
-    low, high, far = low.copy(), high.copy(), 1
-    while far < len(low):
-        low[far:], high[far:] = (np.clip(bound[:-far], low[far:], high[far:]) for bound in (low, high))
-        far *= 2
-    return np.clip(begin, low, high)

@@ -4,12 +4,19 @@ import numpy as np
 
 from origami_sim.drive import CHANNELS, Drive
 from origami_sim.effects._effect import Effect, Parameter
-from origami_sim.effects._signals import clipped, sampled
+from origami_sim.effects._signals import sampled
 
 
 def play(values: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Play operator of samples [n, W]: the output follows once it is `width` [W] behind."""
-    return clipped(np.zeros(1), values - width, values + width)
+    """Play operator of samples [n, W]: the output follows once it is `width` [W] behind.
+
+    Each sample clips the last output; clips that follow each other are one, so that doubling finds all (Blelloch 1990).
+    """
+    low, high, far = values - width, values + width, 1
+    while far < len(low):
+        low[far:], high[far:] = (np.clip(bound[:-far], low[far:], high[far:]) for bound in (low, high))
+        far *= 2
+    return np.clip(0.0, low, high)
 
 
 def apply(drive: Drive, duration: float, coercive_field: np.ndarray) -> Drive:

@@ -37,7 +37,7 @@ Half and double change the verdict of no strip, and the probability of what is n
 """
 
 ROUNDS = 8
-"""Times that a suspect is simulated again, at most, until its strength suits. A delay of a field took five."""
+"""Times that a suspect is simulated again, at most, until its strength suits. A delay of a field took three."""
 
 CHUNK = 6
 """Suspects that are simulated together, so that progress shows and cores share them."""
@@ -235,8 +235,9 @@ def _suiting(forward: Predictor, base: Fit, group: Sequence[Suspect], size, part
     norm = np.array([np.linalg.norm(np.concatenate(p)) for p in parts])
     loud = np.where(norm == 0.0, 0.01, np.clip(np.nan_to_num(norm / goal, nan=100.0), 1e-4, 1e4))
     each = zip(group, size, loud, strict=True)
-    suits = [(s, z, 1.0 if LEAST <= by <= MOST else by * MOST) for s, z, by in each]
-    return np.array([z if by == 1.0 else _affordable(forward, base, s, z / by, least) for s, z, by in suits])
+    return np.array(
+        [z if LEAST <= by <= MOST else _affordable(forward, base, s, z / by / MOST, least) for s, z, by in each]
+    )
 
 
 def _missed(forward: Predictor, base: Fit, weights: Weights) -> float:

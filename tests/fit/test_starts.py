@@ -195,13 +195,13 @@ def test_what_distorts_a_drive_remembers_what_was_before_a_start():
     late = np.stack([switched(at + t0 - 0.05) for t0 in starts], axis=1)
     lagging = np.stack([0.02 * np.exp(-np.maximum(at + t0 - 1.0, 0.0) / 0.1) for t0 in starts], axis=1)
     assert np.abs(seen[:, 0] - np.stack([switched(at + t0) for t0 in starts], axis=1)).max() < 1e-12
-    assert np.abs(seen[:, 1] - late)[:, [0, 2]].max() < 1e-12 and seen[0, 1, 1] == pytest.approx(0.02)
-    assert np.mean(np.abs(seen[:, 1] - late)) < 1e-5  # its bends lie between samples
-    assert np.abs(seen[:, 2] - lagging).max() < 2e-4  # switched off within 1 ms
+    assert np.abs(seen[:, 1] - late).max() < 3e-8  # times of bends are rounded to 10 ns, and one is at a sample
+    assert seen[0, 1, 1] == pytest.approx(0.02)
+    assert np.abs(seen[:, 2] - lagging).max() < 1e-4  # it is switched off within 1 ms
     own = starts + np.array([[0.0], [0.01], [0.02]])  # worlds that are seen by clocks of their own
     seen = reaching(model, each, drive, own, 0.3)["field_z"](at[:, None]).reshape(301, 3, 3)
     lagging = np.stack([0.02 * np.exp(-np.maximum(at + t0 - 1.0, 0.0) / 0.1) for t0 in own[2]], axis=1)
-    assert np.abs(seen[:, 2] - lagging).max() < 2e-4
+    assert np.abs(seen[:, 2] - lagging).max() < 1e-4
     assert np.abs(seen[:, 0] - np.stack([switched(at + t0) for t0 in own[0]], axis=1)).max() < 1e-12
 
 
