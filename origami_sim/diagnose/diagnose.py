@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from origami_sim.device.scene import scene_module
 from origami_sim.diagnose.arrange import arranged
+from origami_sim.diagnose.axes import mistaken
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
@@ -117,13 +118,16 @@ def _diagnosed(
         noted.append(unseen)
     if len(recordings) == 1:
         noted.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
+    unclear = "Whether axes are mistaken could not be told"
+    wrong = attempt(noted, unclear, lambda: mistaken(subject, recordings, o, forward), None)
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
     base, rough = settled(forward, base)
     weights = level(forward, base) if rough else weights
     lap("nominal")
     tell("screen", 0.0)
-    every = forward.admitted(suspects(forward.model, recordings, forward.drive, forward.parameters))
+    every = [] if wrong else suspects(forward.model, recordings, forward.drive, forward.parameters)
+    every = forward.admitted(every)
     if catalogue is not None:
         every = among(every, catalogue)
         idle = sorted({get(n).name for n in catalogue} - {s.effect for s in every})
@@ -147,8 +151,8 @@ def _diagnosed(
         noted.append(f"Not tested, because these recordings do not tell: {', '.join(lost)}.")
     tell("verdict", 0.0)
     judged = judge(forward, given, base, posterior, compared)
-    if loop is not None:
-        judged = replace(judged, verdict="UNTESTABLE", sentence=loop.sentence, probability=1.0, chosen=[], best=base)
+    if (cause := wrong or loop) is not None:
+        judged = replace(judged, verdict="UNTESTABLE", sentence=cause.sentence, probability=1.0, chosen=[], best=base)
     best = judged.best
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}

@@ -26,6 +26,7 @@ from origami_sim.predict.filming import film
 from origami_sim.predict.memories import Motion, in_parts
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.predict.shots import Shots, Simulated, joined_poses, of_worlds
+from origami_sim.predict.starts import spans
 from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
@@ -42,6 +43,15 @@ TOLERANCE = 1e-8
 Ten times less costs 1.6 times the steps; ten times more begins to show in derivatives. Steps end at every frame, also
 where this would let them go over three: worlds that differ by a nudge then take the same steps, whose errors cancel in
 differences, where steps of their own made intervals fifty times too narrow.
+"""
+
+UNSEEN = 0.01
+"""Error of a step, as a part of the smallest shift that all data together show, at most.
+
+Laws with memory turn over within a step, so that predictions are rough in their parameters by a few such errors, and
+fits end where they are rough. By the yield angle of a rubbing swing (11,001 frames, noise of 9 urad, steps wrong by 8e-10)
+derivatives are rough by 4 %, with steps wrong by 1e-8 by 15 %; fits of the same effects then end within 2.3 of log
+evidence, for 5.5.
 """
 
 TOUCHING = 1e-7
@@ -101,6 +111,14 @@ class RigidRollouts(Rollouts):
         check_tree(self._tree, self.articulation)
         for index, recording in enumerate(self.recordings):
             self.blocks += self._segments(index, recording, segment, tied)
+        if not len(self.model.contacts):
+            self.blur = min(TOLERANCE, UNSEEN * self._least_shown())
+
+    def _least_shown(self) -> float:
+        """The shift of a coordinate [rad, or part of the device's size] that all data show by one standard deviation."""
+        unit = spans(self.articulation, self.model)
+        shown = [b.seen().sum(axis=0) / b.noise**2 @ (b.shows * unit) ** 2 for b in self.blocks if b.shows is not None]
+        return float(1.0 / np.sqrt(np.max(np.sum(shown, axis=0)))) if shown else np.inf
 
     def _segments(self, index: int, recording: Recording, segment: float | None, tied: bool) -> list[Block]:
         step, count = float(np.median(np.diff(recording.times))), len(recording.times)

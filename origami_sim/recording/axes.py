@@ -77,7 +77,7 @@ def mistaken_axes(recording: Recording, predicted: Mapping[str, np.ndarray]) -> 
         InputError: a prediction of another shape than the channel.
     """
     found = []
-    for group in _groups([c for c in recording.channels.values() if c.name in predicted]):
+    for group in groups_of([c for c in recording.channels.values() if c.name in predicted]):
         pairs = [_pair(c, np.asarray(predicted[c.name], float)) for c in group]
         axes = _best(group, *(np.concatenate(p) for p in zip(*pairs, strict=True)))
         if axes is not None:
@@ -85,15 +85,20 @@ def mistaken_axes(recording: Recording, predicted: Mapping[str, np.ndarray]) -> 
     return found
 
 
-def _groups(channels: Sequence[Channel]) -> list[list[Channel]]:
+def groups_of(channels: Sequence[Channel]) -> list[list[Channel]]:
     """Channels that can only be mistaken together: markers in the same picture, or in the same space."""
     out: dict[object, list[Channel]] = {}
     for c in channels:
         key: object = c.name
         if c.kind in ("marker", "marker_2d"):
-            key = (c.kind, None if c.camera is None else c.camera.axes.tobytes())
+            key = (c.kind, picture_of(c))
         out.setdefault(key, []).append(c)
     return list(out.values())
+
+
+def picture_of(channel: Channel) -> bytes | None:
+    """What tells the picture that a marker is in from others; None outside of pictures."""
+    return None if channel.camera is None else channel.camera.axes.tobytes()
 
 
 def _pair(channel: Channel, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -133,13 +138,13 @@ def _best(group: Sequence[Channel], read: np.ndarray, said: np.ndarray) -> Axes 
     names = tuple(c.name for c in group)
     unit = group[0].unit
     sentence = (
-        f"{'Channel' if len(names) == 1 else 'Channels'} {', '.join(names)}: {_words(group[0], order, signs)}; so "
+        f"{'Channel' if len(names) == 1 else 'Channels'} {', '.join(names)}: {words(group[0], order, signs)}; so "
         f"changed the model is {quantity(changed, unit)} off, as recorded {quantity(given, unit)}."
     )
     return Axes(names, order, signs, tuple(map(float, shift)), given, changed, sentence)
 
 
-def _words(channel: Channel, order: tuple[int, ...], signs: tuple[int, ...]) -> str:
+def words(channel: Channel, order: tuple[int, ...], signs: tuple[int, ...]) -> str:
     """What is wrong with the axes, for a reader who has the set-up before him."""
     width = len(order)
     if width == 1:

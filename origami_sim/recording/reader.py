@@ -227,6 +227,7 @@ def _drive(name: str, spec: dict, table: Table, times: np.ndarray, side: Sidecar
         own, values = np.array(spec["times"]), np.asarray(spec["values"], dtype=float)
     elif spec["file"] is not None:
         own, values = _other_file(name, spec, side)
+        own = spanning(own, times)
     else:
         values = _whole(name, table, spec["columns"])
     if spec["direction"] is not None:
@@ -247,6 +248,13 @@ def _drive(name: str, spec: dict, table: Table, times: np.ndarray, side: Sidecar
             allowed=error.allowed,
         ) from None
     return drive
+
+
+def spanning(own: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Times (m,) of a drive, from and to a recording's first and last where only a clock's rounding parts them [s]."""
+    ends = times[[0, -1]]
+    near = np.abs(own[[0, -1]] - ends) <= 1e-9 * np.max(np.abs(ends))
+    return np.concatenate([ends[:1] if near[0] else own[:1], own[1:-1], ends[1:] if near[1] else own[-1:]])
 
 
 def _other_file(name: str, spec: dict, side: Sidecar) -> tuple[np.ndarray, np.ndarray]:

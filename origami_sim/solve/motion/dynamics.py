@@ -1,5 +1,6 @@
 """Dynamics: leapfrog rollouts of a batch of worlds, with energies, work and failures by world."""
 
+import math
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -308,7 +309,7 @@ def _simulated(
     frame_time = 1.0 / rate
     substeps = _substeps(chosen, dt, rate, method)
     step = frame_time / substeps
-    frames = round(duration * rate)
+    frames = math.ceil(duration * rate - 1e-6)  # at least as long as asked, but for rounding
     if frames < 1:
         raise InputError(
             "the run is shorter than one frame",

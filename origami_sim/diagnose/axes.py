@@ -1,0 +1,118 @@
+"""Mirrored pictures, reversed signs and exchanged channels, found before anything is fitted.
+
+Such a mistake is no effect with a strength: it is so or it is not, and what is not seen at once is explained away by
+wrong physics. So each of a few changes of the recording is compared with the model as given, from starts that are read
+from the recording changed in this way.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+
+from origami_sim.diagnose.arrange import arranged
+from origami_sim.diagnose.options import Options
+from origami_sim.errors import InputError
+from origami_sim.fit.predictor import Predictor
+from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
+from origami_sim.recording import Recording
+from origami_sim.recording.axes import EXPLAINED, FAR, groups_of, picture_of, words
+from origami_sim.recording.recording import Channel
+
+Change = Callable[[Mapping[str, Channel]], dict[str, Channel]]
+
+FRAMES = 600
+"""Frames of a recording that are looked at; a mistake shows in all of them. Half and double find the same."""
+
+
+TURNS = 3
+"""Axes that are exchanged or reversed at most: two of them where y is up in a file, and one that points back."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A change of the channels after which the model as given agrees far better.
+
+    Attributes:
+        sentence: what is wrong, in words. given, changed: error over the noise (root mean square), before and after.
+    """
+
+    sentence: str
+    given: float
+    changed: float
+
+
+def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forward: Predictor) -> Mistake | None:
+    """The one change of axes, signs or order of channels that explains recordings far better, if there is one.
+
+    Args:
+        forward: what predicts the recordings as they are.
+    """
+    if missed(forward)[0] < FAR:  # nothing can be so many times closer
+        return None
+    few = [beginning(r) for r in recordings]
+    given, found = missed(arranged(subject, few, o)[0])[0], []
+    for what, remedy, change in changes(few[0]):
+        try:
+            left, moved = missed(arranged(subject, [replace(r, channels=change(r.channels)) for r in few], o)[0])
+        except InputError:
+            continue
+        if FAR * max(left, 1.0) < given and left < EXPLAINED * moved:
+            found.append((left, what, remedy))
+    if not found:
+        return None
+    left, what, remedy = min(found)
+    text = f"{what}: as recorded the model misses {given:.3g} times the noise, so changed {left:.3g} times."
+    return Mistake(f"{text} {remedy}, and diagnose again.", given, left)
+
+
+def missed(forward: Predictor) -> tuple[float, float]:
+    """What the model as given misses, and what moves, over the noise (root mean square)."""
+    theta = np.array([f.start for f in forward.subject.nominals])
+    local = np.zeros((1, len(forward.blocks), forward.local))
+    shot = forward.predict(Hypothesis(), theta[None], local)
+    left = np.concatenate([(b.values - v[0]) / b.noise for b, v in zip(forward.blocks, shot, strict=True)])
+    read = np.concatenate([b.values / b.noise for b in forward.blocks])
+    every = [np.sqrt(np.nanmean(v**2)) for v in (left, read - np.nanmean(read, axis=0))]
+    return (float(every[0]) if np.isfinite(every[0]) else np.inf), float(every[1])
+
+
+def beginning(recording: Recording) -> Recording:
+    """The first frames of a recording."""
+    return recording.window(recording.times[0], recording.times[min(FRAMES, len(recording.times)) - 1])
+
+
+def changes(recording: Recording) -> Iterator[tuple[str, str, Change]]:
+    """What may be wrong with channels, in words, what then has to be stated, and the channels as they should be."""
+    groups = groups_of(list(recording.channels.values()))
+    for group in groups:
+        width = group[0].values.reshape(len(recording.times), -1).shape[1]
+        names = [c.name for c in group]
+        for order, signs in product(permutations(range(width)), product((1, -1), repeat=width)):
+            turns = sum(a != b for a, b in zip(order, range(width), strict=True)) + signs.count(-1)
+            if not 0 < turns <= TURNS:
+                continue
+            what = f"{'Channel' if len(names) == 1 else 'Channels'} {', '.join(names)}: {words(group[0], order, signs)}"
+            where = {1: "sign = -1 of the channel", 2: "right and up of the camera"}.get(width, "axes under [source]")
+            yield what, f"State {where} in the sidecar", turned(names, order, signs)
+    for a, b in combinations(recording.channels.values(), 2):
+        if a.kind == b.kind and picture_of(a) == picture_of(b):
+            remedy = "Exchange their columns or tracks in the sidecar"
+            yield f"Channels {a.name} and {b.name} are exchanged", remedy, exchanged(a.name, b.name)
+
+
+def turned(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Change:
+    """Channels with components in another order, and with other signs."""
+
+    def of(channel: Channel) -> Channel:
+        columns = channel.values.reshape(len(channel.values), -1)[:, list(order)] * signs
+        return replace(channel, values=columns.reshape(channel.values.shape))
+
+    return lambda every: {n: of(c) if n in names else c for n, c in every.items()}
+
+
+def exchanged(a: str, b: str) -> Change:
+    """Channels of which two have each other's values."""
+    other = {a: b, b: a}
+    return lambda every: {n: replace(c, values=every[other.get(n, n)].values) for n, c in every.items()}
