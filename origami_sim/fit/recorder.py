@@ -26,10 +26,10 @@ def recorder_noise(forward: Predictor, f: Fit) -> np.ndarray:
     """(D,) standard deviations of the noise of a recorder that may average over frames, as a fit's residuals show it.
 
     What is slower than a recorder's filter counts as noise up to the density of what is just faster; it is no less than
-    the noise that was stated or read. Of curves it is that.
+    the noise that was stated or read. Of load steps, which have no time, it is that.
     """
     noise = forward.blocks[0].noise
-    if forward.curve:
+    if timeless(forward):
         return noise
     whole = joined(forward, f)
     return np.array([flat_level([r[:, d] for r in whole], float(n)) for d, n in enumerate(noise)])
@@ -39,7 +39,7 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
     """Noise that a recorder may have, of which a fit would leave nothing else: white, or as a tracker colours it.
 
     White noise is as large as what is left; that of a tracker is read where no motion reaches (see `infer`), and of
-    curves, which have none, white noise as large as neighbouring points show.
+    load steps, which have no time, white noise as large as neighbouring points show.
     """
     own, noise = f.weights, forward.blocks[0].noise
     assert own is not None
@@ -48,7 +48,7 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
         prior = sum(level_prior(float(a), float(n)) for a, n in zip(level, noise, strict=True))
         return Weights(level, colour, own.gap, prior)
 
-    if forward.curve:
+    if timeless(forward):
         rough = [np.diff(r, 2, axis=0) / np.sqrt(6.0) for r in f.residuals if len(r) > 2]
         level = np.sqrt(np.nanmean(np.concatenate(rough) ** 2, axis=0)) if rough else noise
         return [of(own.deviation), of(np.maximum(np.nan_to_num(level), noise))]
@@ -57,6 +57,11 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
     found = shared([partial(infer, times, column, stated=float(n)) for column, n in zip(whole.T, noise, strict=True)])
     level = np.maximum([n.deviation for n in found], noise)
     return [of(own.deviation), of(level, tuple(n.colour for n in found))]
+
+
+def timeless(forward: Predictor) -> bool:
+    """Whether all recordings are of load steps."""
+    return all(r.by_step for r in forward.recordings)
 
 
 def joined(forward: Predictor, f: Fit) -> list[np.ndarray]:
