@@ -1,8 +1,8 @@
 """The budget of the mismatch: what it goes to, between the model as given and nothing but noise."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import pairwise
 
 import numpy as np
 
@@ -71,11 +71,10 @@ class Budget:
 def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weights | None = None) -> Budget:
     """Shares of what the model as given misses beyond the noise, in squares over the noise; they add up to one.
 
-    What a fit explains is divided between the numbers of the model and the effects, in proportion to what is lost
-    without each, all others refitted (proportional marginal variance decomposition, Feldman 2005, Groemping 2007). So
-    numbers that stayed where they were get nothing, also where they could have imitated an effect. Noise is what the
-    best explanation leaves once forces that are missing are allowed for, up to what the recorder shows; the budget
-    allows for next to none.
+    What a fit explains is divided between the numbers of the model and the effects by what each changes as it was
+    fitted, see `shapley` (product measure, Pratt 1987). So numbers that stayed where they were get nothing, also where
+    they could have imitated an effect. Noise is what the best explanation leaves once forces that are missing are
+    allowed for, up to what the recorder shows; the budget allows for next to none.
 
     Args:
         given, base, best: fits of the model as given, of its numbers alone, and of the best explanation.
@@ -126,41 +125,30 @@ def _parts(f: Fit, noise: Weights) -> np.ndarray:
     assert line is not None
     rows = np.asarray(np.linalg.qr(line.eliminated.rows, mode="r"))  # their Gram matrix is all that matters
     ends = np.cumsum([0, len(f.free) - len(f.hypothesis.free), *(len(s.free) for s in f.hypothesis.suspects)])
-    least = _missed(f, rows, ends, ())
-    return needed(len(ends) - 1, lambda lacking: _missed(f, rows, ends, lacking) - least)
+    strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths} | {id(n) for n in f.free[: ends[1]]}
+    at = np.where([id(n) in strong for n in f.free], f.coordinates.of(f.theta), 0.0)
+    return shapley([rows[:, a:b] @ at[a:b] for a, b in pairwise(ends)])
 
 
-def needed(n: int, lost: Callable[[tuple[int, ...]], float]) -> np.ndarray:
-    """Parts (n,) of a whole, in proportion to what is lost without each: the ratio potential (Ortmann 2000).
+def shapley(changes: Sequence[np.ndarray]) -> np.ndarray:
+    """Parts (n,) of the squares of a sum of changes: their Shapley values, of squares that some of them explain.
 
-    Args:
-        lost: what is lost without some of the parts, whatever the others can do in their place.
+    These are inner products with the sum. A negative one is one with that which it cancels most; the two are divided
+    by their own squares.
     """
-    every = tuple(range(n))
-    potential: dict[tuple[int, ...], float] = {(): 1.0}
-    least = 1e-9 * lost(every)  # so that of several that replace each other, each gets something
-    for lacking in (s for k in range(1, n + 1) for s in combinations(every, k)):
-        fewer = [1.0 / potential[tuple(m for m in lacking if m != k)] for k in lacking]
-        potential[lacking] = max(lost(lacking), least, 1e-300) / np.sum(fewer)
-    out = np.array([potential[every] / potential[tuple(m for m in every if m != k)] for k in every])
-    return out / out.sum()
-
-
-def _missed(f: Fit, rows: np.ndarray, ends: np.ndarray, lacking: Collection[int]) -> float:
-    """Squares that are missed without some parts of a fit, all other numbers refitted.
-
-    Args:
-        rows: [., P + 1] of its tangent and residual. ends: where the numbers of each part begin, and the last ends.
-    """
-    at, gone = f.coordinates.of(f.theta), np.zeros(len(f.free), bool)
-    for k in lacking:
-        gone[ends[k] : ends[k + 1]] = True
-    strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
-    strong |= {id(n) for n in f.free[: ends[1]]}
-    back = np.where(gone & [id(n) in strong for n in f.free], at, 0.0)
-    prior = f.coordinates.precision
-    a = np.concatenate([rows[:, :-1][:, ~gone], np.diag(prior)[:, ~gone]])
-    y = np.concatenate([rows[:, -1] + rows[:, :-1] @ back, np.where(gone, 0.0, -prior * at)])
-    x, *_ = np.linalg.lstsq(a, y, rcond=1e-12)
-    rest = y - a @ x
-    return float(rest @ rest)
+    x = np.array(changes)
+    own, groups = np.sum(x * x, axis=1), [[k] for k in range(len(x))]
+    while True:
+        together = np.array([x[g].sum(axis=0) for g in groups])
+        values = together @ together.sum(axis=0)
+        worst = int(np.argmin(values))
+        if values[worst] >= 0.0 or len(groups) == 1:
+            break
+        against = together @ together[worst]
+        against[worst] = np.inf
+        best = int(np.argmin(against))
+        groups = [g for k, g in enumerate(groups) if k not in (worst, best)] + [groups[best] + groups[worst]]
+    out = np.zeros(len(x))
+    for g, value in zip(groups, values, strict=True):
+        out[g] = max(value, 0.0) * own[g] / max(own[g].sum(), 1e-300)
+    return out / max(out.sum(), 1e-300)

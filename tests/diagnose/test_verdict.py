@@ -12,7 +12,7 @@ from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
-from origami_sim.infer.budget import Budget, Share, needed
+from origami_sim.infer.budget import Budget, Share, shapley
 from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
@@ -31,22 +31,15 @@ def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to
     assert credible({none: 0.6, a: 0.4})[0] == [none, a]
 
 
-def test_what_a_fit_explains_goes_to_the_parts_that_it_needs():
-    """Least squares of three columns: what does not overlap gets its squares, what another can replace nothing."""
-    y = np.array([3.0, 2.0, 1.0, 0.0])
-
-    def parts(columns):
-        def missed(lacking=()):
-            x = np.delete(columns, lacking, axis=1)
-            return float(np.sum((y - x @ np.linalg.lstsq(x, y, rcond=None)[0]) ** 2))
-
-        return needed(columns.shape[1], lambda lacking: missed(lacking) - missed())
-
-    assert parts(np.eye(4)[:, :3]) == pytest.approx(np.array([9.0, 4.0, 1.0]) / 14.0)
-    imitates = np.column_stack([y, y + np.eye(4)[3]])  # the second fits nearly as well, and is not needed
-    assert parts(imitates) == pytest.approx([1.0, 0.0], abs=1e-6)
-    assert parts(np.column_stack([y, y])) == pytest.approx([0.5, 0.5])
-    assert parts(np.column_stack([y])) == pytest.approx([1.0])
+def test_what_a_fit_explains_goes_to_the_parts_by_what_they_change():
+    x, y, z = np.eye(3)
+    assert shapley([3.0 * x, 2.0 * y, z]) == pytest.approx(np.array([9.0, 4.0, 1.0]) / 14.0)
+    assert shapley([0.0 * x, x + y]) == pytest.approx([0.0, 1.0]), "what did not move explains nothing"
+    assert shapley([x, x]) == pytest.approx([0.5, 0.5]) and shapley([2.0 * x, x]) == pytest.approx([2 / 3, 1 / 3])
+    # two that nearly cancel are one, whatever their sizes; the rest keeps its own
+    parts = shapley([x, 100.0 * y, -99.0 * y])
+    assert parts[0] == pytest.approx(0.5) and parts[1] == pytest.approx(0.5 * 100**2 / (100**2 + 99**2))
+    assert shapley([-0.1 * x, 1.1 * x]) == pytest.approx([0.01 / 1.22, 1.21 / 1.22])
 
 
 def test_words_are_those_of_a_physicist():
