@@ -17,15 +17,16 @@ from origami_sim.predict.channels import units_of
 def table(
     forward: Predictor, p: Posterior, base: Fit, judged: Judgement, errors: dict[Key, np.ndarray]
 ) -> list[Candidate]:
-    """All explanations that were fitted, best first, with the reason why each lost.
+    """All explanations that were fitted, best first, with the reason why each lost; the best fit of each.
 
     Args:
         errors: (D,) held-out error of each fitted set, estimated.
     """
     chance = p.probabilities()
     out = []
-    for key, node in p.nodes.items():
-        f = widened(p, key)
+    of = {p.labels(key): key for key in sorted(p.nodes, key=lambda k: p.total[k])}
+    for key in of.values():
+        node, f = p.nodes[key], widened(p, key)
         out.append(
             Candidate(
                 p.label(key) if key else "nominal refitted",

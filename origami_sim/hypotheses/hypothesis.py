@@ -294,7 +294,8 @@ def apply(
     """Parameters for the model with the hypothesis' effects, with the fitted numbers in place.
 
     Parameters that are not fitted are copied from an effect of the model that has one of the same name for the same
-    family (a suspect's magnet is the panel's magnet); else they get their typical value, else their default.
+    family (a suspect's magnet is the panel's magnet); else they get their typical value, else their default. What else
+    is a strength of the effect, as another component of a vector, is zero.
     """
     out = parameters.for_model(model)
     given = [n for n in model.effects if any(owner == n for owner, _ in parameters)]
@@ -302,7 +303,7 @@ def apply(
         effect = get(s.effect)
         if s.effect in given:
             continue
-        fitted = {f.name for f in s.free}
+        fitted = {f.name for f in s.free} | silent(s.effect).keys()
         for p in effect.parameters:
             if p.name in fitted:
                 continue

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from origami_sim.fit.components import without_unseen_components
 from origami_sim.fit.evidence import log_occam
 from origami_sim.fit.implied import OwnColumns, log_evidence, with_own_noise
 from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed, small
@@ -24,7 +25,7 @@ from origami_sim.infer.columns import Columns
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
-from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
+from origami_sim.infer.posterior import CREDIBLE, Estimate, Key, Node, Posterior
 from origami_sim.infer.proposals import UNFITTED, in_place_of, named, proposed
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
@@ -227,6 +228,8 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)
+    if key == out.leader:
+        _with_seen_components(out, forward, key)
 
 
 def better_within(out: Posterior, f: Fit, key: Key) -> Node | None:
@@ -256,8 +259,7 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
         return f
     known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
     own, _ = with_own_noise(forward, f, out.hyper, known)
-    on = _to_the_end(forward, own)
-    return own if on.failed else on
+    return own if (on := _to_the_end(forward, own)).failed else on
 
 
 def _to_the_end(forward: Predictor, f: Fit) -> Fit:
@@ -284,6 +286,22 @@ def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None
         found = fit(forward, hypothesis, level(forward, f), theta=np.concatenate(theta), local=f.local)
         if not found.failed:
             _add(out, forward, fewer, found, log_priors(out.signatures))
+
+
+def _with_seen_components(out: Posterior, forward: Predictor, key: Key) -> None:
+    """Fits a set as well without components of its vectors that recordings do not tell from zero.
+
+    Along these its other numbers are free, as a turn about y beside one about x that a device in that plane hides.
+    """
+    f = out.nodes[key].fit
+    if (fewer := without_unseen_components(f, CREDIBLE)) is None:
+        return
+    hypothesis, theta = fewer
+    found = _finished(out, forward, fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local), f.weights)
+    if not found.failed:
+        known = {id(s.suspect) for s in out.signatures}
+        out.signatures += [Signature(s, [], np.ones(1)) for s in hypothesis.suspects if id(s) not in known]
+        _add(out, forward, frozenset(members_of(hypothesis, out)), found, log_priors(out.signatures))
 
 
 def polished(out: Posterior, forward: Predictor) -> bool:

@@ -333,6 +333,10 @@ def test_tilted_field_or_asymmetry(truth, made):
 
 @pytest.mark.slow
 def test_a_stray_field_is_no_weight_and_no_rest_angle():
-    """One component of three shows: the others cost nothing."""
+    """One component of three shows: the others cost nothing, and are not said."""
     found = diagnose(flap(), [flap_curve(stray=2e-3)])
-    assert found.verdict == "MECHANISM" and found.candidates[0].label == "field_offset at the drive"
+    best = found.candidates[0]
+    assert found.verdict == "MECHANISM" and best.label == "field_offset at the drive"
+    assert len([n for n in best.numbers if n.label.startswith("field_offset.")]) < 3
+    assert "not told from zero" not in best.distrust
+    assert [c.label for c in found.candidates].count(best.label) == 1

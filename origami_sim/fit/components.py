@@ -1,0 +1,52 @@
+"""Components of vectors, as of a field that is turned or added, which recordings do not tell from zero."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from origami_sim.fit.least_squares import Fit
+from origami_sim.hypotheses.hypothesis import Hypothesis
+
+
+def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.ndarray] | None:
+    """The effects of a fit and its numbers, without components that may be zero; None if all are told.
+
+    Of every vector one is left at least. The others are zero together by a Wald test, all numbers refitted.
+
+    Args:
+        credible: probability with which a component is told from zero.
+    """
+    assert f.linear is not None
+    a = np.concatenate([f.linear.eliminated.rows[:, :-1], np.diag(f.coordinates.precision)])
+    root = np.linalg.pinv(a, rcond=1e-12)
+    cover, at = root @ root.T, f.coordinates.of(f.theta)
+    place, gone, suspects = len(f.free) - len(f.hypothesis.free), [], []
+    for s in f.hypothesis.suspects:
+        unseen = _unseen(cover, at, [place + k for k, n in enumerate(s.free) if n in s.strengths], credible)
+        kept = [n for k, n in enumerate(s.free) if place + k not in unseen]
+        suspects.append(replace(s, free=(replace(kept[0], spread=np.inf), *kept[1:])) if unseen else s)
+        gone += unseen
+        place += len(s.free)
+    return (Hypothesis(tuple(suspects)), np.delete(f.theta, gone)) if gone else None
+
+
+def _unseen(cover: np.ndarray, at: np.ndarray, strong: list[int], credible: float) -> list[int]:
+    """Components of a vector, not all of them, that may be zero at once.
+
+    Args:
+        cover: [P, P] covariance of all coordinates. at: (P,) those. strong: which are of the vector.
+    """
+    gone: list[int] = []
+    while len(gone) < len(strong) - 1:
+        lost = {k: _lost(cover, at, [*gone, k]) for k in strong if k not in gone}
+        least = min(lost, key=lambda k: lost[k])
+        if lost[least] >= chi2.ppf(credible, len(gone) + 1):
+            break
+        gone.append(least)
+    return gone
+
+
+def _lost(cover: np.ndarray, at: np.ndarray, some: list[int]) -> float:
+    """Squares that a fit loses if some coordinates are zero, all others refitted."""
+    return float(at[some] @ np.linalg.pinv(cover[np.ix_(some, some)], rcond=1e-12) @ at[some])
