@@ -39,6 +39,7 @@ from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.report.page import geometry_of, write_report
+from origami_sim.report.page.next_experiment import finding
 from origami_sim.report.patch import patched, write_patch
 from origami_sim.solve.timestep import stable_step
 
@@ -459,7 +460,7 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
     lines += [f"{f'{name} [{unit}]':24s} " + " ".join(f"{v:10.3g}" for v in values) for name, unit, *values in rows]
     lines += ["", *(f"note: {note}" for note in d.notes)]
     if d.experiments:
-        lines.append(f"next experiment: {d.experiments[0].what}")
+        lines.append(f"next experiment: {finding(d)}")
     replays = files["replays"]
     assert isinstance(replays, list)
     if "report" in files or "data" in files:

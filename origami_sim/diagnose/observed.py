@@ -196,16 +196,27 @@ def assumed(recording: Recording, drive: Drive) -> list[str]:
 
 
 def switched(recording: Recording) -> list[str]:
-    """A note on drives that were switched between two of their rows, so that it is not known when.
+    """A note on drives that were switched between two of their rows, so that it is not known when."""
+    notes = []
+    for name, (before, after) in switches(recording).items():
+        notes.append(
+            f"The drive '{name}' of '{recording.name}' is switched between two rows, first after {before[0]:.6g} s, "
+            f"and taken as a ramp of {quantity(float(np.max(after - before)), 's')} from one to the other: what is "
+            "found as a lag or a delay of that size may be this."
+            + ("" if recording.drive[name].times is not None else " A log at a higher rate (file = ...) tells when.")
+        )
+    return notes
+
+
+def switches(recording: Recording) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Times (k,) of the rows before and after each switch, of drives that were switched [s].
 
     Switched is what changes between two rows by more than `SWITCH` of its range, by ten times as much as it usually
     does, and by twice as much as before and after together.
     """
-    if recording.by_step:
-        return []
-    notes = []
+    out = {}
     for name, drive in recording.drive.items():
-        if drive.constant or name == PATH:
+        if recording.by_step or drive.constant or name == PATH:
             continue
         values = np.reshape(drive.values, (len(drive.values), -1))
         change = np.pad(np.abs(np.diff(values, axis=0)), ((1, 1), (0, 0)))
@@ -213,11 +224,5 @@ def switched(recording: Recording) -> list[str]:
         rows = np.flatnonzero((change[1:-1] > np.maximum(least, 2.0 * (change[:-2] + change[2:]))).any(axis=1))
         if len(rows):
             times = recording.times if drive.times is None else drive.times
-            wide = float(np.max(times[rows + 1] - times[rows]))
-            notes.append(
-                f"The drive '{name}' of '{recording.name}' is switched between two rows, first after "
-                f"{times[rows[0]]:.6g} s, and taken as a ramp of {quantity(wide, 's')} from one to the other: what is "
-                "found as a lag or a delay of that size may be this."
-                + ("" if drive.times is not None else " A log at a higher rate (file = ...) tells when.")
-            )
-    return notes
+            out[name] = times[rows], times[rows + 1]
+    return out

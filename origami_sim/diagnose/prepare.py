@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from origami_sim.diagnose.observed import switches
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Suspect
@@ -75,7 +76,8 @@ def tamed(recording: Recording) -> Recording:
     """The recording without wild frames, of which a note tells; load steps have no course to be far off from."""
     channels, notes = dict(recording.channels), []
     looked = [] if recording.by_step else list(channels.items())
-    found = shared([partial(wild_frames, recording.times, c.values, c.noise) for _, c in looked])
+    corners = np.concatenate([np.zeros(0), *(t for both in switches(recording).values() for t in both)])
+    found = shared([partial(wild_frames, recording.times, c.values, c.noise, corners) for _, c in looked])
     for (name, c), wild in zip(looked, found, strict=True):
         if not wild.any():
             continue

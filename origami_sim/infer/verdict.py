@@ -26,7 +26,6 @@ LISTED = 3
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
 
-
 MORE_LAWS = " More laws at once would follow the recordings more closely, as they do where the catalogue lacks one."
 """What is said where the best set is not named."""
 
@@ -154,7 +153,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = text if p.signatures else "There is no suspect that could act here."
         return Judgement(d.word, text, d.probability, [], **common)
     if not d.lead:
-        word, text, chosen = unnamed_verdict(forward, given, base, compared, unknown=d.word == "UNKNOWN")
+        alone = p.nodes[frozenset()].fit  # its numbers are those of the tables
+        word, text, chosen = unnamed_verdict(forward, given, alone, compared, unknown=d.word == "UNKNOWN")
         return Judgement(word, text, np.nan if word == "UNKNOWN" else d.probability, chosen, **common)
     if d.word == "UNKNOWN" and UNLISTED in d.lead:
         b = budgeted(d.best)
@@ -249,6 +249,8 @@ def unnamed_verdict(
     if compared < COMPARED:
         text = f"Only {compared:.0%} of the frames could be compared; in these nothing is found to be missing."
         return "UNTESTABLE", text, []
+    assert base.weights is not None
+    given = given.reweighted(base.weights)
     off = [m for m, v in zip(base.free, base.theta, strict=True) if abs(v - m.start) > m.spread]
     if odds_of_numbers(given, base) <= 0.0 or not off:
         text = f"The model is adequate: within what is known of its numbers, its error is {over:.2f} times the noise."

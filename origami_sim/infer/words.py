@@ -6,6 +6,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
+from origami_sim.hypotheses.hypothesis import Free, Suspect
 from origami_sim.recording.units import quantity
 
 WHOLE = ("the measurement", "the drive", "the ground")
@@ -35,7 +36,8 @@ def distinct(fits: Sequence[Fit]) -> list[str]:
 def say(f: Fit, *, only: Collection[str] | None = None) -> str:
     """The effects of a fit, all or `only` some, with their sites and strengths: those of the device first, each once.
 
-    Intervals are left to the table where there are more than two: a headline has to be read at a glance.
+    Intervals are left to the table where there are more than two: a headline has to be read at a glance. Of a single
+    one its other numbers are said, as a time constant. A mass at several nodes is said as their sum.
     """
     sites: dict[str, list[str]] = {}
     every = [s for s in f.hypothesis.suspects if only is None or s.effect in only]
@@ -45,17 +47,29 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
     ends = dict(zip((id(n) for n in f.free), zip(*f.intervals(), strict=True), strict=True))
     for s in every:
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
-        t, d = value[id(n)], deviation[id(n)]
+        nodes = len(n.entities or ()) if n.unit == "kg" and get(s.effect).family == "node" else 1
+        t, d = nodes * value[id(n)], nodes * deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
-        low, high = (said(v, n.unit, digits) for v in ends[id(n)])
+        low, high = (said(nodes * v, n.unit, digits) for v in ends[id(n)])
         what = title(s.effect)
         if s.more:
             what = f"{'more' if t > 0 else 'less'} {what} than stated"
-        strength = f"{n.name.replace('_', ' ')} {said(t, n.unit, digits)}"
+        strength = f"{_named(n, s)} {said(t, n.unit, digits)}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
-        sites.setdefault(what, []).append(f"{where}({strength}{interval})")
+        shape = [f for f in s.free if f not in s.strengths] if len(every) == 1 else []
+        more = "".join(f"; {_named(f, s)} {said(value[id(f)], f.unit)}" for f in shape[:2])
+        sites.setdefault(what, []).append(f"{where}({strength}{interval}{more})")
     return joined([f"{what} {joined(each)}" for what, each in sites.items()])
+
+
+def _named(n: Free, s: Suspect) -> str:
+    """A number of a suspect in words; of a branch of a spectrum with its number, if there are several."""
+    name, _, branch = n.name.rpartition("_")
+    if not branch.isdigit():
+        return n.name.replace("_", " ")
+    several = any(f.name == f"{name}_{int(branch) + 1}" or branch != "1" for f in s.free)
+    return f"{name} of branch {branch}:" if several else name
 
 
 def elsewhere(f: Fit) -> str:

@@ -237,7 +237,7 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
         if bursts > 1.5:
             notes.append(
                 f"Channel '{name}' is now and then {bursts:.1f} times as rough (root mean square) as in most frames, "
-                "whose level is the noise stated: bursts of noise, impacts, or steps that are faster than the frames."
+                "whose level is the noise said above: bursts, impacts, or steps that are faster than the frames."
             )
     return notes
 

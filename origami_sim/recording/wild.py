@@ -3,6 +3,8 @@
 One such frame is as many squares as a real effect of the whole recording, and looks like no physics.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -19,7 +21,9 @@ UNEVEN = 1.5
 """Ratio of time steps up to which frames are neighbours."""
 
 
-def wild_frames(times: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
+def wild_frames(
+    times: np.ndarray, values: np.ndarray, noise: float, corners: np.ndarray | Sequence[float] = ()
+) -> np.ndarray:
     """(n,) frames that lie far off the cubic through the three before and the three after them, which agree.
 
     Where the motion itself has a corner (a blow, a snap), these do not agree: the corner of a path with constant speeds
@@ -27,6 +31,7 @@ def wild_frames(times: np.ndarray, values: np.ndarray, noise: float) -> np.ndarr
 
     Args:
         times: (n,) [s]. values: (n,) or (n, d), nan where missing. noise: standard deviation in the unit of `values`.
+        corners: times at which a drive is switched [s]: what moves fast after that is a motion.
     """
     columns = np.asarray(values, float).reshape(len(times), -1)
     candidates: list[tuple[float, int, int]] = []
@@ -36,6 +41,8 @@ def wild_frames(times: np.ndarray, values: np.ndarray, noise: float) -> np.ndarr
             break
         steps = sliding_window_view(np.diff(times), size - 1)
         even = steps.max(axis=1) < UNEVEN * steps.min(axis=1)
+        ends = sliding_window_view(times, size)[:, [0, -1]]
+        even &= ~np.any([(ends[:, 0] <= t) & (t <= ends[:, 1]) for t in [np.inf, *corners]], axis=0)
         at = np.linspace(-1.0, 1.0, size)
         inside = np.isin(np.arange(size), np.arange(SIDE, SIDE + run))
         outer, inner = np.vander(at[~inside], 4), np.vander(at[inside], 4)

@@ -245,3 +245,16 @@ def test_nothing_is_missing():
     made = recording(angles(times(), END and 0.1))
     found = diagnose(flap(), made, ONE, catalogue=SOME[:3])
     assert found.verdict == "ADEQUATE", found.sentence
+
+
+def test_noise_of_a_recorder_that_filters_is_no_missing_force():
+    """Neighbouring frames differ by less than the noise; what is stated of it is not known."""
+    rng, t = np.random.default_rng(3), times(801)
+    noise = np.zeros(len(t))
+    for n, white in enumerate(NOISE * np.sqrt(1.0 - 0.5**2) * rng.normal(size=len(t))):
+        noise[n] = 0.5 * noise[n - 1] + white
+    one = recording(angles(t) + noise, noise=0.0)
+    channel = one.channels["fold"]
+    one = replace(one, channels={"fold": replace(channel, noise=0.7 * NOISE)}, motion="quasistatic")
+    d = diagnose(flap(), one, ONE, catalogue=SOME)
+    assert d.verdict in ("ADEQUATE", "PARAMETER"), d.sentence

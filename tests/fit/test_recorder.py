@@ -17,7 +17,7 @@ def left_over(seed: int, recordings: int):
         for n in range(recordings)
     ]
     weights = Weights(np.ones(1), (np.ones(1),), 4, 0.0)
-    return SimpleNamespace(curve=False, blocks=blocks), SimpleNamespace(
+    return SimpleNamespace(recordings=[SimpleNamespace(by_step=False)], blocks=blocks), SimpleNamespace(
         weights=weights, blocks=list(range(recordings)), residuals=rows
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim.errors import InputError
-from origami_sim.recording import Series, lint, lint_report, read_recording
+from origami_sim.recording import Series, applied_drive, lint, lint_report, read_recording
 from origami_sim.recording.lint import swaps
 
 RATE, COUNT = 120.0, 400
@@ -148,6 +148,12 @@ def test_a_drive_of_its_own_file_is_joined_by_time(read):
     np.testing.assert_allclose(drive.at(TIMES), (TIMES + 0.5) / 0.05 * 100.0, atol=1e-9)
     shifted = read(OWN_FILE + "shift = 0.25\n", supply).drive["voltage"]
     np.testing.assert_allclose(shifted.at(TIMES), (TIMES + 0.25) / 0.05 * 100.0, atol=1e-9)
+
+
+def test_a_drive_that_begins_with_the_recording_but_for_rounding_covers_it(read):
+    supply = "ms,kv\n" + "".join(f"{350 + 50 * k},{0.1 * k}\n" for k in range(100))
+    recording = read(OWN_FILE + "shift = -0.35\n", supply)  # 0.35 s minus 0.35 s is 6e-17 s
+    assert recording.drive["voltage"].at(TIMES)[0] == 0.0 and not applied_drive(recording)["voltage_0"].is_zero
 
 
 def test_a_drive_that_does_not_cover_the_recording_is_refused(read):

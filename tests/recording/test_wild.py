@@ -57,3 +57,13 @@ def test_neighbours_across_a_gap_in_time_tell_nothing():
     times[300:] += 0.2
     assert not wild_frames(times, np.where(times > times[299], 0.9, 0.0) + SWING, 1e-3).any()
     assert not wild_frames(T[:5], SWING[:5], 1e-3).any()
+
+
+def test_what_follows_a_switch_of_the_drive_is_a_motion():
+    """A blow at a known time, that damps within three frames: wild, unless it is said that something was switched."""
+    values = np.zeros(600)
+    values[300:303] = [0.5, -0.3, 0.1]
+    values += np.random.default_rng(0).normal(0.0, 0.005, 600)
+    assert wild_frames(T, values, 0.005).any()
+    assert not wild_frames(T, values, 0.005, [T[299]]).any()
+    assert wild_frames(T, values, 0.005, [T[100]]).any()

@@ -12,7 +12,7 @@ MEANING = {
     "PARAMETER": "The model has the right effects; its own numbers were off.",
     "MEASUREMENT": "The measurement, not the device, makes the difference.",
     "MECHANISM": "A physical effect was left out of the model.",
-    "TIE": "Several explanations do equally well; another experiment can tell them apart.",
+    "TIE": "Several explanations do equally well.",
     "SEVERAL": "More than one effect was left out of the model.",
     "UNKNOWN": "Something real is missing that the catalogue does not name.",
     "UNTESTABLE": "These recordings cannot answer the question.",
@@ -53,7 +53,7 @@ def numbers(d: Diagnosis) -> Html:
     if np.isfinite(known(d.probability)):
         out.append(("Probability", percent(d.probability), OF.get(d.verdict, "of what is named here")))
     else:
-        out.append(("Probability", "not stated", "no explanation is believed"))
+        out.append(("Probability", "not stated", "no explanation is named"))
     if np.isfinite(after):
         again = f"; {number(refitted)} by refitting alone" if np.isfinite(refitted) else ""
         parts = [v for f in d.folds if np.isfinite(v := multiples(d, f.after))]

@@ -192,7 +192,7 @@ def simulate(
     numerical damping (see `solve.implicit`), world after world, on the CPU.
 
     Args:
-        duration: simulated time [s], rounded to whole frames, or a quantity ("200 ms"). rate: frames per second.
+        duration: simulated time [s], rounded up to whole frames, or a quantity ("200 ms"). rate: frames per second.
         dt: step [s]; default SAFETY times the stability limit of the stiffest element. Implicit: any length, halved
             only where Newton finds no solution; by default adapted within each frame.
         state: where to start (default: the reference state at rest); its worlds must match.
@@ -310,7 +310,7 @@ def _simulated(
     substeps = _substeps(chosen, dt, rate, method)
     step = frame_time / substeps
     frames = math.ceil(duration * rate - 1e-6)  # at least as long as asked, but for rounding
-    if frames < 1:
+    if duration * rate < 0.5:
         raise InputError(
             "the run is shorter than one frame",
             field="duration",
