@@ -49,7 +49,8 @@ def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forw
     Args:
         forward: what predicts the recordings as they are.
     """
-    if missed(forward)[0] < FAR:  # nothing can be so many times closer
+    given, moved = missed(forward)
+    if given < max(FAR, EXPLAINED * moved):  # nothing can be so many times closer, or as it is most is explained
         return None
     few = [beginning(r) for r in recordings]
     given, found = missed(arranged(subject, few, o)[0])[0], []
