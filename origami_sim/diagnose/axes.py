@@ -25,7 +25,6 @@ Change = Callable[[Mapping[str, Channel]], dict[str, Channel]]
 FRAMES = 600
 """Frames of a recording that are looked at; a mistake shows in all of them. Half and double find the same."""
 
-
 TURNS = 3
 """Axes that are exchanged or reversed at most: two of them where y is up in a file, and one that points back."""
 

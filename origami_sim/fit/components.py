@@ -23,7 +23,8 @@ def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.n
     cover, at = root @ root.T, f.coordinates.of(f.theta)
     place, gone, suspects = len(f.free) - len(f.hypothesis.free), [], []
     for s in f.hypothesis.suspects:
-        unseen = _unseen(cover, at, [place + k for k, n in enumerate(s.free) if n in s.strengths], credible)
+        vector = len(s.free) == len(s.strengths)  # the branches of a spectrum have time constants besides
+        unseen = _unseen(cover, at, [place + k for k in range(len(s.free)) if vector], credible)
         kept = [n for k, n in enumerate(s.free) if place + k not in unseen]
         suspects.append(replace(s, free=(replace(kept[0], spread=np.inf), *kept[1:])) if unseen else s)
         gone += unseen

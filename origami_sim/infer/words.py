@@ -44,6 +44,7 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
     every.sort(key=lambda s: s.kind == "measurement")
     deviation = dict(zip((id(n) for n in f.free), f.deviations(), strict=True))
     value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    bound = dict(zip((id(n) for n in f.free), f.at_bound, strict=True))
     ends = dict(zip((id(n) for n in f.free), zip(*f.intervals(), strict=True), strict=True))
     for s in every:
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
@@ -51,14 +52,12 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
         t, d = nodes * value[id(n)], nodes * deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
         low, high = (said(nodes * v, n.unit, digits) for v in ends[id(n)])
-        what = title(s.effect)
-        if s.more:
-            what = f"{'more' if t > 0 else 'less'} {what} than stated"
+        what = f"{'more' if t > 0 else 'less'} {title(s.effect)} than stated" if s.more else title(s.effect)
         strength = f"{_named(n, s)} {said(t, n.unit, digits)}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
-        shape = [f for f in s.free if f not in s.strengths] if len(every) == 1 else []
-        more = "".join(f"; {_named(f, s)} {said(value[id(f)], f.unit)}" for f in shape[:2])
+        shape = [n for n in s.free if n not in s.strengths and not bound[id(n)]] if len(every) == 1 else []
+        more = "".join(f"; {_named(n, s)} {said(value[id(n)], n.unit)}" for n in shape[:2])
         sites.setdefault(what, []).append(f"{where}({strength}{interval}{more})")
     return joined([f"{what} {joined(each)}" for what, each in sites.items()])
 
