@@ -78,7 +78,7 @@ def test_what_the_model_has_is_not_said_to_be_lacking(change, words):
     lower = next(s for s in every if s.effect == "crease_viscosity" and s.entities == (1,))
     ends = np.array([change - 2e-9]), np.array([change + 2e-9])
     known = {"deviations": lambda: np.array([1e-9]), "intervals": lambda: ends}
-    f = SimpleNamespace(hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], **known)
+    f = SimpleNamespace(hypothesis=Hypothesis((lower,)), free=lower.free, theta=[change], at_bound=[False], **known)
     said = say(f)  # type: ignore[arg-type]
     assert said.startswith(words) and "than stated at crease 1" in said
     low, high = said.partition("95 %: ")[2].rstrip(")").split(" to ")
@@ -98,7 +98,7 @@ def test_a_headline_of_many_effects_has_the_devices_first_and_leaves_intervals_t
         free = tuple(n for s in mine[:count] for n in s.free)
         theta = np.array([n.start + n.scale for n in free])
         known = {"deviations": lambda: 0.01 * theta, "intervals": lambda: (0.98 * theta, 1.02 * theta)}
-        f = SimpleNamespace(hypothesis=Hypothesis(mine[:count]), free=free, theta=theta, **known)
+        f = SimpleNamespace(hypothesis=Hypothesis(mine[:count]), free=free, theta=theta, at_bound=0 * theta, **known)
         return say(f)  # type: ignore[arg-type]
 
     places = [said(3).index(words) for words in ("dry friction", "air drag", "zero error of the angle")]

@@ -209,7 +209,34 @@ def test_an_effect_at_two_sites_is_named_once():
     suspects = [Suspect("crease_friction", f"fold{n}", "crease", (f,), (n,)) for n, f in enumerate(numbers)]
     values, sd = np.array([1e-3, 2e-3]), np.full(2, 1e-5)
     ends = values - 2.0 * sd, values + 2.0 * sd
-    made = {"free": numbers, "theta": values, "deviations": lambda: sd, "intervals": lambda: ends}
-    text = say(cast(Fit, SimpleNamespace(hypothesis=Hypothesis(tuple(suspects)), **made)))
+    text = say(fitted(suspects, values, sd, ends))
     assert text.count("dry friction") == 1
     assert "at fold0 (friction moment 1.00 mN m" in text and " and at fold1 (friction moment 2.000" in text
+
+
+def fitted(suspects, values, sd, ends, at_bound=None) -> Fit:
+    made = {"deviations": lambda: sd, "intervals": lambda: ends, "at_bound": np.zeros(len(values), bool)}
+    made |= {} if at_bound is None else {"at_bound": at_bound}
+    hypothesis = Hypothesis(tuple(suspects))
+    return cast(Fit, SimpleNamespace(hypothesis=hypothesis, free=hypothesis.free, theta=values, **made))
+
+
+def test_a_mass_at_several_nodes_is_said_as_their_sum():
+    added = Free("added_mass", "added", "kg", 0.0, 1e-5, entities=(6, 7))
+    values, sd = np.array([77e-6]), np.array([4e-6])
+    one = Suspect("added_mass", "shank", "node", (added,), (6, 7))
+    assert "added 150 mg, 95 %: 140 mg to 170 mg" in say(fitted([one], values, sd, (values - 2 * sd, values + 2 * sd)))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_other_numbers_of_a_single_effect_are_said_unless_they_lie_on_a_bound(held):
+    numbers = (
+        Free("crease_relaxation", "stiffness_1", "N m/rad", 0.0, 1e-5),
+        Free("crease_relaxation", "time_1", "s", 1.0, 1.0, power=0.0),
+    )
+    values, sd = np.array([1e-4, 43.8]), np.array([1e-6, 1.0])
+    suspect = Suspect("crease_relaxation", "hinge", "crease", numbers, (0,))
+    text = say(fitted([suspect], values, sd, (values - 2 * sd, values + 2 * sd), np.array([False, held])))
+    assert (
+        text.startswith("viscoelastic relaxation at hinge (stiffness 100 µN m/rad") and ("time 43.8 s" in text) != held
+    )
