@@ -7,7 +7,7 @@ from the recording changed in this way.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations, product
+from itertools import combinations
 
 import numpy as np
 
@@ -17,16 +17,10 @@ from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.recording import Recording
-from origami_sim.recording.axes import EXPLAINED, FAR, groups_of, picture_of, words
+from origami_sim.recording.axes import EXPLAINED, FAR, alike, groups_of, orders, picture_of, reordered, words
 from origami_sim.recording.recording import Channel
 
 Change = Callable[[Mapping[str, Channel]], dict[str, Channel]]
-
-FRAMES = 600
-"""Frames of a recording that are looked at; a mistake shows in all of them. Half and double find the same."""
-
-TURNS = 3
-"""Axes that are exchanged or reversed at most: two of them where y is up in a file, and one that points back."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +45,19 @@ def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forw
     given, moved = missed(forward)
     if given < max(FAR, EXPLAINED * moved):  # nothing can be so many times closer, or as it is most is explained
         return None
-    few = [beginning(r) for r in recordings]
-    given, found = missed(arranged(subject, few, o)[0])[0], []
-    for what, remedy, change in changes(few[0]):
+    same, found = replace(o, panels=forward.panels or o.panels), []
+    for what, remedy, change in changes(recordings[0]):
+        changed = [replace(r, channels=change(r.channels)) for r in recordings]
         try:
-            left, moved = missed(arranged(subject, [replace(r, channels=change(r.channels)) for r in few], o)[0])
+            left, moved = missed(arranged(subject, changed, same)[0])
         except InputError:
             continue
         if FAR * max(left, 1.0) < given and left < EXPLAINED * moved:
             found.append((left, what, remedy))
     if not found:
         return None
-    left, what, remedy = min(found)
+    least = min(left for left, *_ in found)
+    left, what, remedy = next(one for one in found if alike(one[0], least, 1.0))
     text = f"{what}: as recorded the model misses {given:.3g} times the noise, so changed {left:.3g} times."
     return Mistake(f"{text} {remedy}, and diagnose again.", given, left)
 
@@ -78,23 +73,14 @@ def missed(forward: Predictor) -> tuple[float, float]:
     return (float(every[0]) if np.isfinite(every[0]) else np.inf), float(every[1])
 
 
-def beginning(recording: Recording) -> Recording:
-    """The first frames of a recording."""
-    return recording.window(recording.times[0], recording.times[min(FRAMES, len(recording.times)) - 1])
-
-
 def changes(recording: Recording) -> Iterator[tuple[str, str, Change]]:
     """What may be wrong with channels, in words, what then has to be stated, and the channels as they should be."""
-    groups = groups_of(list(recording.channels.values()))
-    for group in groups:
+    for group in groups_of(list(recording.channels.values())):
         width = group[0].values.reshape(len(recording.times), -1).shape[1]
         names = [c.name for c in group]
-        for order, signs in product(permutations(range(width)), product((1, -1), repeat=width)):
-            turns = sum(a != b for a, b in zip(order, range(width), strict=True)) + signs.count(-1)
-            if not 0 < turns <= TURNS:
-                continue
+        where = {1: "sign = -1 of the channel", 2: "right and up of the camera"}.get(width, "axes under [source]")
+        for order, signs in orders(width)[1:]:
             what = f"{'Channel' if len(names) == 1 else 'Channels'} {', '.join(names)}: {words(group[0], order, signs)}"
-            where = {1: "sign = -1 of the channel", 2: "right and up of the camera"}.get(width, "axes under [source]")
             yield what, f"State {where} in the sidecar", turned(names, order, signs)
     for a, b in combinations(recording.channels.values(), 2):
         if a.kind == b.kind and picture_of(a) == picture_of(b):
@@ -106,8 +92,7 @@ def turned(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> 
     """Channels with components in another order, and with other signs."""
 
     def of(channel: Channel) -> Channel:
-        columns = channel.values.reshape(len(channel.values), -1)[:, list(order)] * signs
-        return replace(channel, values=columns.reshape(channel.values.shape))
+        return replace(channel, values=reordered(channel.values, order, signs))
 
     return lambda every: {n: of(c) if n in names else c for n, c in every.items()}
 

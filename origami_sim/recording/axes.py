@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import CHANNEL_KINDS, Channel, Recording
@@ -56,8 +57,7 @@ class Axes:
 
     def corrected(self, values: np.ndarray) -> np.ndarray:
         """Readings (n,) or (n, d) of one of the channels with the change."""
-        columns = values.reshape(len(values), -1)[:, list(self.order)] * self.signs + self.shift
-        return columns.reshape(values.shape)
+        return reordered(values, self.order, self.signs, self.shift)
 
 
 def mistaken_axes(recording: Recording, predicted: Mapping[str, np.ndarray]) -> list[Axes]:
@@ -83,6 +83,24 @@ def mistaken_axes(recording: Recording, predicted: Mapping[str, np.ndarray]) -> 
         if axes is not None:
             found.append(axes)
     return found
+
+
+def reordered(values: np.ndarray, order: Sequence[int], signs: Sequence[int], shift: ArrayLike = 0.0) -> np.ndarray:
+    """Readings (n,) or (n, d) with components in another order, with other signs, and moved."""
+    columns = values.reshape(len(values), -1)[:, list(order)] * np.asarray(signs) + np.asarray(shift)
+    return columns.reshape(values.shape)
+
+
+def orders(width: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Orders and signs of so many components, those first that change least: as they are."""
+    same = tuple(range(width))
+    every = [(o, s) for o in permutations(same) for s in product((1, -1), repeat=width)]
+    return sorted(every, key=lambda c: sum(a != b for a, b in zip(c[0], same, strict=True)) + c[1].count(-1))
+
+
+def alike(left: float, least: float, noise: float) -> bool:
+    """Whether a change explains readings as well as the best one does."""
+    return left <= 1.05 * least + 0.1 * noise
 
 
 def groups_of(channels: Sequence[Channel]) -> list[list[Channel]]:
@@ -120,21 +138,18 @@ def _best(group: Sequence[Channel], read: np.ndarray, said: np.ndarray) -> Axes 
     if len(read) < 3:
         return None
     width = read.shape[1]
-    none = (tuple(range(width)), (1,) * width)
-    candidates = [(o, s) for o in permutations(range(width)) for s in product((1, -1), repeat=width)]
-    candidates.sort(key=lambda c: sum(a != b for a, b in zip(c[0], none[0], strict=True)) + c[1].count(-1))
-    left = {}
+    candidates, left = orders(width), {}
     for order, signs in candidates:
-        gap = said - read[:, list(order)] * signs
+        gap = said - reordered(read, order, signs)
         left[order, signs] = float(np.sqrt(np.mean(np.sum((gap - gap.mean(axis=0)) ** 2, axis=1))))
-    given, least = left[none], min(left.values())
+    given, least = left[candidates[0]], min(left.values())
     motion = float(np.sqrt(np.mean(np.sum((read - read.mean(axis=0)) ** 2, axis=1))))
     noise = float(np.sqrt(width * np.mean([c.noise**2 for c in group])))
-    order, signs = next(c for c in candidates if left[c] <= 1.05 * least + 0.1 * noise)
+    order, signs = next(c for c in candidates if alike(left[c], least, noise))
     changed = left[order, signs]
     if changed >= given or given < FAR * max(changed, noise) or changed > EXPLAINED * motion:
         return None
-    shift = (said - read[:, list(order)] * signs).mean(axis=0)
+    shift = (said - reordered(read, order, signs)).mean(axis=0)
     names = tuple(c.name for c in group)
     unit = group[0].unit
     sentence = (

@@ -46,7 +46,7 @@ def placed_sources(stated: Any, table: Table, times: np.ndarray, path: Path) -> 
         signal = read_signal(value, unit, field, path)
         if not isinstance(signal, Signal) or signal.times is None or signal.values is None:
             return signal
-        own = signal.times
+        own = spanning(signal.times, times)
         if own[0] > times[0] or own[-1] < times[-1]:
             raise InputError(
                 "does not cover the recording",
@@ -82,6 +82,15 @@ def _measured(value: dict[str, Any], unit: str, field: str, table: Table, times:
 def _lasting(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Samples with the last one held for as long again: a run may end after the last frame."""
     return held_to(2 * times[-1] - times[0], times, values)
+
+
+def spanning(own: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Times (m,) of a drive, from and to a recording's first and last where only a clock's rounding parts them [s]."""
+    out, rounding = np.array(own, float), 1e-9 * np.max(np.abs(times[[0, -1]]))
+    for end in (0, -1):
+        if abs(out[end] - times[end]) <= rounding:
+            out[end] = times[end]
+    return out
 
 
 def surrounded(drive: Drive, recording: Recording) -> Drive:

@@ -13,7 +13,7 @@ from origami_sim.files import read_bytes
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.lint import Series, lint, repeated
 from origami_sim.recording.noise import noise_report
-from origami_sim.recording.placed import placed_sources
+from origami_sim.recording.placed import placed_sources, spanning
 from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.recording.table import Table, read_table
@@ -227,7 +227,6 @@ def _drive(name: str, spec: dict, table: Table, times: np.ndarray, side: Sidecar
         own, values = np.array(spec["times"]), np.asarray(spec["values"], dtype=float)
     elif spec["file"] is not None:
         own, values = _other_file(name, spec, side)
-        own = spanning(own, times)
     else:
         values = _whole(name, table, spec["columns"])
     if spec["direction"] is not None:
@@ -236,6 +235,7 @@ def _drive(name: str, spec: dict, table: Table, times: np.ndarray, side: Sidecar
                 "only one number can be given a direction", file=side.file, field=f"drive.{name}.direction"
             )
         values = values[..., None] * np.array(spec["direction"])
+    own = None if own is None else spanning(own, times)
     drive = DriveChannel(name=name, values=values * factor, unit=unit, constant=constant, times=own)
     try:
         drive.at(times)
@@ -248,13 +248,6 @@ def _drive(name: str, spec: dict, table: Table, times: np.ndarray, side: Sidecar
             allowed=error.allowed,
         ) from None
     return drive
-
-
-def spanning(own: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Times (m,) of a drive, from and to a recording's first and last where only a clock's rounding parts them [s]."""
-    ends = times[[0, -1]]
-    near = np.abs(own[[0, -1]] - ends) <= 1e-9 * np.max(np.abs(ends))
-    return np.concatenate([ends[:1] if near[0] else own[:1], own[1:-1], ends[1:] if near[1] else own[-1:]])
 
 
 def _other_file(name: str, spec: dict, side: Sidecar) -> tuple[np.ndarray, np.ndarray]:
