@@ -25,6 +25,7 @@ from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
 from origami_sim.effects import get
 from origami_sim.fit.bursts import bursts
+from origami_sim.fit.discrepancy import of_recorder
 from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
@@ -34,7 +35,6 @@ from origami_sim.hypotheses.subject import Source, subject_of
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.diagnosis import Diagnosis
-from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search

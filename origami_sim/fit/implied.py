@@ -34,10 +34,13 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Wei
     """
     assert f.weights is not None
     found = implied(forward, f, hyper, (f.weights, *known) if f.weights.colour else known)
-    best, most = (f, 0.0), -np.inf
+    best, most, tried = (f, 0.0), -np.inf, list[tuple[float, float]]()
     for log, noise in sorted(found, key=lambda each: -each[0]):
         if log <= most:
             break
+        if any(noise.gap == gap and other - log < OWED for other, gap in tried):
+            continue  # the same noise, reached from elsewhere
+        tried.append((log, noise.gap))
         one, owed = settled(forward, f.reweighted(noise))
         if (log := log_evidence(one) - 0.5 * owed) > most:
             best, most = (one, owed), log

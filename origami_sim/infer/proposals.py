@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
+from origami_sim.fit.evidence import on_bound
 from origami_sim.fit.least_squares import OWED
 from origami_sim.infer.placement import LEADING
 from origami_sim.infer.posterior import Key, Posterior
@@ -50,7 +51,22 @@ def _likely(out: Posterior) -> Key | None:
     }
     # another start of the shape of a set that was fitted has to promise more than that did
     better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
-    return max(better, key=lambda k: unfitted[k], default=None)
+    return max((k for k in better if not _idle(out, k)), key=lambda k: unfitted[k], default=None)
+
+
+def _idle(out: Posterior, key: Key) -> bool:
+    """Whether a set only adds to a fitted one what physics then holds at nothing, as a lag that would be negative."""
+    estimate = out.estimates[key]
+    node, column = out.nodes[estimate.parent], 0
+    if key in out.begun or not key > node.key or out.promise[key] > out.total[node.key]:
+        return False
+    for g in estimate.groups:
+        group = node.groups[g]
+        strong = estimate.values[column : column + group.strengths]
+        if g >= len(node.key) and np.all(on_bound(np.abs(strong), np.zeros(len(strong)), np.inf)):
+            return True
+        column += len(group.columns)
+    return False
 
 
 def most_gained(gains: Sequence[float]) -> float:
@@ -97,7 +113,9 @@ def _analogous(out: Posterior) -> Key | None:
     adds to one set, or gains in the place of another, it is thought to gain in another set of that size.
     """
     best = max(named(out), key=lambda k: out.total[k])
-    near, promise = out.total[best] + np.log(UNFITTED), {}
+    near, promise, known = out.total[best] + np.log(UNFITTED), dict[Key, float](), dict[tuple[str, ...], float]()
+    for k in out.nodes:
+        known[out.labels(k)] = max(out.total[k], known.get(out.labels(k), -np.inf))
     for one in out.nodes:
         gone, new = one - best, best - one
         if len(new) != 1 or len(gone) > 1:
@@ -105,9 +123,11 @@ def _analogous(out: Posterior) -> Key | None:
         for rival in out.nodes:
             key = (rival - gone) | new
             if len(rival) == len(one) and gone <= rival and not new & rival and key in out.estimates:
-                known = promise.get(key, -np.inf)
-                promise[key] = max(known, out.total[rival] + out.total[best] - out.total[one])
-    return max((k for k, p in promise.items() if p >= near), key=lambda k: promise[k], default=None)
+                hope = out.total[rival] + out.total[best] - out.total[one]
+                promise[key] = max(promise.get(key, -np.inf), hope)
+    # what was fitted from other shapes, or with other components, has to promise more than it came to
+    more = [k for k, p in promise.items() if p >= max(near, known.get(out.labels(k), -np.inf) + OWED)]
+    return max(more, key=lambda k: promise[k], default=None)
 
 
 def _equivalent(out: Posterior) -> Key | None:

@@ -204,23 +204,23 @@ def _signatures(
     """
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     size = np.array([_affordable(forward, base, s, s.free[0].scale, least) for s in group])
-    parts: list[list[np.ndarray]] = []
-    for blocks in filter(len, (_some(forward, base.blocks), base.blocks)):
-        share = np.sqrt(len(blocks) / len(base.blocks))
 
-        def changes(mine: Sequence[int], at: np.ndarray, blocks: Sequence[int] = blocks) -> list[list[np.ndarray]]:
-            return _changes(forward, [group[k] for k in mine], at[mine], base, weights, blocks)
+    def changes(mine: Sequence[int], at: np.ndarray, blocks: Sequence[int]) -> list[list[np.ndarray]]:
+        return _changes(forward, [group[k] for k in mine], at[mine], base, weights, blocks)
 
-        parts = changes(range(len(group)), size)
-        for n in range(ROUNDS):
-            suits = _suiting(forward, base, group, size, parts, share * goal, least)
-            if n:  # a delay that leaves a segment as it is may move the next one into it
-                suits = np.where(abs(suits) < abs(size), suits, size)
-            again = np.flatnonzero(suits != size).tolist()
-            if not again:
-                break
-            for k, new in zip(again, changes(again, suits), strict=True):
-                parts[k], size[k] = new, suits[k]
+    if some := _some(forward, base.blocks):
+        parts, share = changes(range(len(group)), size, some), np.sqrt(len(some) / len(base.blocks))
+        size = _suiting(forward, base, group, size, parts, share * goal, least)
+    parts = changes(range(len(group)), size, base.blocks)
+    for n in range(ROUNDS):
+        suits = _suiting(forward, base, group, size, parts, goal, least)
+        if n:  # a delay that leaves a segment as it is may move the next one into it
+            suits = np.where(abs(suits) < abs(size), suits, size)
+        again = np.flatnonzero(suits != size).tolist()
+        if not again:
+            break
+        for k, new in zip(again, changes(again, suits, base.blocks), strict=True):
+            parts[k], size[k] = new, suits[k]
     return [(s, np.concatenate(p), float(z)) for s, z, p in zip(group, size, parts, strict=True)]
 
 

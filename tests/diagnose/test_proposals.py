@@ -30,7 +30,7 @@ def posterior(fitted: dict[Key, float], estimated: dict[Key, float]) -> Posterio
         SimpleNamespace(suspect=SimpleNamespace(strengths=(f,)), size=np.ones(1)) for f in frees.values()
     ]
     more["suspect"] = lambda n: SimpleNamespace(effect=str(n))
-    own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped")
+    own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped", "begun")
     return cast(Posterior, SimpleNamespace(**{n: getattr(out, n) for n in own}, **more))
 
 
@@ -82,3 +82,24 @@ def test_what_promises_a_part_of_the_posterior_is_fitted():
     other = frozenset({DRAG})
     assert proposed(posterior({BEST: 0.0}, {other: -1.0}), 0) == other
     assert proposed(posterior({BEST: 0.0}, {other: -4.0}), 0) is None
+
+
+@pytest.mark.parametrize(("value", "worth"), [(0.0, False), (0.5, True)])
+def test_what_physics_would_hold_at_nothing_is_not_fitted(value, worth):
+    """A lag beside the best set, of which the recordings would have less than none."""
+    lag = BEST | {DRAG}
+    out = posterior({BEST: 0.0}, {lag: -2.0})
+    node = cast(Any, out.nodes[BEST])
+    node.groups = [SimpleNamespace(columns=(n,), strengths=1) for n in range(len(lag))]
+    out.estimates[lag] = cast(Any, SimpleNamespace(parent=BEST, groups=(0, 1, 2, 3), values=np.array([3, 3, 3, value])))
+    assert proposed(out, 0) == (lag if worth else None)
+
+
+def test_a_set_is_fitted_from_other_shapes_only_if_it_promises_more():
+    """A rival with what the best adds to a smaller set was fitted already, with another yield angle."""
+    two = {frozenset({RUB, LOSS}): -12.0, frozenset({RUB, DRAG}): -12.5}
+    alike = frozenset({RUB, DRAG, SCALE})
+    out = posterior({BEST: 0.0} | two | {frozenset({RUB, DRAG, SCALE, ZERO}): -0.4}, {alike: -40.0})
+    labels = out.labels
+    out.labels = lambda key: labels(key - {ZERO})
+    assert proposed(out, 1) is None

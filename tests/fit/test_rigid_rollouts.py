@@ -144,7 +144,8 @@ def test_worlds_that_were_followed_are_not_simulated_again(tied, monkeypatch):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12)
 
 
-def test_a_fit_of_what_is_exact_leaves_rounding(tied):
+def test_a_fit_of_what_is_exact_leaves_rounding(tied, monkeypatch):
+    monkeypatch.setattr(tied, "blur", 1e-9)
     f = fitted(tied, fixed=True)
     assert not f.failed
     assert max(np.abs(r).max() for r in f.residuals) < 1e-7
@@ -167,6 +168,23 @@ def test_ends_tell_where_the_next_segment_starts_whatever_its_own_start_is(tied)
     assert np.abs(long[n : n + len(second)] - second).max() < 1e-6
 
 
+@pytest.mark.parametrize("effect", [None, "crease_friction"])
+def test_what_steps_of_the_solver_miss_shows_in_no_data(tied, monkeypatch, effect):
+    """All data together would have to show it; friction is a thousand times as strong as they first show."""
+    every = suspects(tied.model, tied.recordings, tied.drive)
+    some = tuple(s for s in every if s.effect == effect)[:1]
+    theta = np.array([f.start + f.scale * (f.name == "friction_moment") for s in some for f in s.free])
+    theta = np.concatenate([np.ones(3), theta])
+    found = []
+    for finer in (1.0, 1e-3):
+        monkeypatch.setattr(tied, "blur", finer * tied.blur)
+        for known in (tied._moved, tied._films, tied._beside):
+            known.clear()
+        found.append(tied.predict(Hypothesis(some), [theta], np.zeros((1, len(tied.blocks), tied.local))))
+    missed = [(a[0] - b[0]) / block.noise for a, b, block in zip(*found, tied.blocks, strict=True)]
+    assert 0.0 < np.linalg.norm(np.concatenate(missed)) < 0.3  # without friction 0.01
+
+
 def test_numbers_are_found_to_rounding_and_better_where_segments_are_tied():
     model, parameters = hanging(3)
     parameters.set("crease", "stiffness", 1.03 * parameters["crease", "stiffness"])
@@ -176,6 +194,7 @@ def test_numbers_are_found_to_rounding_and_better_where_segments_are_tied():
     found = {}
     for tied in (True, False):
         forward = RigidRollouts(known, [recording], segment=0.3, tied=tied)
+        forward.blur = 1e-9
         f = fitted(forward)
         assert f.theta[0] == pytest.approx(1.03, abs=0.1 * f.deviations()[0])
         found[tied] = f.deviations()[0]
