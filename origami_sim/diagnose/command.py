@@ -443,16 +443,18 @@ def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
 
 def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> list[str]:
     lines = ["", f"{d.verdict}: {d.sentence}", "", f"{'explanation':48s} {'probability':>11s} {'log odds':>9s}"]
+    best = d.candidates[0].odds if d.candidates else 0.0
     for c in d.candidates[:8]:
         if c.failed:
             lines.append(f"{c.label:48s}      failed: {c.failed}")
             continue
-        mark = f"   {c.distrust}" if c.distrust else ""
-        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.odds:9.1f}{mark}")
+        remark = c.why if c.odds > best else c.distrust
+        mark = f"   {remark}" if remark else ""
+        lines.append(f"{c.label:48s} {c.probability:11.3f} {c.odds - best:9.1f}{mark}")
     if d.candidates and round(d.unfitted, 3) > 0.0:
         lines.append(f"{'others, estimated and not fitted':48s} {d.unfitted:11.3f}")
-    best = patched(d)
-    for n in best.numbers if best is not None else []:
+    shown = patched(d)
+    for n in shown.numbers if shown is not None else []:
         bound = ", at its bound" if n.at_bound else ""
         lines.append(f"  {n.label} = {n.value:.4g} {n.unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")
     lines += ["", f"{'rms error, held out':24s} {'noise':>10s} {'as given':>10s} {'refitted':>10s} {'explained':>10s}"]

@@ -22,7 +22,6 @@ def table(
     Args:
         errors: (D,) held-out error of each fitted set, estimated.
     """
-    chance = p.probabilities()
     out = []
     of = {p.labels(key): key for key in sorted(p.nodes, key=lambda k: p.total[k])}
     for key in of.values():
@@ -34,7 +33,7 @@ def table(
                 [s.effect for s in f.hypothesis.suspects],
                 [s.site for s in f.hypothesis.suspects],
                 numbers(f),
-                chance[key],
+                judged.chance.get(key, 0.0),
                 log_odds(p, key),
                 errors[key].tolist(),
                 fit_percent(forward, node.fit).tolist(),
@@ -47,7 +46,7 @@ def table(
         empty = [float("nan")] * len(forward.components)
         effects, sites = [s.effect for s in suspects], [s.site for s in suspects]
         out.append(Candidate(p.label(key), "mechanism", effects, sites, [], 0.0, -np.inf, empty, empty, failed=why))
-    return sorted(out, key=lambda c: -c.probability)
+    return sorted(out, key=lambda c: (-c.probability, -c.odds))
 
 
 def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
@@ -59,6 +58,8 @@ def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
         return "not told from the best"
     if not key:
         return "the simplest"
+    if key not in judged.chance:
+        return "not named: so many laws at once rather imitate another"
     best = next(k for k, n in p.nodes.items() if n.fit.hypothesis is judged.best.hypothesis)
     misses = _squares(forward, f) - _squares(forward, p.nodes[best].fit)
     if misses < OWED:

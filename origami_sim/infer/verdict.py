@@ -37,6 +37,7 @@ class Judgement:
     Attributes:
         verdict, sentence, probability, chosen: see `Diagnosis`. best: the fit to show. tied: explanations that are not
             told from it, itself among them. others: the next best. budget: of the mismatch. notes: what else to say.
+        chance: posterior of the sets that may be named, see `considered`.
     """
 
     verdict: str
@@ -48,6 +49,7 @@ class Judgement:
     others: list[Fit] = field(default_factory=list)
     budget: list[Share] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    chance: dict[Key, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
-    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares}
+    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares, "chance": chance}
+    beyond = MORE_LAWS if more_laws else _unlisted(d)
     suspects = shown.hypothesis.suspects
     chosen = [s.label for s in suspects]
     if d.word == "UNTESTABLE":
@@ -179,7 +182,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
             text += f" With {say(shown, only=more)} they {explained.replace('explains', 'explain', 1)}."
         else:
             text += f" The best is {say(shown)}, which {explained}."
-        return Judgement(d.word, text + _unlisted(d), d.probability, names, **common)
+        return Judgement(d.word, text + beyond, d.probability, names, **common)
     # the shown set may hold more than what surely acts: of that, each effect by its own probability
     named = [s for s in suspects if s.effect in d.lead]
     chosen = [s.label for s in named]
@@ -189,8 +192,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
-    text += f", p = {d.probability:.2f}; {who} {explained}."
-    text += MORE_LAWS if more_laws else _unlisted(d)
+    text += f", p = {d.probability:.2f}; {who} {explained}.{beyond}"
     more = 1.0 - classes.get(d.lead, 0.0) * (1.0 - d.foreign) / d.probability
     if more > ALONE:
         each = _besides(classes, d.lead)

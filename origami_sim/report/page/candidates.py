@@ -23,7 +23,7 @@ def section(d: Diagnosis) -> list:
     rows = [_candidate(head, c, d) for c in d.candidates]
     about = (
         "Probability: of exactly these effects there and no others. Log odds: natural logarithm of the posterior odds "
-        "over the model without an effect. Error: root mean square over all channels, on data that are left out, "
+        "over the first row. Error: root mean square over all channels, on data that are left out, "
         "estimated by one linear step from the fit to all."
     )
     if round(d.unfitted, 2) > 0.0:
@@ -62,7 +62,7 @@ def _candidate(head, c: Candidate, d: Diagnosis) -> Html:
         head,
         [name[:1].upper() + name[1:], element("small", KINDS.get(c.kind, c.kind), class_="tag")],
         bar(c.probability),
-        figure(_odds(c)),
+        figure(_odds(c, d.candidates[0])),
         (cells or MISSING, "numbers"),
         figure(times(multiples(d, c.rms))),
         (remarks, "remarks"),
@@ -70,11 +70,11 @@ def _candidate(head, c: Candidate, d: Diagnosis) -> Html:
     )
 
 
-def _odds(c: Candidate) -> str:
-    odds = known(c.odds)
+def _odds(c: Candidate, first: Candidate) -> str:
+    odds = known(c.odds) - known(first.odds)
     if not np.isfinite(odds):
         return MISSING
-    return "0" if not c.effects else f"{odds:+.1f}".replace("-", "−") if abs(odds) < 100 else number(odds, 3)
+    return "0" if c is first else f"{odds:+.1f}".replace("-", "−") if abs(odds) < 100 else number(odds, 3)
 
 
 def _number(n: Number, *, owner: bool) -> Html:
