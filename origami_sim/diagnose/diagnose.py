@@ -25,7 +25,6 @@ from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
 from origami_sim.effects import get
 from origami_sim.fit.bursts import bursts
-from origami_sim.fit.discrepancy import of_recorder
 from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
@@ -275,7 +274,7 @@ def shown_by(p: Posterior, best: Fit, labels: Sequence[str]) -> list[tuple[Suspe
         for s in f.hypothesis.suspects:
             of.setdefault(s.label, (s, f))
     each = dict.fromkeys(one for label in labels for one in label.split(SEPARATOR))
-    return [of[one] for one in each if one in of and not of_recorder(one.partition(" at ")[0])]
+    return [of[one] for one in each if one in of]
 
 
 def possible_of(source: Source) -> Possible:

@@ -156,14 +156,16 @@ class Partial:
     """The partial residual of a named effect: what the found model lacks without it, and what it gives.
 
     Attributes:
-        label: of the effect. site: the coordinate that shows it best. curve: what is missing there without it, against
-            what shows it best. law: what the effect gives, in the bins of the curve.
+        label: of the effect. site: the coordinate, or component of a recording, that shows it best. curve: what is
+            missing there without it, against what shows it best. law: what the effect gives, in the bins of the curve.
+        unit: of a component; "": a generalised force is missing.
     """
 
     label: str
     site: str
     curve: Curve
     law: list[float]
+    unit: str = ""
 
 
 @dataclass

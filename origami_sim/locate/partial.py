@@ -1,7 +1,8 @@
 """Partial residuals: what a found model lacks without one of its effects, and what that effect gives.
 
 Both are moments along the recorded motion, averaged over the same bins (a component-plus-residual plot; Ezekiel 1924,
-Larsen & McCleary 1972). So each law can be seen through the data, whatever it acts on and whatever else was found.
+Larsen & McCleary 1972). So each law can be seen through the data, whatever it acts on and whatever else was found. Of
+errors of a recorder both are readings.
 """
 
 from collections.abc import Sequence
@@ -15,10 +16,11 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.infer.diagnosis import Curve, Partial, Place
-from origami_sim.locate.locate import Motion, dynamics, frozen, locate, loose, motion
+from origami_sim.locate.locate import Motion, binned, bins, dynamics, frozen, locate, loose, motion
 from origami_sim.locate.locate_curves import places
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
+from origami_sim.predict.channels import units_of
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.settling import levels, per_world
@@ -36,7 +38,11 @@ def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[P
     """
     out, fits = [], {id(f): f for _, f in shown}
     for f in fits.values():
-        mine = [s for s, by in shown if by is f]
+        misread = [s for s, by in shown if by is f and s.kind == "measurement"]
+        out += _misread(forward, f, misread) if misread else []
+        mine = [s for s, by in shown if by is f and s.kind != "measurement"]
+        if not mine:
+            continue
         whole, *without = _places(forward, f, [f.theta, *(_without(f, s) for s in mine)])
         for suspect, found in zip(mine, without, strict=True):
             pairs = [(a.site, _laws(a, b)) for a in found for b in whole if a.site == b.site]
@@ -44,6 +50,32 @@ def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[P
             curve, law = max(laws, key=_ordered, default=(None, np.zeros(0)))
             if curve is not None and np.any(law):
                 out.append(Partial(suspect.label, site, curve, law.tolist()))
+    return out
+
+
+def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Partial]:
+    """Of errors of a recorder what readings differ by from those that a fit predicts without each, and what it gives."""
+    thetas = [f.theta, *(_without(f, s) for s in suspects)]
+    local = np.repeat(f.local[None], len(thetas), axis=0)
+    whole, *without = map(np.concatenate, zip(*forward.shoot(f.hypothesis, thetas, local, f.blocks).values, strict=True))
+    blocks, units = [forward.blocks[b] for b in f.blocks], units_of(forward.recordings[0])
+    read, noise = np.concatenate([b.values for b in blocks]), blocks[0].noise
+    times = np.concatenate([forward.recordings[b.recording].times[b.first] + b.times for b in blocks])
+    rates = np.concatenate([np.gradient(b.values, b.times, axis=0) for b in blocks])
+    out = []
+    for suspect, less in zip(suspects, without, strict=True):
+        gives = whole - less
+        d = int(np.argmax(np.nansum(np.square(gives / noise), axis=0)))
+        against = [("reading", units[d], read[:, d]), ("rate", f"{units[d]}/s", rates[:, d]), ("time", "s", times)]
+        laws = []
+        for name, unit, x in against:
+            parts = bins(np.where(np.isnan(read[:, d]), np.nan, x))
+            left = read[:, d] - less[:, d]
+            curve = binned(name, unit, x, left, parts, [left[p].std() / np.sqrt(len(p)) for p in parts])
+            laws.append((curve, np.array([gives[p, d].mean() for p in parts])))
+        curve, law = max(laws, key=_ordered)
+        if np.any(law):
+            out.append(Partial(suspect.label, forward.components[d], curve, law.tolist(), units[d]))
     return out
 
 

@@ -102,6 +102,24 @@ def test_each_of_two_effects_is_seen_through_what_is_missing_without_it():
     assert (bends.site, bends.curve.against) == ("crease 0", "angle")
 
 
+def test_errors_of_a_recorder_are_seen_through_readings_without_each():
+    """A scale is a line, an eccentric disc a parabola; bars hold what was recorded around the law."""
+    recording = record(duration=4.0, rate=100)
+    for c in recording.channels.values():
+        c.values[:] = 1.05 * c.values + 0.05 * (np.cos(c.values) - 1.0)
+    forward, _ = arranged(subject(), prepared([recording], 200.0), Options())
+    base = nominal_fits(forward)[1]
+    every = {s.label: s for s in suspects(forward.model, forward.recordings, forward.drive, forward.parameters)}
+    pair = [every[f"{name} at the measurement"] for name in ("angle_scale", "angle_eccentricity")]
+    f = fit(forward, Hypothesis(tuple(pair)), base.weights, local=base.local)
+    shown = partials(forward, [(s, f) for s in pair])
+    for p, order, gives in zip(shown, (1, 2), (0.05, -0.025), strict=True):
+        assert (p.curve.against, p.unit) == ("reading", "rad")
+        assert np.polyfit(p.curve.x, p.law, order)[0] == pytest.approx(gives, rel=0.2)
+        off = (np.array(p.curve.mean) - p.law) / p.curve.error
+        assert np.sqrt(np.mean(off**2)) < 1.5 and np.abs(p.law).max() > 3 * np.max(p.curve.error)
+
+
 def acting_alone(recording):
     forward = arranged(subject(), prepared([recording], 200.0), Options())[0]
     base = nominal_fits(forward)[1]

@@ -36,14 +36,16 @@ def laws(d: Diagnosis) -> list[Html]:
 
 def _law(p: Partial) -> Html:
     """The partial residual of an effect, with what the effect gives."""
-    name, unit = moment_of(p.site)
+    name, unit = ("residual", p.unit) if p.unit else moment_of(p.site)
     curve, goes = replace(p.curve, error=_error(p.curve).tolist()), p.curve.against.replace("_", " ")
-    plot = against(p.site, curve, f"missing {name}", unit, height=TALL, also=p.law)
+    plot = against(p.site, curve, name if p.unit else f"missing {name}", unit, height=TALL, also=p.law)
     plot.line(array(curve.x), array(p.law), "law", title=title_of(p.label.partition(" at ")[0]))
     along = " along the motion" if curve.against == REVERSAL else ""
     said = f"The {name} at {p.site}{along} that the found model lacks without this effect, against the {goes} there."
+    if p.unit:
+        said = f"Recorded {p.site} minus what the found model predicts without this effect, against the {goes}."
     caption = element("figcaption", element("b", _capital(words_of(p.label))), element("span", said))
-    key = legend(("place", "recorded motion, ± 2 se"), ("law", "what it gives with its fitted numbers"))
+    key = legend(("place", "recorded, ± 2 se"), ("law", "what it gives with its fitted numbers"))
     return element("figure", caption, element("div", plot.html(), key), class_="law")
 
 
@@ -93,7 +95,7 @@ def _trace(d: Diagnosis, heading: str, without: str = "refitted", *, channel: st
     plot.level(0.0, "zero").line(x, before, without, breaks=t.breaks).line(x, after, "after", breaks=t.breaks)
     said = f"Recorded minus predicted {t.component} in {t.recording}, where it changes most. Shaded: noise, ± 2 sd."
     caption = element("figcaption", element("b", heading), element("span", said))
-    key = legend((without, "as given" if without == "before" else "without it"), ("after", "now"))
+    key = legend((without, "as given" if without == "before" else "refitted without effects"), ("after", "now"))
     return element("figure", caption, element("div", plot.html(), key), class_="law")
 
 
