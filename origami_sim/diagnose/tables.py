@@ -143,6 +143,7 @@ def traces(forward: Predictor, given: Fit, base: Fit, best: Fit, noise: np.ndarr
                     *(p[:, d].tolist() for p in predictions),
                     band=float(2 * left[d]),
                     breaks=breaks.tolist(),
+                    by_step=recording.by_step,
                 )
             )
     return out

@@ -1,4 +1,4 @@
-"""Bouc-Wen hysteresis: of a crease, independent of the rate, with a rounded loop."""
+"""Rate-independent hysteresis (Bouc-Wen): of a crease, with a rounded loop, as of friction that yields gradually."""
 
 import math
 

@@ -189,7 +189,10 @@ class Impulse:
 
 @dataclass
 class Trace:
-    """One component of one recording: times [s], recorded, predicted before, refitted and after; band is +-2 sd."""
+    """One component of one recording: times [s], recorded, predicted before, refitted and after; band is +-2 sd.
+
+    Where `by_step`, times count load steps.
+    """
 
     recording: str
     component: str
@@ -203,6 +206,12 @@ class Trace:
     band: float
     breaks: list[int]
     """Indices at which a segment with a start of its own begins."""
+    by_step: bool = False
+
+    @property
+    def clock(self) -> tuple[str, str]:
+        """What times count, and their unit."""
+        return ("load step", "1") if self.by_step else ("time", "s")
 
 
 @dataclass

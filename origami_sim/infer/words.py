@@ -12,7 +12,7 @@ from origami_sim.recording.units import quantity
 WHOLE = ("the measurement", "the drive", "the ground")
 """Sites that an effect's title says already."""
 
-PEOPLE = ("Bouc", "Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
+PEOPLE = ("Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
 """Names with which titles of effects begin; they keep their capital."""
 
 

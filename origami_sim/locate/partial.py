@@ -57,16 +57,19 @@ def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Pa
     """Of errors of a recorder what readings differ by from those that a fit predicts without each, and what it gives."""
     thetas = [f.theta, *(_without(f, s) for s in suspects)]
     local = np.repeat(f.local[None], len(thetas), axis=0)
-    whole, *without = map(np.concatenate, zip(*forward.shoot(f.hypothesis, thetas, local, f.blocks).values, strict=True))
+    whole, *without = map(
+        np.concatenate, zip(*forward.shoot(f.hypothesis, thetas, local, f.blocks).values, strict=True)
+    )
     blocks, units = [forward.blocks[b] for b in f.blocks], units_of(forward.recordings[0])
     read, noise = np.concatenate([b.values for b in blocks]), blocks[0].noise
     times = np.concatenate([forward.recordings[b.recording].times[b.first] + b.times for b in blocks])
     rates = np.concatenate([np.gradient(b.values, b.times, axis=0) for b in blocks])
+    clock = ("load step", "1") if all(r.by_step for r in forward.recordings) else ("time", "s")
     out = []
     for suspect, less in zip(suspects, without, strict=True):
         gives = whole - less
         d = int(np.argmax(np.nansum(np.square(gives / noise), axis=0)))
-        against = [("reading", units[d], read[:, d]), ("rate", f"{units[d]}/s", rates[:, d]), ("time", "s", times)]
+        against = [("reading", units[d], read[:, d]), ("rate", f"{units[d]}/s", rates[:, d]), (*clock, times)]
         laws = []
         for name, unit, x in against:
             parts = bins(np.where(np.isnan(read[:, d]), np.nan, x))

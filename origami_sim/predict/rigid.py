@@ -54,7 +54,9 @@ times the time, by twice as much, and a scale of all moments looks known to 0.85
 Laws with memory turn over within a step, so that predictions are rough in their parameters by a few such errors, and
 fits end where they are rough: by the yield angle of a swing that rubs (11,001 frames, noise of 9 urad) derivatives are
 rough by 15 % with forty times as much, and fits of the same effects end within 5.5 of log evidence for 2.3. A tenth
-takes 1.05 times the time of a diagnosis of the double pendulum chain, and 1.4 times that of a box in the battery.
+takes 1.05 times the time of a diagnosis of the double pendulum chain, and 1.4 times that of a box in the battery. Much
+finer is no better, as worlds then part in how many steps they take: with a thirtieth, the scale of all moments of
+another box looked known to 0.15 % where priors alone tell it, to 1.5 %.
 """
 
 TOUCHING = 1e-7

@@ -81,11 +81,11 @@ def _trace(d: Diagnosis, heading: str, without: str = "refitted", *, channel: st
     x, y = array(t.times), array(t.recorded)
     before, after = y - array(getattr(t, without)), y - array(t.after)
     plot = Plot(
-        f"residual of {t.component} of {t.recording} in time",
+        f"residual of {t.component} of {t.recording} by {t.clock[0]}",
         span_of(x, margin=0.0),
         span_of(before, after, zero=True),
-        x_name="time",
-        x_unit="s",
+        x_name=t.clock[0],
+        x_unit=t.clock[1],
         y_name="residual",
         y_unit=t.unit,
         height=TALL,

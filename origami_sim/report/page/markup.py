@@ -65,7 +65,12 @@ def scaled_unit(value: float, unit: str) -> tuple[float, str]:
 
 def pretty(unit: str) -> str:
     """A unit in print: m², s⁻¹; nothing for pure numbers."""
-    return "" if unit in ("1", "-") else re.sub(r"\^(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), unit)
+    return "" if unit in ("1", "-") else raised(unit)
+
+
+def raised(text: str) -> str:
+    """Text with powers as superscripts."""
+    return re.sub(r"\^(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), text)
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -49,7 +49,7 @@ def overlay(t: Trace, onset: float) -> Html:
     y = {kind: array(getattr(t, kind)) for kind in ("recorded", "before", "refitted", "after")}
     along = span_of(x, margin=0.0)
     top = Plot(
-        f"{t.component} of {t.recording} in time: recorded and predicted",
+        f"{t.component} of {t.recording} by {t.clock[0]}: recorded and predicted",
         along,
         span_of(*y.values()),
         y_name=t.component,
@@ -58,11 +58,11 @@ def overlay(t: Trace, onset: float) -> Html:
         bare=True,
     )
     low = Plot(
-        f"residual of {t.component} of {t.recording} in time",
+        f"residual of {t.component} of {t.recording} by {t.clock[0]}",
         along,
         span_of(y["recorded"] - y["before"], y["recorded"] - y["after"], [2 * known(t.noise, 0.0)], symmetric=True),
-        x_name="time",
-        x_unit="s",
+        x_name=t.clock[0],
+        x_unit=t.clock[1],
         y_name="residual",
         y_unit=t.unit,
         height=90,

@@ -6,6 +6,7 @@ from functools import cache
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.hypotheses.hypothesis import SEPARATOR
 from origami_sim.infer.words import WHOLE, title
+from origami_sim.report.page.markup import raised
 
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
 _PLAIN_OWNERS = ("inertia", "setting")
@@ -39,7 +40,7 @@ def worded(text: str) -> str:
 
     text = _NUMBER.sub(said, text)
     text = _names().sub(lambda m: title_of(m[0]), text)
-    return text.replace("+-", "±")
+    return raised(text.replace("+-", "±"))
 
 
 @cache
