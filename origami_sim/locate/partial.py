@@ -54,12 +54,10 @@ def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[P
 
 
 def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Partial]:
-    """Of errors of a recorder what readings differ by from those that a fit predicts without each, and what it gives."""
+    """Of errors of a recorder what readings differ by from those predicted without each, and what that gives."""
     thetas = [f.theta, *(_without(f, s) for s in suspects)]
-    local = np.repeat(f.local[None], len(thetas), axis=0)
-    whole, *without = map(
-        np.concatenate, zip(*forward.shoot(f.hypothesis, thetas, local, f.blocks).values, strict=True)
-    )
+    shot = forward.shoot(f.hypothesis, thetas, np.repeat(f.local[None], len(thetas), axis=0), f.blocks)
+    whole, *without = (np.concatenate(each) for each in zip(*shot.values, strict=True))
     blocks, units = [forward.blocks[b] for b in f.blocks], units_of(forward.recordings[0])
     read, noise = np.concatenate([b.values for b in blocks]), blocks[0].noise
     times = np.concatenate([forward.recordings[b.recording].times[b.first] + b.times for b in blocks])
