@@ -103,17 +103,21 @@ def screen(
     base: Fit,
     weights: Weights,
     *,
+    sized: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> list[Signature]:
     """Signatures of all suspects about a fit.
 
     What all creases (or panels) would do together is the sum of what each would do, so that only single ones are
     simulated.
+
+    Args:
+        sized: whether the scales of strengths are known to suit.
     """
     single = [one for s in suspects if not _together(s, suspects) for one in along_each_axis(s)]
     groups = [single[k : k + CHUNK] for k in range(0, len(single), CHUNK)]
     goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
-    jobs = [partial(_signatures, forward, group, base, weights, goal) for group in groups]
+    jobs = [partial(_signatures, forward, group, base, weights, goal, sized) for group in groups]
     each = side_by_side(jobs, forward.threads, progress)
     assert base.linear is not None
     ends = np.cumsum([r.count for r in base.linear.rows])[:-1]
@@ -196,7 +200,7 @@ def _together(s: Suspect, suspects: Sequence[Suspect]) -> bool:
 
 
 def _signatures(
-    forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights, goal: float
+    forward: Predictor, group: Sequence[Suspect], base: Fit, weights: Weights, goal: float, sized: bool
 ) -> list[tuple[Suspect, np.ndarray, float]]:
     """What suspects change in all rows (R,) by their first strengths, and how large these are.
 
@@ -208,7 +212,7 @@ def _signatures(
     def changes(mine: Sequence[int], at: np.ndarray, blocks: Sequence[int]) -> list[list[np.ndarray]]:
         return _changes(forward, [group[k] for k in mine], at[mine], base, weights, blocks)
 
-    if some := _some(forward, base.blocks):
+    if not sized and (some := _some(forward, base.blocks)):
         parts, share = changes(range(len(group)), size, some), np.sqrt(len(some) / len(base.blocks))
         size = _suiting(forward, base, group, size, parts, share * goal, least)
     parts = changes(range(len(group)), size, base.blocks)

@@ -101,7 +101,7 @@ def beside(
     first = {s.site: s for s in coefficients[::-1]}
     size = {s.suspect.site: s.size for s in screen(forward, list(first.values()), f, f.weights)}
     coefficients = [scaled(s, size[s.site]) for s in coefficients]
-    found = [s for s in screen(forward, coefficients, f, f.weights) if s.parts and not s.status]
+    found = [s for s in screen(forward, coefficients, f, f.weights, sized=True) if s.parts and not s.status]
     sites: dict[str, list[Signature]] = {}
     for s in found:
         sites.setdefault(s.suspect.site, []).append(s)
