@@ -28,7 +28,7 @@ from origami_sim.recording import Recording  # noqa: E402
 from tests.diagnose.strips import record, subject  # noqa: E402
 
 FOLDERS = ("hypotheses", "fit", "predict", "infer", "diagnose")
-LEFT_OUT = ("fit/hyper.py", "infer/diagnosis.py", "diagnose/baselines.py", "diagnose/closed_loop.py",
+LEFT_OUT = ("fit/hyper.py", "report/diagnosis.py", "diagnose/baselines.py", "diagnose/closed_loop.py",
             "diagnose/command.py", "diagnose/experiment.py", "diagnose/inertia.py", "diagnose/menu.py",
             "diagnose/observed.py", "diagnose/overlay.py", "diagnose/prepare.py", "diagnose/tables.py")  # fmt: skip
 """Varied elsewhere, asked of other recordings (closed loops, slow motions), or made after the verdict."""

@@ -9,7 +9,7 @@ UNITS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3},
-    "moment": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
+    "moment": {"N m": 1.0, "mN m": 1e-3, "uN m": 1e-6, "N mm": 1e-3},
     "flux density": {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "G": 1e-4},
     "flux density gradient": {"T/m": 1.0, "mT/m": 1e-3, "mT/mm": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "kV": 1e3},
@@ -32,7 +32,7 @@ UNITS: dict[str, dict[str, float]] = {
     "areal density": {"kg/m^2": 1.0, "g/m^2": 1e-3, "g/cm^2": 10.0},
     "stiffness": {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3},
     "crease stiffness": {"N m/rad": 1.0, "mN m/rad": 1e-3, "uN m/rad": 1e-6, "N mm/rad": 1e-3},
-    "crease viscosity": {"N m s/rad": 1.0, "mN m s/rad": 1e-3, "uN m s/rad": 1e-6},
+    "crease viscosity": {"N m s/rad": 1.0, "mN m s/rad": 1e-3, "uN m s/rad": 1e-6, "N mm s/rad": 1e-3},
     "viscosity": {"N s/m": 1.0, "mN s/m": 1e-3},
 }
 """Units by dimension with their factor to SI; the first of each dimension is the SI unit."""

@@ -11,7 +11,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.options import Options
 from origami_sim.hypotheses.hypothesis import Free, Subject, factor
 from origami_sim.hypotheses.subject import subject_of
-from origami_sim.infer.diagnosis import EXIT, VERDICTS, Diagnosis
+from origami_sim.report.diagnosis import EXIT, VERDICTS, Diagnosis
 
 __all__ = ["EXIT", "VERDICTS", "Diagnosis", "Free", "Keep", "Options", "Subject", "diagnose", "factor", "subject_of"]
 

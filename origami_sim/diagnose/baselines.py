@@ -17,8 +17,8 @@ from origami_sim.fit.held_out import HeldOut, folds
 from origami_sim.fit.least_squares import Fit, Weights, fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import NOMINAL, Free, Hypothesis, Subject
-from origami_sim.infer.diagnosis import Baseline
 from origami_sim.locate.locate import motion
+from origami_sim.report.diagnosis import Baseline
 from origami_sim.threads import shared
 
 KNOTS = 9

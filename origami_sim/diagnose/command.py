@@ -34,10 +34,10 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Free, Subject
 from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads
-from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page import geometry_of, write_report
 from origami_sim.report.page.next_experiment import finding
 from origami_sim.report.patch import patched, write_patch

@@ -33,7 +33,6 @@ from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
 from origami_sim.hypotheses.subject import Source, subject_of
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
-from origami_sim.infer.diagnosis import Diagnosis
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search
@@ -47,6 +46,7 @@ from origami_sim.locate.where import located
 from origami_sim.predict.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import in_step, leads, shared
 
 

@@ -23,10 +23,10 @@ from origami_sim.fit.least_squares import Fit, changed, first_steps, links, star
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
-from origami_sim.infer.diagnosis import Experiment
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.recording.possible import Possible
+from origami_sim.report.diagnosis import Experiment
 
 LEADING, LEAST = 5, 0.01
 """Explanations that are looked at, and the probability of the least of them; with more, what is told of the leaders

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from origami_sim.diagnose.options import Report
 from origami_sim.errors import InputError
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import shared
 
 T = TypeVar("T")

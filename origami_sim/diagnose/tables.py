@@ -5,13 +5,13 @@ import numpy as np
 from origami_sim.fit.held_out import HeldOut, folds
 from origami_sim.fit.least_squares import OWED, Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.verdict import Judgement, log_odds
 from origami_sim.infer.words import kind
 from origami_sim.predict.channels import units_of
+from origami_sim.report.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 
 
 def table(

@@ -19,6 +19,7 @@ from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere
 from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.columns import Columns
@@ -30,7 +31,6 @@ from origami_sim.infer.proposals import UNFITTED, in_place_of, named, proposed
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
-from origami_sim.predict.spectra import without_idle
 
 FITS = 16
 """Sets that are fitted at most, and as many if others are more probable then: without a fit none can be named."""

@@ -84,7 +84,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     chance = considered(p)
     classes = by_effects(p, chance)
     top = max(classes, key=lambda c: classes[c])
-    lead, beside = surely(classes)
+    lead, beside = surely(classes, lambda lead, each: indistinct(p, lead, each))
     if not any(p.effects(k) >= lead for k in p.nodes):  # of what was never fitted no number could be said
         lead, beside = frozenset(), []
     best = best_of(p, chance, top if beside else lead or top)
@@ -220,7 +220,7 @@ def undecided(
     Args:
         described: what surely acts, with sites and strengths, in words.
     """
-    likely = [c for c in credible[:4] if chances[c] > 1.0 - CREDIBLE] or credible[:1]
+    likely = [c for c in credible if chances[c] > 1.0 - CREDIBLE] or credible[:1]
     each = [f"{_name(c - sure)} (p = {chances[c]:.2f})" for c in likely]
     rest = len(credible) - len(each)
     more = f", and {rest} that {'are' if rest > 1 else 'is'} less probable" if rest else ""
@@ -318,10 +318,17 @@ def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
     return out
 
 
-def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
+def surely(
+    classes: dict[frozenset[str], float],
+    grouped: Callable[[frozenset[str], list[str]], list[list[str]]] = lambda lead, each: [[e] for e in each],
+) -> tuple[frozenset[str], list[frozenset[str]]]:
     """Effects that act together with at least `ALONE`; and with what else, if one of a few surely acts besides.
 
-    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them.
+    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them; of those
+    that nothing tells apart beside the first, all.
+
+    Args:
+        grouped: those of some effects together that are not told apart, see `indistinct`.
     """
     marginal = of_each(classes)
     lead: frozenset[str] = frozenset()
@@ -332,11 +339,39 @@ def surely(classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[f
         lead = larger
     more = {c - lead: v for c, v in classes.items() if c >= lead}
     chance = of_each(more)
-    likely = sorted(chance, key=lambda e: (-chance[e], e))[:LISTED]
-    for n in range(2, len(likely) + 1 if lead else 1):
-        if sum(v for c, v in more.items() if c & set(likely[:n])) >= ALONE:
-            return lead, [lead | {e} for e in likely[:n]]
+    groups = grouped(lead, sorted(chance, key=lambda e: (-chance[e], e))) if lead else []
+    for n in range(1, min(LISTED, len(groups)) + 1):
+        likely = [e for group in groups[:n] for e in group]
+        if len(likely) > 1 and sum(v for c, v in more.items() if c & set(likely)) >= ALONE:
+            return lead, [lead | {e} for e in likely]
     return lead, []
+
+
+def indistinct(p: Posterior, lead: frozenset[str], effects: list[str]) -> list[list[str]]:
+    """Groups of effects that recordings do not tell apart beside others: their fits predict the same.
+
+    All data together see their predictions differ by less than one standard deviation. Of what was not fitted nothing
+    is known.
+    """
+    groups: list[list[str]] = []
+    best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
+    for effect in effects:
+        one = best.get(lead | {effect})
+        for group in groups:
+            other = best.get(lead | {group[0]})
+            if one is not None and other is not None and apart(one.fit, other.fit) < 1.0:
+                group.append(effect)
+                break
+        else:
+            groups.append([effect])
+    return groups
+
+
+def apart(one: Fit, other: Fit) -> float:
+    """Standard deviations of all data together by which predictions of two fits differ."""
+    assert one.weights is not None
+    gaps = [(a - b) / one.weights.deviation for a, b in zip(one.residuals, other.residuals, strict=True)]
+    return float(np.sqrt(sum(np.nansum(np.square(g)) for g in gaps)))
 
 
 def holding(classes: dict[frozenset[str], float], effects: frozenset[str]) -> float:

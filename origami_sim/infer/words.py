@@ -48,12 +48,13 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
     ends = dict(zip((id(n) for n in f.free), zip(*f.intervals(), strict=True), strict=True))
     for s in every:
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
-        nodes = len(n.entities or ()) if n.unit == "kg" and get(s.effect).family == "node" else 1
+        mass = n.unit == "kg" and get(s.effect).family == "node"
+        nodes = len(n.entities) if mass and n.entities else 1
         t, d = nodes * value[id(n)], nodes * deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
         low, high = (said(nodes * v, n.unit, digits) for v in ends[id(n)])
         what = f"{'more' if t > 0 else 'less'} {title(s.effect)} than stated" if s.more else title(s.effect)
-        strength = f"{_named(n, s)} {said(t, n.unit, digits)}"
+        strength = f"{_named(n, s)} {said(t, n.unit, digits)}{' in all' if nodes > 1 else ' at each node' if mass and not n.entities else ''}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
         shape = [n for n in s.free if n not in s.strengths and not bound[id(n)]] if len(every) == 1 else []

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import REVERSAL, Acting, Curve
 from origami_sim.locate.locate import Motion, against, bins, way
+from origami_sim.locate.places import REVERSAL, Acting, Curve
 from origami_sim.model.articulation import Articulation
 
 SAME = 0.999

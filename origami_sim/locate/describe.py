@@ -8,7 +8,7 @@ from origami_sim.effects import get
 from origami_sim.effects.crease_polynomial import EFFECT as MOMENT
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.diagnosis import Acting, Curve, Place
+from origami_sim.locate.places import Acting, Curve, Place
 from origami_sim.locate.where import located
 
 NEAR = 1.25

@@ -9,8 +9,8 @@ import numpy as np
 
 from origami_sim.effects import CONTACTS, get
 from origami_sim.fit.least_squares import Fit
-from origami_sim.infer.diagnosis import Impulse
 from origami_sim.locate.locate import dynamics, loose, touching
+from origami_sim.locate.places import Impulse
 from origami_sim.model.distort import distorted
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.predict.track import Track, track

@@ -15,8 +15,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from origami_sim.drive import Drive, Signal
 from origami_sim.fit.least_squares import Fit
-from origami_sim.infer.diagnosis import REVERSAL, Curve, Place
-from origami_sim.model import Model, Parameters, State
+from origami_sim.locate.places import REVERSAL, Curve, Place
+from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Pose
 from origami_sim.model.distort import distorted
 from origami_sim.predict.curves import PASSIVE
@@ -158,7 +158,7 @@ def dynamics(forward: Rollouts, model: Model, parameters: Parameters, drive: Dri
     state = State.at_rest(model, x.shape[1], position=x)
     state.v[:] = np.einsum("mnwa,mw->nwa", jacobian, rate)
     batch = Batch(model, parameters, drive, state, threads=forward.threads)
-    mass = parameters["inertia", "mass"][:, :, None]
+    mass = node_mass(model, parameters)[:, :, None]
     force = batch.total_force(0.0) - mass * (ahead - 2 * x + behind) / h**2
     inertia = np.einsum("mnwa,nwa,knwa->mkw", jacobian, np.broadcast_to(mass, x.shape), jacobian)
     gaps = batch.evaluate(0.0).gaps if len(model.contacts) else np.zeros((0, x.shape[1]))

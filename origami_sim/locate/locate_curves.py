@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Curve, Place
 from origami_sim.locate.locate import BINS, binned
+from origami_sim.locate.places import Curve, Place
 from origami_sim.predict.curves import Balance
 
 

@@ -15,9 +15,9 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import Suspect
-from origami_sim.infer.diagnosis import Curve, Partial, Place
 from origami_sim.locate.locate import Motion, binned, bins, dynamics, frozen, locate, loose, motion
 from origami_sim.locate.locate_curves import places
+from origami_sim.locate.places import Curve, Partial, Place
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import units_of

@@ -2,10 +2,10 @@
 
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.diagnosis import Acting, Place
 from origami_sim.locate.acting import acting
 from origami_sim.locate.locate import locate, motions_of
 from origami_sim.locate.locate_curves import places
+from origami_sim.locate.places import Acting, Place
 
 
 def located(forward: Predictor, f: Fit) -> tuple[list[Place], list[Acting]]:

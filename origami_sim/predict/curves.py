@@ -13,6 +13,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
+from origami_sim.hypotheses.spectra import with_spectra
 from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
@@ -20,7 +21,6 @@ from origami_sim.observation.observe import Poses, read_channel
 from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous
-from origami_sim.predict.spectra import with_spectra
 from origami_sim.predict.thresholds import within_reach
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions

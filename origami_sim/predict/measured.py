@@ -66,17 +66,18 @@ def measured(
     times: np.ndarray,
     shown: np.ndarray,
     *,
-    rested: bool | None,
+    rested: bool | np.ndarray | None,
 ) -> np.ndarray:
     """Channels [n, D, W] as distorted measurements show them; what is `shown` first (K,) is the grid's start.
 
     Args:
         distort: effects of the measurement. channels: [F, D + k, W] on the grid (F,). times: (n,) of frames [s].
-        rested: whether the motion was at rest before the grid's start; None: the grid begins with the times of frames,
-            and they are read at no others.
+        rested: whether the motion was at rest before the grid's start, of all worlds or of each (W,); None: the grid
+            begins with the times of frames, and they are read at no others.
     """
     worlds = channels.shape[2]
     shown = np.repeat(shown, worlds // len(shown))
+    still = None if rested is None else np.broadcast_to(rested, worlds)
     at = np.repeat(times[:, None], worlds, axis=1)
     distort = sorted(distort, key=lambda name: not get(name).on_body)
     parts, row, deep = [], 0, len(angle_mask(recording))
@@ -97,7 +98,7 @@ def measured(
             mine = np.flatnonzero(kind.ravel() == k)
             laws = list(compress(given.items(), on))
             seen = [*rows, *turned] if any(get(name).on_body for name, _ in laws) else rows
-            reader = _reader(grid, channels[:, seen][:, :, mine], shown[mine], rested=rested)
+            reader = _reader(grid, channels[:, seen][:, :, mine], shown[mine], None if still is None else still[mine])
             for name, by in laws:
                 reader = _wrapped(get(name), reader, {n: v[mine] for n, v in by.items()})
             part[:, :, mine] = reader(at[:, mine])[:, :width]
@@ -131,11 +132,11 @@ def _wrapped(effect, inner, given):
     return lambda t: effect.apply(inner, t, **given)
 
 
-def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: bool | None):
+def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, rested: np.ndarray | None):
     """values [F, d, W] as a function of times [n, W], of which `shown` (W,) is the grid's start.
 
-    Before it the motion rested, or went on as it began, with its rate and acceleration there; many worlds may share a
-    column. Of None, see `measured`.
+    Before it the motion rested (W,), or went on as it began, with its rate and acceleration there; many worlds may
+    share a column. Of None, see `measured`.
     """
     if rested is None:
         return lambda times: values[: len(times)]
@@ -153,12 +154,12 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, *, rested: 
             inside = np.clip(columns[:, c], grid[0], grid[-1])
             out[:, :, mine] = part(inside)
             outside = columns[:, c] - inside
-            late = outside > 0
-            beyond = np.flatnonzero(outside if not rested else late)
-            if len(beyond):  # often thousands of times: only the rate and the bend of both ends are asked for
-                rate, bend = (part(grid[[0, -1]], order)[late[beyond].astype(int)] for order in (1, 2))
-                by = outside[beyond, None, None]
-                out[np.ix_(beyond, np.arange(out.shape[1]), mine)] += by * rate + 0.5 * by**2 * bend
+            for end, which, some in ((0, outside < 0, ~rested[mine]), (-1, outside > 0, np.ones(len(mine), bool))):
+                beyond = np.flatnonzero(which)
+                if len(beyond) and np.any(some):  # often thousands of times: only the end's rate and bend are asked for
+                    rate, bend = (part(grid[end], order)[:, some] for order in (1, 2))
+                    by = outside[beyond, None, None]
+                    out[np.ix_(beyond, np.arange(out.shape[1]), mine[some])] += by * rate + 0.5 * by**2 * bend
         return out
 
     return at

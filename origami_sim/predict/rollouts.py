@@ -242,7 +242,8 @@ class Rollouts(Worlds, ABC):
         grid = np.arange(len(raw)) * step
         if distort:
             parameters = Parameters.join([p for _, p in worlds], repeat=count)
-            rested = None if as_filmed else self.start != "fit"
+            began = recording.start is not None and recording.start.state != "moving"  # at rest
+            rested = None if as_filmed else np.tile([self.start != "fit" or (began and not b.first) for b in blocks], k)
             values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
         elif as_filmed:
             values = plain[: len(times)]

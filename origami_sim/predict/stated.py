@@ -10,14 +10,15 @@ from origami_sim.fit.predictor import Block
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
+from origami_sim.predict.track import coordinates
 from origami_sim.predict.weight import weighed
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.solve.statics.equilibria import equilibrium
 
 AT_REST = 1e-3
-"""Standard deviation of rates that are stated to be zero, as a part of usual rates, where no other is stated.
+"""Standard deviation of rates of a device at rest, as a part of usual rates, where no other is stated.
 
-A hand that lets go moves by less than a thousandth of what follows; ten times as much frees the start again.
+What is left to itself moves by less than a thousandth of what follows; ten times as much frees the start again.
 """
 
 RESTS = 0.01
@@ -44,10 +45,12 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
     arm, m = forward.articulation, forward.articulation.size
     sidecar = recording.metadata.get("sidecar")
     pose, known = block.pose, block.known.copy()
-    still = AT_REST * np.maximum(usual, 1e-9)
+    still, let_go = AT_REST * np.maximum(usual, 1e-9), np.zeros(m)
     if start.rate_sd is not None:
         still = np.full(m, start.rate_sd)
-    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read)
+    elif start.state == "released":
+        let_go = _in_a_frame(forward, block.recording, usual)
+    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read) + 2.0 * let_go
     if np.any(far):
         worst = arm.names()[int(np.argmax(np.abs(block.rates) * far))]
         raise InputError(
@@ -57,7 +60,7 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
             value=start.state,
             allowed="'moving', or the frames from the release on",
         )
-    known[m:] = still
+    known[m:] = np.hypot(still, let_go)
     angles = pose.angles.copy()
     first = m - len(arm.creases)
     if start.state == "released":
@@ -83,6 +86,17 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
             _agrees(angles[joint, 0], value, np.hypot(sd[joint], shown[first + joint]), name, sidecar)
         angles[:, 0], known[first : first + len(rest)] = rest, sd
     return replace(block, pose=replace(pose, angles=angles), rates=np.zeros(m), known=known)
+
+
+def _in_a_frame(forward: Worlds, r: int, usual: np.ndarray) -> np.ndarray:
+    """Rates (m,) that a device gains in a frame after a hand let it go: at which instant is not known better.
+
+    With usual rates u and a spread q of a coordinate, accelerations are about u^2 / q.
+    """
+    found, times = coordinates(forward, r), forward.recordings[r].times
+    if found is None:
+        return np.zeros_like(usual)
+    return usual**2 / np.maximum(found[0].std(axis=1), 1e-9) * float(np.median(np.diff(times)))
 
 
 def _agrees(read: float, value: float, sd: float, crease: str, sidecar: object) -> None:

@@ -27,9 +27,9 @@ from origami_sim.effects import CATALOGUE, Parameter, get
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect, apply, silent
-from origami_sim.infer.diagnosis import Candidate, Diagnosis
 from origami_sim.model import BODY, Model, Parameters
 from origami_sim.model.entities import OWNERS, WAYS, located
+from origami_sim.report.diagnosis import Candidate, Diagnosis
 
 _WORDS = ("site", "source", "at")
 _SWITCHES = ("more", "times")

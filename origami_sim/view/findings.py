@@ -12,8 +12,8 @@ from origami_sim.view.summary import card, counted, picture_of
 if TYPE_CHECKING:
     from origami_sim.explore.sweep import Sweep
     from origami_sim.folding import Folding
-    from origami_sim.infer.diagnosis import Diagnosis
     from origami_sim.observation.compare import Comparison
+    from origami_sim.report.diagnosis import Diagnosis
 
 DRAWN = 4
 """Components of a recording in the plot of a diagnosis; the report has all."""

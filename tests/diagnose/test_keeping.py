@@ -15,7 +15,7 @@ from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, command
 from origami_sim.diagnose.later import Part, add
 from origami_sim.errors import InputError
-from origami_sim.infer import diagnosis
+from origami_sim.report import diagnosis
 
 
 @pytest.fixture(scope="module")

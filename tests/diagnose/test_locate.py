@@ -15,10 +15,10 @@ from origami_sim.fit.least_squares import carried_on, fit
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
-from origami_sim.infer.diagnosis import REVERSAL
 from origami_sim.locate.acting import _actions, acting
 from origami_sim.locate.locate import frozen, locate, motions_of, phase, reversals, since
 from origami_sim.locate.partial import partials
+from origami_sim.locate.places import REVERSAL
 from origami_sim.model import dihedral_angles
 from origami_sim.model.articulation import Articulation
 from origami_sim.scenes import box

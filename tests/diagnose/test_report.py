@@ -15,23 +15,19 @@ from origami_sim.design.build import Sheet
 from origami_sim.effects import CATALOGUE
 from origami_sim.errors import InputError
 from origami_sim.infer.budget import Share
-from origami_sim.infer.diagnosis import (
+from origami_sim.locate.places import Acting, Curve, Impulse, Partial, Place
+from origami_sim.pattern import grid
+from origami_sim.report.diagnosis import (
     VERDICTS,
-    Acting,
     Baseline,
     Candidate,
     Correlation,
-    Curve,
     Diagnosis,
     Experiment,
-    Impulse,
     Number,
-    Partial,
-    Place,
     Suspected,
     Trace,
 )
-from origami_sim.pattern import grid
 from origami_sim.report.page import geometry_of, page, read_report, write_report
 from origami_sim.report.page.markup import amount, element, interval, percent, plus_minus
 from origami_sim.report.page.plots import POINTS, Plot, ticks

@@ -12,9 +12,9 @@ from origami_sim.diagnose.arrange import arranged, slowly
 from origami_sim.diagnose.inertia import inertia
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.spectra import with_spectra, without_idle
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.predict.slow import Slow
-from origami_sim.predict.spectra import with_spectra, without_idle
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.recording.recording import DriveChannel
 from origami_sim.recording.stated import Start

@@ -13,12 +13,12 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share, shapley
-from origami_sim.infer.diagnosis import Acting, Curve, Place
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.verdict import credible, decide, in_all, undecided
 from origami_sim.infer.words import joined, said, say, title
 from origami_sim.locate.describe import described
+from origami_sim.locate.places import Acting, Curve, Place
 
 
 def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():
@@ -177,6 +177,25 @@ def test_what_acts_in_every_explanation_is_said_once():
     assert "dry friction" not in text and text.count(" with ") == 1
 
 
+@pytest.mark.parametrize(("apart", "listed"), [(0.3, 5), (6.0, 0)])
+def test_of_effects_that_nothing_tells_apart_all_are_listed(apart, listed):
+    """Five ways to be late beside a friction: predictions differ by less than all data together see, or by more."""
+    late = ("clock_delay", "drive_delay", "exposure", "field_lag", "tracker_lag")
+    logs = {("crease_friction", e): -0.3 * n for n, e in enumerate(late)}
+    p = posterior({**logs, ("crease_friction",): -90.0, (): -99.0})
+    cells = np.where(HYPER.clean, 0.0, -np.inf)
+    for n, effects in enumerate(logs):
+        key = frozenset(k for k in range(len(p.signatures)) if p.suspect(k).effect in effects)
+        left = [np.full((4, 1), 0.5 * apart * n / (len(late) - 1))]
+        own = Hypothesis(tuple(p.suspect(k) for k in sorted(key)))
+        fit = cast(Fit, SimpleNamespace(residuals=left, weights=Weights(np.ones(1)), hypothesis=own))
+        p.nodes[key] = Node(key, fit, cells, [], [], [None] * len(HYPER.cells))
+    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert decided.lead == {"crease_friction"} and decided.word == ("TIE" if listed else "MECHANISM")
+    assert not listed or decided.credible == [frozenset(e) for e in logs]
+    assert decided.probability > 0.7
+
+
 def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
     """Fitted sets of effects with these log posteriors, without a discrepancy."""
     names = sorted({e for effects in logs for e in effects})
@@ -225,7 +244,9 @@ def test_a_mass_at_several_nodes_is_said_as_their_sum():
     added = Free("added_mass", "added", "kg", 0.0, 1e-5, entities=(6, 7))
     values, sd = np.array([77e-6]), np.array([4e-6])
     one = Suspect("added_mass", "shank", "node", (added,), (6, 7))
-    assert "added 150 mg, 95 %: 140 mg to 170 mg" in say(fitted([one], values, sd, (values - 2 * sd, values + 2 * sd)))
+    assert "added 150 mg in all, 95 %: 140 mg to 170 mg" in say(
+        fitted([one], values, sd, (values - 2 * sd, values + 2 * sd))
+    )
 
 
 @pytest.mark.parametrize("held", [False, True])

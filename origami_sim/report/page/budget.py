@@ -3,7 +3,7 @@
 import numpy as np
 
 from origami_sim.infer.budget import Share
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, element, percent
 from origami_sim.report.page.measures import known
 from origami_sim.report.page.pieces import nothing, quiet

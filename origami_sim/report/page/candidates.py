@@ -3,7 +3,7 @@
 import numpy as np
 
 from origami_sim.hypotheses.hypothesis import SEPARATOR
-from origami_sim.infer.diagnosis import Candidate, Diagnosis, Number
+from origami_sim.report.diagnosis import Candidate, Diagnosis, Number
 from origami_sim.report.page.markup import MISSING, Html, amount, element, interval, number, times
 from origami_sim.report.page.measures import has_noise, known, multiples
 from origami_sim.report.page.pieces import bar, figure, fold, nothing, quiet, row, table

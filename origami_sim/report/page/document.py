@@ -10,7 +10,7 @@ from string import Template
 
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page import (
     budget,
     candidates,

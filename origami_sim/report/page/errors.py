@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import MISSING, Html, amount, element, number, times
 from origami_sim.report.page.measures import each_multiple, has_noise, multiples, padded
 from origami_sim.report.page.pieces import figure, quiet, row, table

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, element, number, percent
 from origami_sim.report.page.measures import has_noise, known, multiples
 from origami_sim.report.page.wording import worded

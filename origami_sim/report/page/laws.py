@@ -7,7 +7,8 @@ import numpy as np
 from origami_sim.effects import CATALOGUE
 from origami_sim.fit.discrepancy import of_recorder
 from origami_sim.hypotheses.hypothesis import SEPARATOR
-from origami_sim.infer.diagnosis import REVERSAL, Curve, Diagnosis, Partial, Trace
+from origami_sim.locate.places import REVERSAL, Curve, Partial
+from origami_sim.report.diagnosis import Diagnosis, Trace
 from origami_sim.report.page.markup import Html, element
 from origami_sim.report.page.measures import array
 from origami_sim.report.page.pieces import against, legend, moment_of

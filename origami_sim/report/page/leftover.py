@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import element, percent
 from origami_sim.report.page.measures import array, limit, outside
 from origami_sim.report.page.pieces import legend, nothing

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, element, percent
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.plots import colour

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Correlation, Diagnosis, Trace
+from origami_sim.report.diagnosis import Correlation, Diagnosis, Trace
 
 
 def array(values) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What to record next, so that the explanations part."""
 
-from origami_sim.infer.diagnosis import Diagnosis, Experiment
+from origami_sim.report.diagnosis import Diagnosis, Experiment
 from origami_sim.report.page.markup import element, number
 from origami_sim.report.page.measures import known
 from origami_sim.report.page.pieces import nothing, quiet

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, element
 from origami_sim.report.page.measures import known
 from origami_sim.report.page.pieces import bar, figure, nothing, row, table

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Diagnosis, Trace
+from origami_sim.report.diagnosis import Diagnosis, Trace
 from origami_sim.report.page.markup import Html, amount, element, fit_percent, join
 from origami_sim.report.page.measures import array, fit, known
 from origami_sim.report.page.pieces import fold, legend, nothing

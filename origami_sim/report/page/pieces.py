@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import REVERSAL, Curve
+from origami_sim.locate.places import REVERSAL, Curve
 from origami_sim.report.page.markup import Html, amount, element, join, percent, plus_minus
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.plots import Plot, span_of

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.infer.diagnosis import Acting, Diagnosis, Impulse, Place
 from origami_sim.locate.acting import DRAWN
+from origami_sim.locate.places import Acting, Impulse, Place
+from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, amount, element, number, percent
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.pieces import (

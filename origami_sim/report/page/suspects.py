@@ -3,7 +3,7 @@
 import numpy as np
 
 from origami_sim.hypotheses.hypothesis import SEPARATOR
-from origami_sim.infer.diagnosis import Diagnosis, Suspected
+from origami_sim.report.diagnosis import Diagnosis, Suspected
 from origami_sim.report.page.markup import MISSING, Html, element, number, percent, plus_minus
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.pieces import bar, figure, fold, nothing, quiet, row, table
