@@ -54,7 +54,8 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
         low, high = (said(nodes * v, n.unit, digits) for v in ends[id(n)])
         what = f"{'more' if t > 0 else 'less'} {title(s.effect)} than stated" if s.more else title(s.effect)
-        strength = f"{_named(n, s)} {said(t, n.unit, digits)}{' in all' if nodes > 1 else ' at each node' if mass and not n.entities else ''}"
+        at_each = " in all" if nodes > 1 else " at each node" if mass and not n.entities else ""
+        strength = f"{_named(n, s)} {said(t, n.unit, digits)}{at_each}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
         shape = [n for n in s.free if n not in s.strengths and not bound[id(n)]] if len(every) == 1 else []

@@ -50,7 +50,7 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
         still = np.full(m, start.rate_sd)
     elif start.state == "released":
         let_go = _in_a_frame(forward, block.recording, usual)
-    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read) + 2.0 * let_go
+    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read) + let_go
     if np.any(far):
         worst = arm.names()[int(np.argmax(np.abs(block.rates) * far))]
         raise InputError(
