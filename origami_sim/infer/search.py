@@ -107,14 +107,17 @@ def reconsidered(
     """Simulates every single effect at several strengths where nothing explains a recording; whether any promises more.
 
     A model that snaps, or a crease that sticks, has no derivatives that tell why. So before nothing is said to explain
-    a recording, each effect is tried over its range, once.
+    a recording, each effect is tried over its range, once, and the best of them is fitted.
     """
     if out.reconsidered or over_noise(forward, out.nodes[out.leader].fit) < FAR:
         return False
     out.reconsidered = True
     alone = [k for k in out.estimates if len(k) == 1]
     suspects = [out.suspect(n) for k in alone for n in k]
-    return _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), progress))
+    if not _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), progress)):
+        return False
+    _tried(out, forward, next(k for k in out.ranked if k in out.begun and k in out.estimates))
+    return True
 
 
 def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
