@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from origami_sim.fit.evidence import on_bound
+from origami_sim.fit.evidence import AT_BOUND
 from origami_sim.fit.least_squares import OWED
 from origami_sim.infer.placement import LEADING
 from origami_sim.infer.posterior import Key, Posterior
@@ -63,7 +63,7 @@ def _idle(out: Posterior, key: Key) -> bool:
     for g in estimate.groups:
         group = node.groups[g]
         strong = estimate.values[column : column + group.strengths]
-        if g >= len(node.key) and np.all(on_bound(np.abs(strong), np.zeros(len(strong)), np.inf)):
+        if g >= len(node.key) and np.all(np.abs(strong) <= AT_BOUND):
             return True
         column += len(group.columns)
     return False
