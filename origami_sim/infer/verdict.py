@@ -12,7 +12,7 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
 from origami_sim.infer.intervals import widened
-from origami_sim.infer.posterior import CREDIBLE, Key, Posterior
+from origami_sim.infer.posterior import CREDIBLE, Key, Node, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
 from origami_sim.infer.words import distinct, joined, said, say, title
@@ -85,6 +85,8 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     classes = by_effects(p, chance)
     top = max(classes, key=lambda c: classes[c])
     lead, beside = surely(classes, lambda lead, each: indistinct(p, lead, each))
+    if lead and not beside:
+        lead, beside = with_likes(p, classes, lead)
     if not any(p.effects(k) >= lead for k in p.nodes):  # of what was never fitted no number could be said
         lead, beside = frozenset(), []
     best = best_of(p, chance, top if beside else lead or top)
@@ -350,8 +352,7 @@ def surely(
 def indistinct(p: Posterior, lead: frozenset[str], effects: list[str]) -> list[list[str]]:
     """Groups of effects that recordings do not tell apart beside others: their fits predict the same.
 
-    All data together see their predictions differ by less than one standard deviation. Of what was not fitted nothing
-    is known.
+    Of what was not fitted nothing is known. See `predict_the_same`.
     """
     groups: list[list[str]] = []
     best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
@@ -359,7 +360,7 @@ def indistinct(p: Posterior, lead: frozenset[str], effects: list[str]) -> list[l
         one = best.get(lead | {effect})
         for group in groups:
             other = best.get(lead | {group[0]})
-            if one is not None and other is not None and apart(one.fit, other.fit) < 1.0:
+            if one is not None and other is not None and predict_the_same(one, other):
                 group.append(effect)
                 break
         else:
@@ -367,11 +368,33 @@ def indistinct(p: Posterior, lead: frozenset[str], effects: list[str]) -> list[l
     return groups
 
 
-def apart(one: Fit, other: Fit) -> float:
-    """Standard deviations of all data together by which predictions of two fits differ."""
-    assert one.weights is not None
-    gaps = [(a - b) / one.weights.deviation for a, b in zip(one.residuals, other.residuals, strict=True)]
-    return float(np.sqrt(sum(np.nansum(np.square(g)) for g in gaps)))
+def with_likes(
+    p: Posterior, classes: dict[frozenset[str], float], lead: frozenset[str]
+) -> tuple[frozenset[str], list[frozenset[str]]]:
+    """Effects that surely act, without one in whose place another predicts the same, and sets with either.
+
+    Of two that data cannot tell apart only priors, and how far their fits went, decide which is more probable. A drag
+    on a single arm and a loss of its hinge are the same.
+    """
+    best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
+    own = best.get(lead)
+    for effect in sorted(lead) if own is not None else []:
+        likely = [c for c in best if len(c) == len(lead) and c - lead and lead - c == {effect}]
+        likely = [c for c in likely if holding(classes, c) > 1.0 - CREDIBLE]
+        if alike := [c for c in likely if predict_the_same(best[c], own)]:
+            return lead - {effect}, [lead, *alike]
+    return lead, []
+
+
+def predict_the_same(one: Node, other: Node) -> bool:
+    """Whether all data together see the predictions of two fits differ by less than one standard deviation.
+
+    Either may be off its best by what derivatives still promise it. A search that was stored has no predictions.
+    """
+    if one.fit.weights is None:
+        return False
+    gaps = [(a - b) / one.fit.weights.deviation for a, b in zip(one.fit.residuals, other.fit.residuals, strict=True)]
+    return float(sum(np.nansum(np.square(g)) for g in gaps)) < 1.0 + one.owed + other.owed
 
 
 def holding(classes: dict[frozenset[str], float], effects: frozenset[str]) -> float:

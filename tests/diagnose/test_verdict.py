@@ -183,17 +183,35 @@ def test_of_effects_that_nothing_tells_apart_all_are_listed(apart, listed):
     late = ("clock_delay", "drive_delay", "exposure", "field_lag", "tracker_lag")
     logs = {("crease_friction", e): -0.3 * n for n, e in enumerate(late)}
     p = posterior({**logs, ("crease_friction",): -90.0, (): -99.0})
-    cells = np.where(HYPER.clean, 0.0, -np.inf)
-    for n, effects in enumerate(logs):
-        key = frozenset(k for k in range(len(p.signatures)) if p.suspect(k).effect in effects)
-        left = [np.full((4, 1), 0.5 * apart * n / (len(late) - 1))]
-        own = Hypothesis(tuple(p.suspect(k) for k in sorted(key)))
-        fit = cast(Fit, SimpleNamespace(residuals=left, weights=Weights(np.ones(1)), hypothesis=own))
-        p.nodes[key] = Node(key, fit, cells, [], [], [None] * len(HYPER.cells))
+    predicted(p, {effects: apart * n / (len(late) - 1) for n, effects in enumerate(logs)})
     decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
     assert decided.lead == {"crease_friction"} and decided.word == ("TIE" if listed else "MECHANISM")
     assert not listed or decided.credible == [frozenset(e) for e in logs]
     assert decided.probability > 0.7
+
+
+@pytest.mark.parametrize(
+    ("apart", "owed", "log", "tie"),
+    [(0.5, 0.0, -1.7, True), (1.8, 0.0, -1.7, False), (1.8, 1.5, -1.7, True), (0.5, 0.0, -9.0, False)],
+)
+def test_what_only_priors_tell_apart_is_a_tie(apart, owed, log, tie):
+    """A loss of the hinge of a single arm and the air's drag on it, beside a friction; a rival of 1e-4 is none."""
+    two = ("crease_friction", "crease_quadratic_damping"), ("air_drag", "crease_friction")
+    p = posterior({two[0]: 0.0, two[1]: log, ("crease_friction",): -90.0, (): -99.0})
+    predicted(p, {two[0]: 0.0, two[1]: apart}, owed)
+    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert decided.word == ("TIE" if tie else "SEVERAL")
+    assert decided.credible[:2] == [frozenset(e) for e in two] if tie else decided.lead == set(two[0])
+
+
+def predicted(p: Posterior, at: dict[tuple[str, ...], float], owed: float = 0.0) -> None:
+    """Gives fitted sets predictions that lie so many standard deviations of all data together from each other."""
+    for effects, by in at.items():
+        key = frozenset(k for k in range(len(p.signatures)) if p.suspect(k).effect in effects)
+        own = Hypothesis(tuple(p.suspect(k) for k in sorted(key)))
+        made = {"residuals": [np.full((4, 1), 0.5 * by)], "weights": Weights(np.ones(1)), "hypothesis": own}
+        cells = np.where(HYPER.clean, 0.0, -np.inf)
+        p.nodes[key] = Node(key, cast(Fit, SimpleNamespace(**made)), cells, [], [], [None] * len(HYPER.cells), owed)
 
 
 def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
