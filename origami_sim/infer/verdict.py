@@ -377,8 +377,9 @@ def with_likes(
     on a single arm and a loss of its hinge are the same.
     """
     best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
-    own = best.get(lead)
-    for effect in sorted(lead) if own is not None else []:
+    if (own := best.get(lead)) is None:
+        return lead, []
+    for effect in sorted(lead):
         likely = [c for c in best if len(c) == len(lead) and c - lead and lead - c == {effect}]
         likely = [c for c in likely if holding(classes, c) > 1.0 - CREDIBLE]
         if alike := [c for c in likely if predict_the_same(best[c], own)]:
