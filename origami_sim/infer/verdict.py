@@ -321,8 +321,7 @@ def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
 
 
 def surely(
-    classes: dict[frozenset[str], float],
-    grouped: Callable[[frozenset[str], list[str]], list[list[str]]] = lambda lead, each: [[e] for e in each],
+    classes: dict[frozenset[str], float], grouped: Callable[[frozenset[str], list[str]], list[list[str]]]
 ) -> tuple[frozenset[str], list[frozenset[str]]]:
     """Effects that act together with at least `ALONE`; and with what else, if one of a few surely acts besides.
 
