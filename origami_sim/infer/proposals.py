@@ -113,9 +113,7 @@ def _analogous(out: Posterior) -> Key | None:
     adds to one set, or gains in the place of another, it is thought to gain in another set of that size.
     """
     best = max(named(out), key=lambda k: out.total[k])
-    near, promise, known = out.total[best] + np.log(UNFITTED), dict[Key, float](), dict[tuple[str, ...], float]()
-    for k in out.nodes:
-        known[out.labels(k)] = max(out.total[k], known.get(out.labels(k), -np.inf))
+    near, promise = out.total[best] + np.log(UNFITTED), dict[Key, float]()
     for one in out.nodes:
         gone, new = one - best, best - one
         if len(new) != 1 or len(gone) > 1:
@@ -126,7 +124,8 @@ def _analogous(out: Posterior) -> Key | None:
                 hope = out.total[rival] + out.total[best] - out.total[one]
                 promise[key] = max(promise.get(key, -np.inf), hope)
     # what was fitted from other shapes, or with other components, has to promise more than it came to
-    more = [k for k, p in promise.items() if p >= max(near, known.get(out.labels(k), -np.inf) + OWED)]
+    known = {out.labels(k): out.total[k] + OWED for k in sorted(out.nodes, key=lambda k: out.total[k])}
+    more = [k for k, p in promise.items() if p >= max(near, known.get(out.labels(k), near))]
     return max(more, key=lambda k: promise[k], default=None)
 
 

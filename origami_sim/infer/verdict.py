@@ -1,6 +1,6 @@
 """The verdict: sums over the posterior, put into words."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,9 @@ ALONE = 0.8
 """Probability from which one explanation is named alone: to name a wrong one is four times as bad as a tie."""
 
 LISTED = 3
-"""Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time."""
+"""Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time.
+
+Those that predict the same are one."""
 
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
@@ -84,9 +86,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     chance = considered(p)
     classes = by_effects(p, chance)
     top = max(classes, key=lambda c: classes[c])
-    lead, beside = surely(classes, lambda lead, each: indistinct(p, lead, each))
-    if lead and not beside:
-        lead, beside = with_likes(p, classes, lead)
+    lead, beside = surely(p, classes)
     if not any(p.effects(k) >= lead for k in p.nodes):  # of what was never fitted no number could be said
         lead, beside = frozenset(), []
     best = best_of(p, chance, top if beside else lead or top)
@@ -320,17 +320,13 @@ def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
     return out
 
 
-def surely(
-    classes: dict[frozenset[str], float], grouped: Callable[[frozenset[str], list[str]], list[list[str]]]
-) -> tuple[frozenset[str], list[frozenset[str]]]:
+def surely(p: Posterior, classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
     """Effects that act together with at least `ALONE`; and with what else, if one of a few surely acts besides.
 
-    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them; of those
-    that nothing tells apart beside the first, all.
-
-    Args:
-        grouped: those of some effects together that are not told apart, see `indistinct`.
+    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them. Those of
+    which fits predict the same are one here, and an effect that has such likes is one of them.
     """
+    fitted = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}  # the best of each
     marginal = of_each(classes)
     lead: frozenset[str] = frozenset()
     for effect in sorted(marginal, key=lambda e: (-marginal[e], e)):
@@ -340,58 +336,50 @@ def surely(
         lead = larger
     more = {c - lead: v for c, v in classes.items() if c >= lead}
     chance = of_each(more)
-    groups = grouped(lead, sorted(chance, key=lambda e: (-chance[e], e))) if lead else []
+    groups = indistinct(fitted, lead, sorted(chance, key=lambda e: (-chance[e], e))) if lead else []
     for n in range(1, min(LISTED, len(groups)) + 1):
         likely = [e for group in groups[:n] for e in group]
         if len(likely) > 1 and sum(v for c, v in more.items() if c & set(likely)) >= ALONE:
             return lead, [lead | {e} for e in likely]
-    return lead, []
+    return with_likes(fitted, classes, lead)
 
 
-def indistinct(p: Posterior, lead: frozenset[str], effects: list[str]) -> list[list[str]]:
-    """Groups of effects that recordings do not tell apart beside others: their fits predict the same.
-
-    Of what was not fitted nothing is known. See `predict_the_same`.
-    """
+def indistinct(fitted: dict[frozenset[str], Node], lead: frozenset[str], effects: Sequence[str]) -> list[list[str]]:
+    """Groups of effects that recordings do not tell apart beside others: their fits predict the same."""
     groups: list[list[str]] = []
-    best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
     for effect in effects:
-        one = best.get(lead | {effect})
-        for group in groups:
-            other = best.get(lead | {group[0]})
-            if one is not None and other is not None and predict_the_same(one, other):
-                group.append(effect)
-                break
+        one = fitted.get(lead | {effect})
+        same = (group for group in groups if predict_the_same(one, fitted.get(lead | {group[0]})))
+        if (group := next(same, None)) is not None:
+            group.append(effect)
         else:
             groups.append([effect])
     return groups
 
 
 def with_likes(
-    p: Posterior, classes: dict[frozenset[str], float], lead: frozenset[str]
+    fitted: dict[frozenset[str], Node], classes: dict[frozenset[str], float], lead: frozenset[str]
 ) -> tuple[frozenset[str], list[frozenset[str]]]:
     """Effects that surely act, without one in whose place another predicts the same, and sets with either.
 
     Of two that data cannot tell apart only priors, and how far their fits went, decide which is more probable. A drag
     on a single arm and a loss of its hinge are the same.
     """
-    best = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}
-    if (own := best.get(lead)) is None:
-        return lead, []
     for effect in sorted(lead):
-        likely = [c for c in best if len(c) == len(lead) and c - lead and lead - c == {effect}]
-        likely = [c for c in likely if holding(classes, c) > 1.0 - CREDIBLE]
-        if alike := [c for c in likely if predict_the_same(best[c], own)]:
+        others = [c for c in fitted if len(c) == len(lead) and lead - c == {effect}]
+        likely = [c for c in others if holding(classes, c) > 1.0 - CREDIBLE]
+        if alike := [c for c in likely if predict_the_same(fitted[c], fitted.get(lead))]:
             return lead - {effect}, [lead, *alike]
     return lead, []
 
 
-def predict_the_same(one: Node, other: Node) -> bool:
+def predict_the_same(one: Node | None, other: Node | None) -> bool:
     """Whether all data together see the predictions of two fits differ by less than one standard deviation.
 
-    Either may be off its best by what derivatives still promise it. A search that was stored has no predictions.
+    Either may be off its best by what derivatives still promise it. Of what was not fitted, or of a search that was
+    stored, predictions are not known.
     """
-    if one.fit.weights is None:
+    if one is None or other is None or one.fit.weights is None:
         return False
     gaps = [(a - b) / one.fit.weights.deviation for a, b in zip(one.fit.residuals, other.fit.residuals, strict=True)]
     return float(sum(np.nansum(np.square(g)) for g in gaps)) < 1.0 + one.owed + other.owed

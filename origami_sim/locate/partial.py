@@ -17,7 +17,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.locate.locate import Motion, binned, bins, dynamics, frozen, locate, loose, motion
 from origami_sim.locate.locate_curves import places
-from origami_sim.locate.places import Curve, Partial, Place
+from origami_sim.locate.places import Curve, Partial, Place, clock
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import units_of
@@ -61,13 +61,14 @@ def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Pa
     blocks, units = [forward.blocks[b] for b in f.blocks], units_of(forward.recordings[0])
     read, noise = np.concatenate([b.values for b in blocks]), blocks[0].noise
     times = np.concatenate([forward.recordings[b.recording].times[b.first] + b.times for b in blocks])
-    rates = np.concatenate([np.gradient(b.values, b.times, axis=0) for b in blocks])
-    clock = ("load step", "1") if all(r.by_step for r in forward.recordings) else ("time", "s")
+    by_step = forward.recordings[0].by_step  # then all are, and nothing has a rate
+    rates = np.nan if by_step else np.concatenate([np.gradient(b.values, b.times, axis=0) for b in blocks])
     out = []
     for suspect, less in zip(suspects, without, strict=True):
         gives = whole - less
         d = int(np.argmax(np.nansum(np.square(gives / noise), axis=0)))
-        against = [("reading", units[d], read[:, d]), ("rate", f"{units[d]}/s", rates[:, d]), (*clock, times)]
+        against = [("reading", units[d], read[:, d]), (*clock(by_step), times)]
+        against += [] if by_step else [("rate", f"{units[d]}/s", rates[:, d])]
         laws = []
         for name, unit, x in against:
             parts = bins(np.where(np.isnan(read[:, d]), np.nan, x))

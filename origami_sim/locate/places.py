@@ -3,6 +3,11 @@
 from dataclasses import dataclass, field
 
 
+def clock(by_step: bool) -> tuple[str, str]:
+    """What times of a recording count, and their unit."""
+    return ("load step", "1") if by_step else ("time", "s")
+
+
 @dataclass
 class Curve:
     """Residual moment of one coordinate binned against something: x, mean, its standard error, number in the bin."""

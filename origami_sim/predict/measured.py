@@ -154,12 +154,11 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, rested: np.
             inside = np.clip(columns[:, c], grid[0], grid[-1])
             out[:, :, mine] = part(inside)
             outside = columns[:, c] - inside
-            for end, which, some in ((0, outside < 0, ~rested[mine]), (-1, outside > 0, np.ones(len(mine), bool))):
-                beyond = np.flatnonzero(which)
-                if len(beyond) and np.any(some):  # often thousands of times: only the end's rate and bend are asked for
-                    rate, bend = (part(grid[end], order)[:, some] for order in (1, 2))
+            for end, beyond, moves in ((0, outside < 0, ~rested[mine]), (-1, outside > 0, np.ones(len(mine), bool))):
+                if np.any(beyond) and np.any(moves):  # often thousands of times: only the end's rate and bend are asked
+                    rate, bend = (part(grid[end], order)[:, moves] for order in (1, 2))
                     by = outside[beyond, None, None]
-                    out[np.ix_(beyond, np.arange(out.shape[1]), mine[some])] += by * rate + 0.5 * by**2 * bend
+                    out[np.ix_(beyond, np.full(out.shape[1], True), mine[moves])] += by * rate + 0.5 * by**2 * bend
         return out
 
     return at

@@ -48,15 +48,15 @@ intervals fifty times too narrow.
 UNSEEN = 0.003
 """Error of a step, over the smallest shift that all data together show.
 
-On eight devices of the battery predictions are then off by up to 0.1 standard deviations of all data together; with
-friction and relaxation several hundred times as strong as first shows by 0.1 to 0.7. With three times as much, in 0.9
-times the time, by twice as much, and a scale of all moments looks known to 0.85 of its prior, where nothing tells it.
-Laws with memory turn over within a step, so that predictions are rough in their parameters by a few such errors, and
-fits end where they are rough: by the yield angle of a swing that rubs (11,001 frames, noise of 9 urad) derivatives are
-rough by 15 % with forty times as much, and fits of the same effects end within 5.5 of log evidence for 2.3. A tenth
-takes 1.05 times the time of a diagnosis of the double pendulum chain, and 1.4 times that of a box in the battery. Much
-finer is no better, as worlds then part in how many steps they take: with a thirtieth, the scale of all moments of
-another box looked known to 0.15 % where priors alone tell it, to 1.5 %.
+On seven devices of the battery predictions are then off by up to 0.2 standard deviations of all data together; with a
+friction of 0.1 mN m by 0.1 to 0.3, with a relaxation of 0.3 mN m/rad by 0.1 to 1.2. With three times as much, in 0.8 to
+1.1 times the time of a rollout, friction is off by 0.2 to 0.6, and a scale of all moments looks known to 0.85 of its
+prior where nothing tells it (here to 1.00). A tenth takes up to 1.5 times the time. Laws with memory turn over within a
+step, so that predictions are rough in their parameters by a few such errors, and fits end where they are rough: of a
+swing that rubs (11,001 frames, noise of 9 urad) fits of the same effects end within 5.5 of log evidence with steps
+wrong by 1e-8 rad, within 2.3 with 8e-10; this asks for 2e-10. Much finer is no better where noise is coarse, as worlds
+then part in how many steps they take: with a thirtieth, the scale of all moments of another box looked known to 0.15 %
+where priors alone tell it, to 1.5 %.
 """
 
 TOUCHING = 1e-7

@@ -11,7 +11,7 @@ import numpy as np
 
 from origami_sim.files import write_text
 from origami_sim.infer.budget import Share
-from origami_sim.locate.places import Acting, Impulse, Partial, Place
+from origami_sim.locate.places import Acting, Impulse, Partial, Place, clock
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,7 +111,7 @@ class Trace:
     @property
     def clock(self) -> tuple[str, str]:
         """What times count, and their unit."""
-        return ("load step", "1") if self.by_step else ("time", "s")
+        return clock(self.by_step)
 
 
 @dataclass

@@ -113,9 +113,10 @@ def test_errors_of_a_recorder_are_seen_through_readings_without_each():
     pair = [every[f"{name} at the measurement"] for name in ("angle_scale", "angle_eccentricity")]
     f = fit(forward, Hypothesis(tuple(pair)), base.weights, local=base.local)
     shown = partials(forward, [(s, f) for s in pair])
-    for p, order, gives in zip(shown, (1, 2), (0.05, -0.025), strict=True):
+    scale, _, cosine = f.theta[len(base.theta) :]
+    for p, order, gives in zip(shown, (1, 2), (scale / (1.0 + scale), -0.5 * cosine), strict=True):
         assert (p.curve.against, p.unit) == ("reading", "rad")
-        assert np.polyfit(p.curve.x, p.law, order)[0] == pytest.approx(gives, rel=0.2)
+        assert np.polyfit(p.curve.x, p.law, order)[0] == pytest.approx(gives, rel=0.05)  # 0.0002 and 0.029
         off = (np.array(p.curve.mean) - p.law) / p.curve.error
         assert np.sqrt(np.mean(off**2)) < 1.5 and np.abs(p.law).max() > 3 * np.max(p.curve.error)
 

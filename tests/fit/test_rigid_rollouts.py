@@ -170,7 +170,7 @@ def test_ends_tell_where_the_next_segment_starts_whatever_its_own_start_is(tied)
 
 @pytest.mark.parametrize("effect", [None, "crease_friction"])
 def test_what_steps_of_the_solver_miss_shows_in_no_data(tied, monkeypatch, effect):
-    """All data together would have to show it; friction is a thousand times as strong as they first show."""
+    """In standard deviations of all data together, of a swing without and with a friction of 0.1 mN m."""
     every = suspects(tied.model, tied.recordings, tied.drive)
     some = tuple(s for s in every if s.effect == effect)[:1]
     theta = np.array([f.start + f.scale * (f.name == "friction_moment") for s in some for f in s.free])
@@ -182,7 +182,7 @@ def test_what_steps_of_the_solver_miss_shows_in_no_data(tied, monkeypatch, effec
             known.clear()
         found.append(tied.predict(Hypothesis(some), [theta], np.zeros((1, len(tied.blocks), tied.local))))
     missed = [(a[0] - b[0]) / block.noise for a, b, block in zip(*found, tied.blocks, strict=True)]
-    assert 0.0 < np.linalg.norm(np.concatenate(missed)) < 0.3  # without friction 0.01
+    assert 0.0 < np.linalg.norm(np.concatenate(missed)) < (0.15 if effect else 0.003)  # 0.08 and 0.0012
 
 
 def test_numbers_are_found_to_rounding_and_better_where_segments_are_tied():

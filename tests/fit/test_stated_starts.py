@@ -27,7 +27,7 @@ def test_what_is_released_has_no_rates_and_stated_angles():
     m = len(block.rates)
     assert not np.any(block.rates) and block.pose.angles[0, 0] == pytest.approx(read + 1e-3)
     assert block.known[0] == 5e-3 and block.known[1] == 1.0  # nothing is stated of the second
-    assert np.all(block.known[m:] < 0.2 * first_block(RELEASED).known[m:]), "what it gains in a frame of 10 ms"
+    assert np.all(block.known[m:] < 0.1 * first_block(RELEASED).known[m:]), "what it gains in a frame of 10 ms"
 
 
 def test_a_hand_may_let_go_up_to_a_frame_late():
@@ -35,7 +35,7 @@ def test_a_hand_may_let_go_up_to_a_frame_late():
     coarse = replace(record(panels=3, duration=1.0, rate=100, noise=1e-3), start=Start("released"))
     fine = replace(record(panels=3, duration=1.0, rate=200, noise=1e-3), start=Start("released"))
     sd = [first_block(r).known[-2:] for r in (coarse, fine)]
-    assert sd[0] == pytest.approx(2.0 * sd[1], rel=0.1)
+    assert sd[0] == pytest.approx(2.0 * sd[1], rel=0.1)  # 2.02 and 2.16: rates are read from fewer frames
 
 
 def test_a_stated_rate_is_as_well_known_as_it_says():
