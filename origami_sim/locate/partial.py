@@ -61,14 +61,15 @@ def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Pa
     blocks, units = [forward.blocks[b] for b in f.blocks], units_of(forward.recordings[0])
     read, noise = np.concatenate([b.values for b in blocks]), blocks[0].noise
     times = np.concatenate([forward.recordings[b.recording].times[b.first] + b.times for b in blocks])
-    by_step = forward.recordings[0].by_step  # then all are, and nothing has a rate
-    rates = np.nan if by_step else np.concatenate([np.gradient(b.values, b.times, axis=0) for b in blocks])
+    by_step = forward.recordings[0].by_step  # then all are
     out = []
     for suspect, less in zip(suspects, without, strict=True):
         gives = whole - less
         d = int(np.argmax(np.nansum(np.square(gives / noise), axis=0)))
         against = [("reading", units[d], read[:, d]), (*clock(by_step), times)]
-        against += [] if by_step else [("rate", f"{units[d]}/s", rates[:, d])]
+        if not by_step:
+            rate = np.concatenate([np.gradient(b.values[:, d], b.times) for b in blocks])
+            against.append(("rate", f"{units[d]}/s", rate))
         laws = []
         for name, unit, x in against:
             parts = bins(np.where(np.isnan(read[:, d]), np.nan, x))
