@@ -331,7 +331,7 @@ def test_real_crease(recordings, tmp_path):
 
 def test_unit_of_the_real_torque_must_be_stated(recordings):
     with pytest.raises(
-        InputError, match=r"unit of a column is not stated \(field 'torque'\); allowed: N m, mN m, N mm"
+        InputError, match=r"unit of a column is not stated \(field 'torque'\); allowed: N m, mN m, uN m, N mm"
     ):
         command.build(CREASE[:3])
 
