@@ -104,6 +104,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
+from origami_sim.recording.clock import even_times
 from origami_sim.recording.camera import rotation_matrix
 from origami_sim.recording.placed import columns_of
 from origami_sim.recording.possible import Possible
@@ -242,9 +243,9 @@ class Sidecar:
         """(n,) times [s], or step numbers."""
         base = self.time_base(table)
         if base == "column":
-            return table.numbers[self.time["column"]] * unit_factor(self.time["unit"])
+            return even_times(table.numbers[self.time["column"]]) * unit_factor(self.time["unit"])
         if base == "clock":
-            return table.numbers[table.clock or ""]
+            return even_times(table.numbers[table.clock or ""])
         steps = table.numbers[table.frame] if base == "rate" and table.frame else np.arange(len(table.rows))
         return steps / (self.time["rate_hz"] or 1.0)
 
