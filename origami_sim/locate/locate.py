@@ -21,7 +21,7 @@ from origami_sim.model.articulation import Pose
 from origami_sim.model.distort import distorted
 from origami_sim.predict.curves import PASSIVE
 from origami_sim.predict.rollouts import Rollouts
-from origami_sim.predict.track import followed
+from origami_sim.predict.track import Track, followed
 from origami_sim.solve.batch import Batch
 
 BINS = 13
@@ -64,9 +64,12 @@ class Motion:
 
     def thinned(self, by: int) -> "Motion":
         """Every so many frames."""
-        part = {f.name: getattr(self, f.name)[..., ::by] for f in fields(self) if f.name in _BY_FRAME}
-        drive = {n: v[::by] for n, v in self.drive.items()}
-        return replace(self, **part, pose=self.pose.select(slice(None, None, by)), drive=drive, half=self.half // by)
+        return replace(self.part(slice(None, None, by)), half=self.half // by)
+
+    def part(self, some: slice | np.ndarray) -> "Motion":
+        """Some of the frames."""
+        part = {f.name: getattr(self, f.name)[..., some] for f in fields(self) if f.name in _BY_FRAME}
+        return replace(self, **part, pose=self.pose.select(some), drive={n: v[some] for n, v in self.drive.items()})
 
     def _windows(self, values: np.ndarray) -> np.ndarray:
         width, count = self.width, max(1, len(self.times) // self.width)
@@ -87,21 +90,33 @@ class Motion:
 _BY_FRAME = ("times", "q", "rate", "acceleration", "missing", "error", "inertia", "modelled")
 
 
-def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
+def motion(
+    forward: Rollouts,
+    fit: Fit,
+    index: int,
+    *,
+    path: Track | None = None,
+    half: int | None = None,
+    frames: np.ndarray | None = None,
+) -> Motion | None:
     """The smoothed motion of a recording, and what is missing in it under a fitted hypothesis.
 
     Of a device that nothing holds, frames near a contact are left out: in a blow a smoothed acceleration means nothing,
     see `impulses`.
+
+    Args:
+        path: another motion in its frames; None: the recorded one. half: half window of the smoother [frames]; None:
+            the largest that leaves no more than noise. frames: their times [s]; None: all that can be smoothed.
     """
     recording, arm = forward.recordings[index], forward.articulation
-    path = followed(forward, index)
+    path = path or followed(forward, index)
     if path is None or not np.any(path.told) or not (arm.floating or np.all(path.told)):
         return None
     times = recording.times - recording.times[0]
     step = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1], step)
     q, noise, told = np.stack([np.interp(grid, times, row) for row in path.q]), path.noise, path.told
-    half = _half_window(q[told], noise[told])
+    half = half or _half_window(q[told], noise[told])
     if q.shape[1] < 4 * half + 2:
         return None
     smooth, rate, acceleration = (
@@ -120,6 +135,8 @@ def motion(forward: Rollouts, fit: Fit, index: int) -> Motion | None:
     if arm.floating:
         keep = ~spread_out(touching(gaps, noise[: arm.shifts].max()), half)
     keep[:half] = keep[-half:] = False
+    if frames is not None:
+        keep = np.isin(grid + recording.times[0], frames)
     if keep.sum() < 4 * half + 2:
         return None
     missing = np.einsum("mkw,kw->mw", inertia, acceleration) - free

@@ -3,6 +3,9 @@
 Both are moments along the recorded motion, averaged over the same bins (a component-plus-residual plot; Ezekiel 1924,
 Larsen & McCleary 1972). So each law can be seen through the data, whatever it acts on and whatever else was found. Of
 errors of a recorder both are readings.
+
+What the whole model lacks is the difference between what the recorded motion needs and what the predicted one does,
+read and smoothed alike: what smoothing takes from accelerations would else look like a law.
 """
 
 from collections.abc import Sequence
@@ -22,6 +25,7 @@ from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
 from origami_sim.predict.channels import units_of
 from origami_sim.predict.rollouts import Rollouts
+from origami_sim.predict.track import track
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.settling import levels, per_world
 
@@ -29,6 +33,12 @@ FRAMES = 4000
 """Frames of a recording along which laws with a memory are followed, at most, evenly spread: 0.3 s.
 
 Half and double take half and twice that; nothing is named by what is drawn."""
+
+
+WIDER = 2.0
+"""Frames of the smoother for what the whole model lacks, over those that leave no more than noise of the motion.
+
+Of two flaps that swing (2 mrad, 150 Hz) bars are then a fifth; with three times as many frames a tenth."""
 
 
 def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[Partial]:
@@ -117,9 +127,22 @@ def _places(forward: Predictor, f: Fit, thetas: Sequence[np.ndarray]) -> list[li
         m = motion(forward, f, r)
         if m is None:
             continue
-        for found, one in zip(each, _lacking(forward, f, thetas, r, m), strict=True):
-            found.append(one)
+        m, residual = _with_residual(forward, f, r, m)
+        whole, *without = _lacking(forward, f, thetas, r, m)
+        for found, one in zip(each, (whole, *without), strict=True):
+            found.append(replace(one, missing=one.missing - whole.missing + residual))
     return [locate(forward, found) for found in each]
+
+
+def _with_residual(forward: Rollouts, f: Fit, index: int, m: Motion) -> tuple[Motion, np.ndarray]:
+    """What a fit lacks [m, n] along the motion of a recording, and the frames of that in which it is known."""
+    mine = [b for b in f.blocks if forward.blocks[b].recording == index]
+    shot = forward.shoot(f.hypothesis, f.theta[None], f.local[None], mine)
+    path = track(forward, forward.recordings[index], np.concatenate([values[0] for values in shot.values]))
+    wide = motion(forward, f, index, half=round(WIDER * m.half)) or m
+    own = motion(forward, f, index, path=path, half=wide.half, frames=wide.times) if path is not None else None
+    needed, given = (_lacking(forward, f, [f.theta], index, one)[0].missing if one else 0.0 for one in (wide, own))
+    return m.part(np.isin(m.times, wide.times)), needed - given
 
 
 def _lacking(forward: Rollouts, f: Fit, thetas: Sequence[np.ndarray], index: int, m: Motion) -> list[Motion]:

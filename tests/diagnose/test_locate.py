@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from origami_sim.device.scene import read_calibration
-from origami_sim.diagnose import Options
+from origami_sim.design.build import Sheet
+from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, sine
@@ -19,9 +20,12 @@ from origami_sim.locate.acting import _actions, acting
 from origami_sim.locate.locate import frozen, locate, motions_of, phase, reversals, since
 from origami_sim.locate.partial import partials
 from origami_sim.locate.places import REVERSAL
-from origami_sim.model import dihedral_angles
+from origami_sim.model import State, dihedral_angles
 from origami_sim.model.articulation import Articulation
+from origami_sim.pattern import strip
+from origami_sim.recording import Channel, Recording
 from origami_sim.scenes import box
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
@@ -94,11 +98,11 @@ def test_each_of_two_effects_is_seen_through_what_is_missing_without_it():
     rubs, bends = partials(forward, [(s, f) for s in pair])
     assert (rubs.label, rubs.site, rubs.curve.against) == (pair[0].label, "crease 1", "rate")
     x, law = np.array(rubs.curve.x), np.array(rubs.law)
-    fast = np.abs(x) > 0.3 * np.abs(x).max()
+    fast = np.abs(x) > 0.5 * np.abs(x).max()  # well after it has turned
     assert law[fast] == pytest.approx(-2e-5 * np.sign(x[fast]), rel=0.1)
     for p in (rubs, bends):
         seen, given = np.array(p.curve.mean), np.array(p.law)
-        assert np.sqrt(np.mean((seen - given) ** 2)) < 0.35 * np.sqrt(np.mean(given**2))  # 0.29 and 0.27: noise
+        assert np.sqrt(np.mean((seen - given) ** 2)) < 0.2 * np.sqrt(np.mean(given**2))  # 0.15 and 0.06: noise
     assert (bends.site, bends.curve.against) == ("crease 0", "angle")
 
 
@@ -119,6 +123,32 @@ def test_errors_of_a_recorder_are_seen_through_readings_without_each():
         assert np.polyfit(p.curve.x, p.law, order)[0] == pytest.approx(gives, rel=0.05)  # 0.0002 and 0.029
         off = (np.array(p.curve.mean) - p.law) / p.curve.error
         assert np.sqrt(np.mean(off**2)) < 1.5 and np.abs(p.law).max() > 3 * np.max(p.curve.error)
+
+
+def test_each_of_several_explanations_is_seen_through_what_its_own_fit_lacks():
+    """Of a flap that swings fast, smoothing takes a moment from accelerations that goes with the angle as laws do."""
+    sheet = Sheet(strip(["20 mm", "60 mm"], "40 mm"), thickness="3 mm", material="pet", panels="rigid")
+    sheet.body(1, mass="8.6 g", centre=(0.05, 0, 0), inertia=(1.16e-6, 2.58e-6, 3.72e-6))
+    sheet.crease(stiffness="2 mN m/rad", loss_time="6.5 ms").gravity((9.81, 0, 0)).fix(panels=[0])
+    model, parameters = sheet.build()
+    arm = Articulation(model)
+    state = State.at_rest(model, position=arm.positions(arm.moved(arm.reference(), np.ones((1, 1))))[:, 0])
+    motion = simulate(model, parameters, Drive(), duration=4.0, rate=150, state=state)
+    read = 1.03 * motion.creases[:, 0, 0] + 2e-3 * np.random.default_rng(1).normal(size=len(motion.times))
+    recording = Recording(
+        "swing", motion.times, {"fold": Channel("fold", "crease_angle", read, "rad", 2e-3, {"crease": 0})}
+    )
+    known = [factor("crease.stiffness", 0.03), factor("inertia.mass", 0.005)]
+    forward, _ = arranged(Subject.from_model(model, parameters, None, known), prepared([recording], 200.0), Options())
+    base = nominal_fits(forward)[1]
+    every = {s.label: s for s in suspects(forward.model, forward.recordings, forward.drive, forward.parameters)}
+    rivals = [every[name] for name in ("crease_stiffening at crease 0", "eccentric_weight at panel 1")]
+    fits = [carried_on(forward, fit(forward, Hypothesis((s,)), base.weights, local=base.local)) for s in rivals]
+    stiffens, leans = partials(forward, list(zip(rivals, fits, strict=True)))
+    for p in (stiffens, leans):
+        off = (np.array(p.curve.mean) - p.law) / p.curve.error
+        assert np.sqrt(np.mean(off**2)) < 0.7  # 0.5 and 0.3; with what smoothing takes 1.9 and 2.1
+    assert np.abs(leans.law).max() > 5 * np.max(leans.curve.error)  # 7
 
 
 def acting_alone(recording):
