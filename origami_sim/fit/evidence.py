@@ -53,6 +53,7 @@ class Group:
         spread: (k,) prior standard deviations of the shapes about where they begin, over the scale.
         low, high: (k,) bounds from where they begin, over the scale; None: there are none.
         usual: (k,) strengths as they usually are, over the scale; infinite where that depends on the device.
+        whole: columns of what the strengths do from where they begin, and by how much of each; None: `columns`, `at`.
     """
 
     columns: tuple[int, ...]
@@ -63,6 +64,7 @@ class Group:
     low: np.ndarray | None = None
     high: np.ndarray | None = None
     usual: np.ndarray | None = None
+    whole: tuple[tuple[int, ...], np.ndarray] | None = None
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest values (k,) of the columns."""
@@ -189,7 +191,8 @@ class Sets:
         for k in range(own):
             g = groups[k]
             lacks = np.array([k not in row for row in sets])
-            back[np.ix_(lacks, np.array(g.columns[: g.strengths], int))] = g.at[: g.strengths]
+            columns, values = g.whole or (g.columns[: g.strengths], g.at[: g.strengths])
+            back[np.ix_(lacks, np.array(columns, int))] = values
         columns, at, spread, side, strength, low, high, usual = each
         return cls(columns.astype(int), at, spread, side, strength > 0.0, low, high, usual, back)
 
@@ -278,7 +281,9 @@ class Summed:
 def summed(p: Problem, smooth: float, flaws: float, held: Sequence[int] = ()) -> Summed:
     """Sums out flaws and a discrepancy of the channels whose sizes are standard deviations of noise, see `Hyper`.
 
-    Columns that a fit holds at a bound (`held`) have no flaw, which would take them beyond.
+    Args:
+        held: columns that have no flaw, see `without_flaws`: at a bound it would take them beyond, and others are there
+            twice.
     """
     c, k = p.columns, len(p.gram) - 1 - p.columns
     norms = np.sqrt(np.maximum(np.diag(p.gram)[:c], 1e-12))
@@ -300,9 +305,10 @@ def on_bound(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarra
     return (values <= low + AT_BOUND) | (values >= high - AT_BOUND)
 
 
-def at_bounds(groups: Sequence[Group]) -> list[int]:
-    """Columns of groups that are linearised at one of their bounds."""
-    return [c for g in groups for c, on in zip(g.columns, on_bound(g.at, *g.bounds()), strict=True) if on]
+def without_flaws(groups: Sequence[Group]) -> list[int]:
+    """Columns of groups that are linearised at one of their bounds, and of what their strengths do as a whole."""
+    held = [c for g in groups for c, on in zip(g.columns, on_bound(g.at, *g.bounds()), strict=True) if on]
+    return held + [c for g in groups if g.whole for c in g.whole[0]]
 
 
 def log_slabs(d: np.ndarray, hyper: Hyper) -> np.ndarray:

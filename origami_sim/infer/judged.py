@@ -9,12 +9,13 @@ import numpy as np
 
 from origami_sim.fit.chain import Chain
 from origami_sim.fit.discrepancy import cosines
-from origami_sim.fit.evidence import Problem, Summed, at_bounds, beside_numbers, summed
+from origami_sim.fit.evidence import Problem, Summed, beside_numbers, summed, without_flaws
 from origami_sim.fit.implied import OwnColumns
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import log_volume
 from origami_sim.infer.columns import Columns
+from origami_sim.infer.placement import members_of
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.threads import shared
 
@@ -35,13 +36,21 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit, owed: float = 0
         groups.append(one.group(width))
         width += len(one.size)
     weights = f.weights
+    # what a strength does from nothing on is no multiple of what a little more of it does about the fit
+    mine = {g: out.signatures[n] for g, n in enumerate(members_of(f.hypothesis, out))}
+    secants = {g: s for g, s in mine.items() if s.parts and not s.status and len(s.size) == len(s.suspect.free)}
+    for g, s in secants.items():
+        values = own.groups[g].at * [n.scale for n in f.hypothesis.suspects[g].strengths] / s.size
+        own.groups[g] = groups[g] = replace(own.groups[g], whole=(tuple(range(width, width + len(values))), values))
+        width += len(values)
     effects = Columns(line, weights, own.columns, known, out.weights)
-    held = at_bounds(own.groups)
+    every = replace(effects, further=[*known, *secants.values()])
+    held = without_flaws(own.groups)
     laid, volume = own.sets(width), weights.log_prior - log_volume(weights, line.rows) - 0.5 * owed
     out.smooth = smooth = out.smooth or cosines(forward, f, line)
 
     def columns(some: Sequence[int]) -> list[np.ndarray]:
-        both = [np.concatenate([x, smooth[n]], axis=1) for n, x in zip(some, effects.of(some), strict=True)]
+        both = [np.concatenate([x, smooth[n]], axis=1) for n, x in zip(some, every.of(some), strict=True)]
         return beside_numbers(line, own.nominal, some, both)
 
     chain = Chain.shared(line, columns)

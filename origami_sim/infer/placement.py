@@ -160,17 +160,18 @@ def _judge(
         leading = np.argsort(-rank)[:LEADING].tolist()
         ahead = node.foresight.gains([[node.groups[g] for g in sets[n]] for n in leading], out.hyper)
         promise[leading] = total + log_prior[leading] + ahead
+    here = out.effects(node.key)
     for n, key in enumerate(keys):
+        apart = len(out.effects(key) ^ here), len(key ^ node.key)
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
         if key in out.nodes and key and key < node.key and (key, node.key) not in out.renewed and n in values:
             known, _ = out.ahead.get(key, (out.total[key] + OWED, None))
             if totals[n] > known:  # its own fit ended early
-                near = (len(key ^ node.key), 0.0)
-                out.ahead[key] = totals[n], Estimate(node.key, sets[n], values[n], near, float(gains[n]))
+                out.ahead[key] = totals[n], Estimate(node.key, sets[n], values[n], (*apart, 0.0), float(gains[n]))
         if key in out.nodes or key in out.failed or n not in values:
             continue
-        before, near = out.estimates.get(key), (len(key ^ node.key), -float(np.max(node.evidence)))
+        before, near = out.estimates.get(key), (*apart, -float(np.max(node.evidence)))
         if before is None or near <= before.near:
             out.log[key], out.total[key], out.promise[key] = found[n], totals[n], float(promise[n])
             out.estimates[key] = Estimate(node.key, sets[n], values[n], near, float(gains[n]))

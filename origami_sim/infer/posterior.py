@@ -54,14 +54,14 @@ class Node:
 class Estimate:
     """Of a set that was not fitted: by which fitted one, as which groups of it, and the values of their columns.
 
-    `near`: how many effects that one has more or less, and its evidence, the better the smaller. `gain`: log Bayes
-    factor of the set over that one.
+    `near`: how many effects that one has more or less, how many suspects, and its evidence, the better the smaller
+    (what an effect does at another site is told best where it acts). `gain`: log Bayes factor of the set over that one.
     """
 
     parent: Key
     groups: tuple[int, ...]
     values: np.ndarray
-    near: tuple[int, float]
+    near: tuple[int, int, float]
     gain: float
 
 

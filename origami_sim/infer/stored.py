@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from origami_sim.errors import InputError
-from origami_sim.fit.evidence import Group, Problem, Sets, Summed, at_bounds
+from origami_sim.fit.evidence import Group, Problem, Sets, Summed, without_flaws
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
@@ -142,7 +142,7 @@ class Stored:
         fit = Fit(hypothesis, hypothesis.free, np.zeros(0), np.zeros((0, 0)), (), 0.0, 0.0, [], np.zeros(0))
         own = [tuple(range(len(members)))]
         laid = Sets.of(own, groups, len(members), len(next(iter(problems.values())).gram) - 1)
-        grid, evidence, held = [], np.full(len(hyper.cells), -np.inf), at_bounds(groups[: len(members)])
+        grid, evidence, held = [], np.full(len(hyper.cells), -np.inf), without_flaws(groups[: len(members)])
         for c, (gap, size, flaws) in enumerate(hyper.cells):
             # segments that are not tied have one problem; the cells of other gaps then say the same and are left out
             one = problems[min(problems)] if gap == hyper.gaps[0] else None
@@ -178,6 +178,7 @@ class Stored:
             told = [
                 [list(g.columns), g.strengths, g.at.tolist(), g.side]
                 + [[_json(v) for v in values] for values in (g.spread, *g.bounds(), g.sizes())]
+                + [g.whole and [list(g.whole[0]), g.whole[1].tolist()]]
                 for g in groups
             ]
             nodes.append(
@@ -233,8 +234,9 @@ class Stored:
                     _wide(low, -np.inf),
                     _wide(high),
                     _wide(typical),
+                    whole and (tuple(whole[0]), np.array(whole[1])),
                 )
-                for c, s, at, side, spread, low, high, typical in node["groups"]
+                for c, s, at, side, spread, low, high, typical, whole in node["groups"]
             ]
             problems = {}
             for k, gap in enumerate(node["gaps"]):

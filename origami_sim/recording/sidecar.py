@@ -104,8 +104,8 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
-from origami_sim.recording.clock import even_times
 from origami_sim.recording.camera import rotation_matrix
+from origami_sim.recording.clock import even_times
 from origami_sim.recording.placed import columns_of
 from origami_sim.recording.possible import Possible
 from origami_sim.recording.recording import CHANNEL_KINDS

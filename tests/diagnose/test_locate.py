@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from origami_sim.device.scene import read_calibration
 from origami_sim.design.build import Sheet
+from origami_sim.device.scene import read_calibration
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared

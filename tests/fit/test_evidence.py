@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
 
-from origami_sim.fit.evidence import Group, Sets, Summed, at_bounds, problem, summed
+from origami_sim.fit.evidence import Group, Sets, Summed, problem, summed, without_flaws
 from origami_sim.fit.hyper import Hyper
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.weights import Rows
@@ -273,7 +273,7 @@ def test_no_flaw_takes_an_effect_beyond_its_bound():
     line = Linearisation([Rows(COUNT)], [residual], [toy.numbers], [np.zeros((COUNT, 0))], [None])
     p = problem(line, np.arange(2), PRECISION, AWAY, [toy.effects], [toy.smooth])
     loss = Group((0,), 1, np.zeros(1), 1, np.full(1, np.inf), low=np.zeros(1), high=np.full(1, 1e3))
-    held = at_bounds([loss, replace(loss, columns=(1,), at=np.ones(1))])
+    held = without_flaws([loss, replace(loss, columns=(1,), at=np.ones(1))])
     assert held == [0]
     none, with_loss = (Sets.of([k], [loss], 0, 2) for k in [(), (0,)])
     free, bound = summed(p, SMOOTH, 16.0), summed(p, SMOOTH, 16.0, held)
