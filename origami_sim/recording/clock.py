@@ -4,7 +4,6 @@ from decimal import Decimal
 
 import numpy as np
 
-
 FINEST = 1e-6
 """Digit, over the time between frames, beyond which a stamp counts for no more: else one alone would decide."""
 
