@@ -76,9 +76,14 @@ class Hyper:
         """Whether a cell has next to no discrepancy, of forces or of channels."""
         return np.array([gap <= self.least and smooth == 0.0 for gap, smooth, _ in self.cells])
 
-    def foreign(self, effects: int) -> float:
-        """Probability that what so many effects explain together is done by a law that the catalogue lacks."""
-        odds = self.unlisted * self.imitated ** (effects - 1) if effects else 0.0
+    def foreign(self, effects: int, left: float = 0.0) -> float:
+        """Probability that what so many effects explain together is done by a law that the catalogue lacks.
+
+        Args:
+            left: what they leave and is real, over what they explain. It needs a law beside them (`effects`), or is the
+                part that they do not imitate of the one that does all: of these any part is as probable.
+        """
+        odds = self.unlisted * self.imitated ** (effects - 1) + left / self.effects if effects else 0.0
         return odds / (1.0 + odds)
 
 

@@ -95,15 +95,15 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
         may_be, total = beside, sum(v for c, v in classes.items() if any(c >= b for b in beside))
     left = budgets(best)
     named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
-    foreign = p.hyper.foreign(laws(beside[0] if beside else lead)) if lead else imitated(p, chance, named)
+    beyond = real_rest(p, best, left)
+    foreign = p.hyper.foreign(laws(beside[0] if beside else lead), beyond) if lead else imitated(p, chance, named, beyond)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
         return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, classes, foreign)
 
     if all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    missing = max(left.pushed, left.real, float(np.sum(p.cells(best)[~p.hyper.clean])))
-    real = UNLISTED in lead or left.over > FAR or missing > ALONE
+    real = UNLISTED in lead or left.over > FAR or missing(p, best, left) > ALONE
     if left.rest > left.beyond and real:
         return as_("UNKNOWN", np.nan)
     if not top:
@@ -113,6 +113,16 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     several = sum(p.suspect(n).effect in lead for n in best) > 1
     word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if several else "MECHANISM"
     return as_(word, sum(classes[c] for c in named))
+
+
+def missing(p: Posterior, key: Key, left: Budget) -> float:
+    """Probability that a set leaves something real."""
+    return max(left.pushed, left.real, float(np.sum(p.cells(key)[~p.hyper.clean])))
+
+
+def real_rest(p: Posterior, key: Key, left: Budget) -> float:
+    """What a set leaves and is real, over what its effects explain."""
+    return missing(p, key, left) * left.rest / max(left.beyond, left.rest, 1e-300)
 
 
 def considered(p: Posterior) -> dict[Key, float]:
@@ -150,7 +160,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
     common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares, "chance": chance}
-    beyond = MORE_LAWS if more_laws else _unlisted(d)
+    beyond = (MORE_LAWS if more_laws else "") + _unlisted(d)
     suspects = shown.hypothesis.suspects
     chosen = [s.label for s in suspects]
     if d.word == "UNTESTABLE":
@@ -304,11 +314,15 @@ def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], f
     return {c: value / total for c, value in out.items()}
 
 
-def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]]) -> float:
-    """Probability that a law which the catalogue lacks is imitated by effects, if these sets of effects explain all."""
+def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]], left: float) -> float:
+    """Probability that a law which the catalogue lacks is imitated by effects, of which these sets act.
+
+    Args:
+        left: see `Hyper.foreign`.
+    """
     mine = [(value, c) for key, value in chance.items() if (c := p.told(key)) in classes]
     total = sum(value for value, _ in mine)
-    return sum(value * p.hyper.foreign(laws(c)) for value, c in mine) / total if total else 0.0
+    return sum(value * p.hyper.foreign(laws(c), left) for value, c in mine) / total if total else 0.0
 
 
 def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
@@ -440,7 +454,7 @@ def _share(part: float) -> str:
 def _unlisted(d: Decision) -> str:
     """How probable it is that a law is imitated which the catalogue lacks, in words."""
     small = d.foreign < 1.0 - CREDIBLE
-    return "" if small else f" A law that the catalogue lacks may look the same (p = {d.foreign:.2f})."
+    return "" if small else f" A law that the catalogue lacks may do all of this (p = {d.foreign:.2f})."
 
 
 def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:

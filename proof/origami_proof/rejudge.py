@@ -20,7 +20,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.discrepancy import laws
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.infer.stored import Stored
-from origami_sim.infer.verdict import by_effects
+from origami_sim.infer.verdict import by_effects, real_rest
 
 REJUDGED = "rejudged.json"
 """What comes out, in the folder of the run."""
@@ -94,7 +94,8 @@ def _row(stored: Stored, answer: dict, hyper: Hyper) -> dict:
     blank = {"noise": [1.0], "error_refitted": [1.0], "error_after": [1.0], "candidates": [], "screening": []}
     row = judge(answer, {**blank, **decided})
     chance = p.probabilities()
-    listed = {key: value * (1.0 - hyper.foreign(laws(p.effects(key)))) for key, value in chance.items()}
+    left = {key: real_rest(p, key, stored.budgets[key]) for key in chance if key in p.nodes}
+    listed = {k: value * (1.0 - hyper.foreign(laws(p.effects(k)), left.get(k, 0.0))) for k, value in chance.items()}
     missing = chance[frozenset()] * float(np.sum(p.cells(frozenset())[~hyper.clean]))
     classes = by_effects(p, listed)
     return {**row, "score": log_score(classes, 1.0 - sum(listed.values()) + missing, answer)}

@@ -135,6 +135,17 @@ def test_a_law_that_the_catalogue_lacks_may_be_imitated(effects, word, foreign):
     assert decided.lead == set(effects) and decided.probability == pytest.approx(1.0 - foreign)
 
 
+@pytest.mark.parametrize(("rest", "real", "foreign"), [(0.0, 1.0, 0.07), (0.2, 0.0, 0.07), (0.2, 1.0, 0.9)])
+def test_what_is_left_may_be_the_part_of_one_law_that_is_not_imitated(rest, real, foreign):
+    """A fifth that is real needs a further law (0.3) beside the named one; a fourth of that may be left of any law."""
+    shares = [Share("", "effect", 1.0 - rest), Share("", "rest", rest)]
+    budget = Budget(shares, 1.0, real=real, beyond=1.0 - rest)
+    decided = decide(posterior({("air_drag",): 0.0, (): -50.0}), lambda key: budget)
+    odds = 0.07 + real * 0.25 / 0.3 if rest else 0.07
+    assert odds == pytest.approx(foreign, abs=0.01) and decided.word == "MECHANISM"
+    assert decided.probability == pytest.approx(1.0 / (1.0 + odds))
+
+
 @pytest.mark.parametrize(("left", "word"), [(0.1, "SEVERAL"), (0.6, "UNKNOWN")])
 def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
     """Three laws are 1500 more probable (in the logarithm) than two of them; those are named if they explain most."""
