@@ -7,8 +7,12 @@ import warp as wp
 
 from origami_sim.effects._effect import Effect, Parameter, scalar
 
-ORDER = 5
-"""Highest order in the angle or the rate alone."""
+ANGLE, RATE = 9, 9
+"""Highest orders in the angle or the rate alone.
+
+Of four flaps with a moment that the catalogue lacks (a ratchet, detents, an even one, a loss that falls with speed) all
+are told from laws of the catalogue. With 5 the first two are not; with 18 all are, and two predict held-out data as
+badly as the model as given."""
 
 
 @wp.func
@@ -27,11 +31,19 @@ def moment(
     angle_3: scalar,
     angle_4: scalar,
     angle_5: scalar,
+    angle_6: scalar,
+    angle_7: scalar,
+    angle_8: scalar,
+    angle_9: scalar,
     rate_1: scalar,
     rate_2: scalar,
     rate_3: scalar,
     rate_4: scalar,
     rate_5: scalar,
+    rate_6: scalar,
+    rate_7: scalar,
+    rate_8: scalar,
+    rate_9: scalar,
     both_11: scalar,
     both_12: scalar,
     both_21: scalar,
@@ -47,19 +59,29 @@ def moment(
     x3 = scalar(2.0) * x * x2 - x
     x4 = scalar(2.0) * x * x3 - x2
     x5 = scalar(2.0) * x * x4 - x3
+    x6 = scalar(2.0) * x * x5 - x4
+    x7 = scalar(2.0) * x * x6 - x5
+    x8 = scalar(2.0) * x * x7 - x6
+    x9 = scalar(2.0) * x * x8 - x7
     y2 = scalar(2.0) * y * y - one
     y3 = scalar(2.0) * y * y2 - y
     y4 = scalar(2.0) * y * y3 - y2
     y5 = scalar(2.0) * y * y4 - y3
+    y6 = scalar(2.0) * y * y5 - y4
+    y7 = scalar(2.0) * y * y6 - y5
+    y8 = scalar(2.0) * y * y7 - y6
+    y9 = scalar(2.0) * y * y8 - y7
     by_angle = angle_1 * x + angle_2 * x2 + angle_3 * x3 + angle_4 * x4 + angle_5 * x5
+    by_angle += angle_6 * x6 + angle_7 * x7 + angle_8 * x8 + angle_9 * x9
     by_rate = rate_1 * y + rate_2 * y2 + rate_3 * y3 + rate_4 * y4 + rate_5 * y5
+    by_rate += rate_6 * y6 + rate_7 * y7 + rate_8 * y8 + rate_9 * y9
     return constant + by_angle + by_rate + both_11 * x * y + both_12 * x * y2 + both_21 * x2 * y
 
 
 TERMS = (
     ("constant", 0, 0),
-    *((f"angle_{n}", n, 0) for n in range(1, ORDER + 1)),
-    *((f"rate_{n}", 0, n) for n in range(1, ORDER + 1)),
+    *((f"angle_{n}", n, 0) for n in range(1, ANGLE + 1)),
+    *((f"rate_{n}", 0, n) for n in range(1, RATE + 1)),
     ("both_11", 1, 1),
     ("both_12", 1, 2),
     ("both_21", 2, 1),

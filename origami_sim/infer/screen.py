@@ -166,6 +166,7 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
         loud = np.linalg.norm(np.concatenate(s.parts), axis=0)
         axes = along_each_axis(s.suspect)
         most = [_admissible(a, 10 * np.sign(z) * _typical(a)) / z for a, z in zip(axes, s.size, strict=True)]
+        most = most if _typical(s.suspect) else [np.inf]  # of a coefficient any size is plausible
         reach = np.maximum(1.0, most)
         status, shows = "", (norm[mine] * reach >= SILENT) & (norm[mine] >= 1e-6 * loud)
         if not np.any(shows):

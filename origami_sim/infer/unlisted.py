@@ -11,11 +11,12 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval2d
 from scipy.signal import savgol_filter
 
-from origami_sim.effects.crease_polynomial import EFFECT, ORDER, TERMS
+from origami_sim.effects.crease_polynomial import ANGLE, EFFECT, RATE, TERMS
 from origami_sim.fit.evidence import Group
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.implied import OwnColumns
 from origami_sim.fit.least_squares import Fit
+from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Suspect, scaled
@@ -121,7 +122,7 @@ def beside(
     out = []
     for of, gain, mine in zip(sets, gains, sites.values(), strict=True):
         columns = [c for g in of for c in groups[g].columns]
-        suspect, sizes = _joint(mine, float(np.sqrt(f.cost))), np.concatenate([m.size for m in mine])
+        suspect, sizes = _joint(mine, f.linear), np.concatenate([m.size for m in mine])
         known = [0.0] * len(own.columns) + [s.size[0] / n.spread for s, n in zip(mine, suspect.free, strict=False)]
         gram = ahead.white.gram
         values = np.linalg.lstsq(
@@ -140,13 +141,18 @@ def crease_of_the_rest(forward: Predictor, f: Fit, hyper: Hyper = HYPER) -> str:
     return found[0].site if found is not None and found[2] > 0.0 else ""
 
 
-def _joint(mine: Sequence[Signature], missed: float) -> Suspect:
-    """One suspect with all of its coefficients.
+def _joint(mine: Sequence[Signature], line: Linearisation) -> Suspect:
+    """One suspect with all of its coefficients: of a moment that changes readings about as much as is missed.
 
     Args:
-        missed: norm of what is missed, over the noise.
+        line: of the fit that they are beside.
     """
-    unit = missed * float(np.median([abs(s.size) / s.raw for s in mine]))
+
+    def read(parts: Sequence[np.ndarray]) -> float:
+        """Norm of what concerns readings: where segments are tied, far less shows."""
+        return float(np.linalg.norm(np.concatenate([p[: r.data] for p, r in zip(parts, line.rows, strict=True)])))
+
+    unit = read(line.residual) * float(np.median([abs(s.size) / max(read(s.parts), 1e-300) for s in mine]))
     strengths = [replace(s.suspect.free[0], scale=abs(float(s.size[0])), spread=WIDE * unit) for s in mine]
     first = mine[0].suspect
     return replace(first, free=(*strengths, *first.free[1:]))
@@ -162,7 +168,7 @@ def usual_moment(forward: Predictor, f: Fit) -> float:
     angle, rate = (v[np.isin(forward.articulation.creases, suspect.entities)] for v in moved)
     x = np.clip((angle - of["middle"]) / of["reach"], -1.0, 1.0)
     y = np.clip(np.arcsinh(rate / of["usual"]) / np.arcsinh(of["fastest"] / of["usual"]), -1.0, 1.0)
-    table = np.zeros((ORDER + 1, ORDER + 1))
+    table = np.zeros((ANGLE + 1, RATE + 1))
     for name, i, j in TERMS:
         table[i, j] = of.get(name, 0.0)
     return float(np.sqrt(np.mean(np.square(chebval2d(x, y, table)))))

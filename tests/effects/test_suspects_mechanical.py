@@ -279,7 +279,7 @@ def test_table_of_the_discrepancy_is_exact_for_bilinear_moments():
 
 def test_polynomial_of_a_crease_is_that_of_chebyshev():
     rng, ends = np.random.default_rng(3), {"middle": 0.2, "reach": 0.9, "usual": 0.7, "fastest": 6.0}
-    table = np.zeros((6, 6))
+    table = np.zeros((crease_polynomial.ANGLE + 1, crease_polynomial.RATE + 1))
     for _, i, j in crease_polynomial.TERMS:
         table[i, j] = rng.normal()
     given = {name: table[i, j] for name, i, j in crease_polynomial.TERMS}
