@@ -34,6 +34,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Free, Subject
 from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads
+from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
 from origami_sim.recording import DataSet, lint_report, read_dataset
@@ -456,7 +457,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
     shown = patched(d)
     for n in shown.numbers if shown is not None else []:
         bound = ", at its bound" if n.at_bound else ""
-        lines.append(f"  {n.label} = {n.value:.4g} {n.unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")
+        unit = "" if n.unit in ("-", "1") else f" {n.unit}"
+        lines.append(f"  {n.label} = {n.value:.4g}{unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")
     lines += ["", f"{'rms error, held out':24s} {'noise':>10s} {'as given':>10s} {'refitted':>10s} {'explained':>10s}"]
     rows = zip(d.components, d.units, d.noise, d.error_before, d.error_refitted, d.error_after, strict=True)
     lines += [f"{f'{name} [{unit}]':24s} " + " ".join(f"{v:10.3g}" for v in values) for name, unit, *values in rows]
@@ -469,6 +471,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
         lines.append(f"report: {files.get('report', files.get('data'))}")
     lines += [f"replay: origami-sim replay {r}" for r in replays]
     if "calibration" in files:
+        moment = any(label.startswith(UNLISTED) for label in d.chosen)
         far = "   (the closest explanation, which is not enough)" if d.verdict == "UNKNOWN" and d.patch else ""
+        far = "   (with that moment)" if moment else far
         lines.append(f"patched: origami-sim run {scene} --calibration {files['calibration']}{far}")
     return [*lines, f"{sum(d.seconds.values()):.0f} s of computing"]

@@ -8,6 +8,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
+from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.verdict import Judgement, log_odds
 from origami_sim.infer.words import kind
 from origami_sim.predict.channels import units_of
@@ -52,6 +53,8 @@ def table(
 def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
     """Why a row won or lost, in words."""
     f = p.nodes[key].fit
+    if f.hypothesis is judged.best.hypothesis and UNLISTED in f.hypothesis.effects:
+        return "no law of the catalogue; its coefficients are in the patch"
     if f.hypothesis is judged.best.hypothesis:
         return "closest, but not enough" if judged.verdict in ("UNKNOWN", "UNTESTABLE") else "chosen"
     if any(f.hypothesis is t.hypothesis for t in judged.tied):
@@ -82,17 +85,18 @@ def _distrust(f: Fit) -> str:
             out.append(f"{n.label} left its prior by {strain:.1f} sd")
     strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
     for n, t, d in zip(f.free[own:], f.theta[own:], f.deviations()[own:], strict=True):
-        if id(n) in strong and abs(t) < 2 * d:
+        if id(n) in strong and abs(t) < 2 * d and n.owner != UNLISTED:
             out.append(f"{n.label} is not told from zero")
     return "; ".join(out)
 
 
 def numbers(f: Fit) -> list[Number]:
-    """Fitted numbers with 95 % intervals."""
-    return [
+    """Fitted numbers with 95 % intervals, without the coefficients of a moment that no law gives."""
+    every = [
         Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away))
         for n, t, low, high, away, b in zip(f.free, f.theta, *f.intervals(), f.strain, f.at_bound, strict=True)
     ]
+    return [number for number, n in zip(every, f.free, strict=True) if n.owner != UNLISTED]
 
 
 def suspected(s: Signature, scores: np.ndarray, total: float) -> Suspected:

@@ -10,6 +10,7 @@ from origami_sim.fit.bursts import bursts
 from origami_sim.fit.discrepancy import laws, of_recorder
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.hypotheses.hypothesis import NOMINAL
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import CREDIBLE, Key, Node, Posterior
@@ -157,7 +158,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     more_laws = len(chance) < len(p.total)  # only some may be named
     best = p.nodes[d.best].fit
     left = crease_of_the_rest(forward, best, p.hyper) if d.lead and _shows(budgeted(d.best).rest) else ""
-    shown, explained = widened(p, d.best), _explained(budgeted(d.best), left)
+    shown = widened(p, d.best)
+    explained = explains(budgeted(d.best), left, shown)
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
@@ -435,11 +437,18 @@ def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]]
     return out, min(total, 1.0)
 
 
-def _explained(b: Budget, left: str) -> str:
-    """What a set explains, what numbers of the model do, and how much at which crease is left, in words."""
+def explains(b: Budget, left: str, f: Fit) -> str:
+    """What a set explains, what numbers of the model do, and how much at which crease is left, in words.
+
+    Where numbers explain more, the one is said that moved farthest.
+    """
     text = f"explains {_share(b.named)} of the mismatch"
     if _shows(b.numbers):
         text += f", numbers of the model {b.numbers:.0%}"
+    moved = [(s, n, t) for s, n, t in zip(f.strain, f.free, f.theta, strict=True) if n.owner == NOMINAL and s > 1.0]
+    if moved and b.numbers > b.named:
+        _, n, value = max(moved, key=lambda one: one[0])
+        text += f" (above all {n.label}, from {said(n.start, n.unit)} to {said(value, n.unit)})"
     where = f", above all at {left}" if left else ""
     return text + (f"; {b.rest:.0%} is real and not named{where}" if _shows(b.rest) else "")
 

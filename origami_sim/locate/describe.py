@@ -8,6 +8,7 @@ from origami_sim.effects import get
 from origami_sim.effects.crease_polynomial import EFFECT as MOMENT
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.locate.partial import lacking
 from origami_sim.locate.places import Acting, Curve, Place
 from origami_sim.locate.where import located
 
@@ -99,8 +100,10 @@ def unnamed(forward: Predictor, base: Fit, best: Fit) -> str:
     They know no memory, and are read as recorded, without what a hypothesis says of the measurement. A moment that no
     law gives is no name.
     """
+    if (moment := next((s for s in best.hypothesis.suspects if s.effect == MOMENT.name), None)) is not None:
+        return described(lacking(forward, best, moment), [], "What is missing")
     effects = best.hypothesis.effects
-    lost = any(get(e).memory or get(e).family == "measurement" or e == MOMENT.name for e in effects)
+    lost = any(get(e).memory or get(e).family == "measurement" for e in effects)
     f, what = (base, "What is missing") if lost else (best, "What is left")
     places, actions = located(forward, f)
     return described(places, actions, what)

@@ -63,6 +63,11 @@ def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[P
     return out
 
 
+def lacking(forward: Predictor, f: Fit, suspect: Suspect) -> list[Place]:
+    """Places of what a fit's model lacks without one of its effects."""
+    return _places(forward, f, [f.theta, _without(f, suspect)])[1]
+
+
 def _misread(forward: Predictor, f: Fit, suspects: Sequence[Suspect]) -> list[Partial]:
     """Of errors of a recorder what readings differ by from those predicted without each, and what that gives."""
     thetas = [f.theta, *(_without(f, s) for s in suspects)]

@@ -8,7 +8,7 @@ import pytest
 from origami_sim.diagnose import Options
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.diagnose.tables import patch
+from origami_sim.diagnose.tables import numbers, patch
 from origami_sim.effects.crease_polynomial import TERMS
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import fit
@@ -21,6 +21,7 @@ from origami_sim.infer.search import search
 from origami_sim.infer.stored import Stored
 from origami_sim.infer.unlisted import UNLISTED, anywhere, beside, motion, usual_moment
 from origami_sim.infer.verdict import decide, judge
+from origami_sim.locate.describe import unnamed
 from tests.diagnose.strips import record, subject
 
 SMALL = {"duration": 4.0, "panels": 3, "rate": 100}
@@ -119,6 +120,16 @@ def test_the_moment_is_named_in_the_sentence_and_in_the_patch(fallen):
     assert "a moment by angle and rate that no law of the catalogue gives, at crease 1 (root mean" in said.sentence
     assert "The closest of the catalogue is dry friction at crease 1" in said.sentence
     assert UNLISTED in str(patch(said.best))
+    assert not any(UNLISTED in n.label for n in numbers(said.best))  # two dozen coefficients say nothing to a reader
+
+
+def test_it_is_described_by_what_it_gives(fallen):
+    """And not by what the model without it lacks, which counts what smoothing takes from accelerations."""
+    forward, _, _, found = fallen
+    best = found.nodes[max(found.nodes, key=lambda k: found.total[k])].fit
+    said = unnamed(forward, found.nodes[frozenset()].fit, best)
+    assert said.startswith("What is missing acts at crease 1, goes with the rate at crease 1 (")
+    assert said.endswith("is odd in the rate and takes energy.")
 
 
 def test_what_is_left_beside_named_laws_is_said_to_be_at_its_crease(fallen):

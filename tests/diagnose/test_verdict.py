@@ -15,7 +15,7 @@ from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share, shapley
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import credible, decide, in_all, undecided
+from origami_sim.infer.verdict import credible, decide, explains, in_all, undecided
 from origami_sim.infer.words import joined, said, say, title
 from origami_sim.locate.describe import described
 from origami_sim.locate.places import Acting, Curve, Place
@@ -290,3 +290,13 @@ def test_other_numbers_of_a_single_effect_are_said_unless_they_lie_on_a_bound(he
     assert (
         text.startswith("viscoelastic relaxation at hinge (stiffness 100 µN m/rad") and ("time 43.8 s" in text) != held
     )
+
+
+@pytest.mark.parametrize(("numbers", "far", "words"), [(0.7, 2.0, True), (0.7, 0.5, False), (0.2, 2.0, False)])
+def test_where_numbers_explain_more_the_one_that_moved_farthest_is_said(numbers, far, words):
+    known = (Free("", "mass", "kg", 0.02, 1e-3, spread=1e-3), Free("", "stiffness", "N m/rad", 3e-3, 1e-4, spread=1e-4))
+    f = cast(Fit, SimpleNamespace(free=known, theta=np.array([0.0205, 3e-3 + far * 1e-4]), strain=np.array([0.5, far])))
+    shares = [Share("", "numbers", numbers), Share("", "effect", 1.0 - numbers)]
+    text = explains(Budget(shares, 1.0), "", f)
+    assert text.startswith(f"explains {1.0 - numbers:.0%} of the mismatch, numbers of the model {numbers:.0%}")
+    assert ("above all stiffness, from 3.00 mN m/rad to 3.20 mN m/rad" in text) == words and "mass" not in text
