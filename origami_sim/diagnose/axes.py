@@ -1,11 +1,11 @@
-"""Mirrored pictures, reversed signs and exchanged channels, found before anything is fitted.
+"""Mirrored pictures, reversed signs, exchanged channels and milliseconds read as seconds, found before a fit.
 
 Such a mistake is no effect with a strength: it is so or it is not, and what is not seen at once is explained away by
 wrong physics. So each of a few changes of the recording is compared with the model as given, from starts that are read
 from the recording changed in this way.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,7 +20,14 @@ from origami_sim.recording import Recording
 from origami_sim.recording.axes import EXPLAINED, FAR, alike, groups_of, orders, picture_of, reordered, words
 from origami_sim.recording.recording import Channel
 
-Change = Callable[[Mapping[str, Channel]], dict[str, Channel]]
+Change = Callable[[Recording], Recording]
+
+CLOCKS = {1e-3: "1000 times too long", 1e3: "1000 times too short"}
+"""Factors by which times may be wrong: milliseconds read as seconds, and the reverse."""
+
+FIRST = 100
+"""Frames of a recording that tell whether its times are too short, of rigid panels: a motion that lasts 1000 times as
+long is predicted in a second or two, and of bars, which take steps of microseconds, it is not."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,8 @@ def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forw
     if given < max(FAR, EXPLAINED * moved):  # nothing can be so many times closer, or as it is most is explained
         return None
     same, found = replace(o, panels=forward.panels or o.panels), []
-    for what, remedy, change in changes(recordings[0]):
-        changed = [replace(r, channels=change(r.channels)) for r in recordings]
+    for what, remedy, change in changes(recordings[0], longer=forward.panels == "rigid"):
+        changed = [change(r) for r in recordings]
         try:
             left, moved = missed(arranged(subject, changed, same)[0])
         except InputError:
@@ -73,8 +80,12 @@ def missed(forward: Predictor) -> tuple[float, float]:
     return (float(every[0]) if np.isfinite(every[0]) else np.inf), float(every[1])
 
 
-def changes(recording: Recording) -> Iterator[tuple[str, str, Change]]:
-    """What may be wrong with channels, in words, what then has to be stated, and the channels as they should be."""
+def changes(recording: Recording, *, longer: bool = True) -> Iterator[tuple[str, str, Change]]:
+    """What may be wrong with a recording, in words, what then has to be stated, and the recording as it should be.
+
+    Args:
+        longer: whether times may be too short, too.
+    """
     for group in groups_of(list(recording.channels.values())):
         width = group[0].values.reshape(len(recording.times), -1).shape[1]
         names = [c.name for c in group]
@@ -86,18 +97,40 @@ def changes(recording: Recording) -> Iterator[tuple[str, str, Change]]:
         if a.kind == b.kind and picture_of(a) == picture_of(b):
             remedy = "Exchange their columns or tracks in the sidecar"
             yield f"Channels {a.name} and {b.name} are exchanged", remedy, exchanged(a.name, b.name)
+    if not recording.by_step and all(d.times is None for d in recording.drive.values()):
+        for factor, words_of_it in CLOCKS.items():
+            if factor > 1.0 and not longer:
+                continue
+            yield f"Times are {words_of_it}", "State their unit or rate_hz under [time] in the sidecar", clocked(factor)
 
 
 def turned(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Change:
-    """Channels with components in another order, and with other signs."""
+    """A recording with components of channels in another order, and with other signs."""
 
     def of(channel: Channel) -> Channel:
         return replace(channel, values=reordered(channel.values, order, signs))
 
-    return lambda every: {n: of(c) if n in names else c for n, c in every.items()}
+    return lambda r: replace(r, channels={n: of(c) if n in names else c for n, c in r.channels.items()})
 
 
 def exchanged(a: str, b: str) -> Change:
-    """Channels of which two have each other's values."""
+    """A recording of which two channels have each other's values."""
     other = {a: b, b: a}
-    return lambda every: {n: replace(c, values=every[other.get(n, n)].values) for n, c in every.items()}
+
+    def change(r: Recording) -> Recording:
+        values = {n: r.channels[other.get(n, n)].values for n in r.channels}
+        return replace(r, channels={n: replace(c, values=values[n]) for n, c in r.channels.items()})
+
+    return change
+
+
+def clocked(factor: float) -> Change:
+    """A recording of which all times are so many times as long, or the beginning of it if they get longer."""
+
+    def change(r: Recording) -> Recording:
+        n = len(r.times) if factor < 1.0 else min(FIRST, len(r.times))
+        channels = {name: replace(c, values=c.values[:n]) for name, c in r.channels.items()}
+        drive = {name: d if d.constant else replace(d, values=d.values[:n]) for name, d in r.drive.items()}
+        return replace(r, times=r.times[0] + factor * (r.times[:n] - r.times[0]), channels=channels, drive=drive)
+
+    return change

@@ -18,7 +18,6 @@ from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
-from origami_sim.diagnose.meeting import meetings
 from origami_sim.diagnose.observed import assumed, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
@@ -40,6 +39,7 @@ from origami_sim.infer.stored import Stored
 from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
+from origami_sim.locate.meeting import meetings
 from origami_sim.locate.onset import onset
 from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located

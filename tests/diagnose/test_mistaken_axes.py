@@ -47,6 +47,14 @@ def test_exchanged_channels_are_told_from_a_missing_effect(exchange):
         assert f"Channels {names[0]} and {names[1]} are exchanged" in mistake.sentence
 
 
+@pytest.mark.parametrize(("factor", "said"), [(1e3, "too long"), (1e-3, "too short")])
+def test_milliseconds_that_were_read_as_seconds_are_told_before_a_search(factor, said):
+    right = record(panels=2, duration=2.0, rate=100)
+    mistake = found(subject(2), replace(right, times=factor * right.times))
+    assert mistake is not None and mistake.sentence.startswith(f"Times are 1000 times {said}: as recorded the model")
+    assert "[time]" in mistake.sentence and found(subject(2), right) is None
+
+
 def test_a_recording_of_another_device_is_no_mistake_of_axes():
     recording = record(panels=3, duration=3.0)
     noise = {n: np.random.default_rng(k).normal(size=len(recording.times)) for k, n in enumerate(recording.channels)}

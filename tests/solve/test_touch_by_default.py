@@ -9,10 +9,10 @@ import pytest
 
 from origami_sim import Drive, Sheet, continuation, equilibrium, quasistatic, ramp, simulate, strip
 from origami_sim import sheet as mesh
-from origami_sim.diagnose.meeting import meetings
 from origami_sim.errors import InputError
 from origami_sim.explore import Way, angle, find
 from origami_sim.explore.gradients import gradient
+from origami_sim.locate.meeting import meetings
 from origami_sim.model import State
 from origami_sim.predict.memories import Motion
 from origami_sim.predict.rollouts import Rollouts
