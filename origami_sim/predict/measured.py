@@ -71,14 +71,15 @@ def measured(
     """Channels [n, D, W] as distorted measurements show them; what is `shown` first (K,) is the grid's start.
 
     Args:
-        distort: effects of the measurement. channels: [F, D + k, W] on the grid (F,). times: (n,) of frames [s].
+        distort: effects of the measurement. channels: [F, D + k, W] on the grid (F,). times: (n,) of frames [s], or
+            [n, W] of each world's.
         rested: whether the motion was at rest before the grid's start, of all worlds or of each (W,); None: the grid
             begins with the times of frames, and they are read at no others.
     """
     worlds = channels.shape[2]
     shown = np.repeat(shown, worlds // len(shown))
     still = None if rested is None else np.broadcast_to(rested, worlds)
-    at = np.repeat(times[:, None], worlds, axis=1)
+    at = times if times.ndim == 2 else np.repeat(times[:, None], worlds, axis=1)
     distort = sorted(distort, key=lambda name: not get(name).on_body)
     parts, row, deep = [], 0, len(angle_mask(recording))
     axes = deep + sum(c.kind == "marker_2d" for c in recording.channels.values())
@@ -98,7 +99,8 @@ def measured(
             mine = np.flatnonzero(kind.ravel() == k)
             laws = list(compress(given.items(), on))
             seen = [*rows, *turned] if any(get(name).on_body for name, _ in laws) else rows
-            reader = _reader(grid, channels[:, seen][:, :, mine], shown[mine], None if still is None else still[mine])
+            rests = None if still is None else still[mine]
+            reader = _reader(grid, channels[:, seen][:, :, mine], shown[mine], rests, trembling=times.ndim == 2)
             for name, by in laws:
                 reader = _wrapped(get(name), reader, {n: v[mine] for n, v in by.items()})
             part[:, :, mine] = reader(at[:, mine])[:, :width]
@@ -132,7 +134,7 @@ def _wrapped(effect, inner, given):
     return lambda t: effect.apply(inner, t, **given)
 
 
-def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, rested: np.ndarray | None):
+def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, rested: np.ndarray | None, *, trembling: bool):
     """values [F, d, W] as a function of times [n, W], of which `shown` (W,) is the grid's start.
 
     Before it the motion rested (W,), or went on as it began, with its rate and acceleration there; many worlds may
@@ -144,8 +146,9 @@ def _reader(grid: np.ndarray, values: np.ndarray, shown: np.ndarray, rested: np.
 
     def at(times: np.ndarray) -> np.ndarray:
         since = times - shown
-        # clocks are late and fast: their first and last readings tell them apart
-        _, some, inverse = np.unique(since[[0, -1]], axis=1, return_index=True, return_inverse=True)
+        # clocks are late and fast: their first and last readings tell them apart, if they do not tremble
+        telling = since if trembling else since[[0, -1]]
+        _, some, inverse = np.unique(telling, axis=1, return_index=True, return_inverse=True)
         columns = since[:, some]
         out = np.empty((len(times), values.shape[1], values.shape[2]))
         for c in range(columns.shape[1]):

@@ -20,7 +20,7 @@ from origami_sim.predict.drives import drive_of, reaching
 from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.predict.memories import Motion, memories
-from origami_sim.predict.shots import Shots, Simulated, by_length, joined, joined_poses, remembering
+from origami_sim.predict.shots import Shots, Simulated, by_length, joined, joined_poses, remembering, trembles
 from origami_sim.predict.starts import CAREFUL, Readings, seen_first, spans
 from origami_sim.predict.stated import stated
 from origami_sim.predict.thresholds import within_reach
@@ -187,23 +187,27 @@ class Rollouts(Worlds, ABC):
         recording, every = self.recordings[r], [self.blocks[b] for b in group]
         blocks, mine = [self.blocks[b] for b in part], [group.index(b) for b in part]
         k, count = len(worlds), len(blocks)
-        model, times, lasting = lead, every[0].times, every[0].lasting
-        step = film_step(recording.times)
-        ends = round(lasting / step)
-        if ends:
-            step = even(step, lasting, ends)
+        model, uneven, step = lead, trembles(every), film_step(recording.times)
+        lasting = np.array([b.lasting for b in every]) if uneven else every[0].lasting
+        ends = round(float(np.median(lasting)) / step)
+        if ends and not uneven:
+            step = even(step, every[0].lasting, ends)
         begins = recording.times[[b.first for b in every]] - recording.times[0]
         once = Parameters.join([p for _, p in worlds])
         late, shown = lateness(model, once, k, begins, self.start == "fit")
         longer = lateness(model, once, k, begins + lasting, self.start == "fit")[0] - late
+        if uneven and ends:
+            longer = longer + (lasting - ends * step)
         clocked = bool(ends and np.any(longer))
         begun = begins + late if np.any(late) else begins
         distort = [e for e in model.effects if get(e).family == "measurement"]
-        frames = len(times)
+        times = np.stack([b.times for b in (blocks if uneven else every[:1])], axis=1)
+        frames, latest = len(times), max(b.times[-1] for b in every)
         timed = any(not get(e).channels for e in distort)  # what reads angles or places has no time of its own
-        as_filmed = not timed and np.allclose(times, np.arange(frames) * step, atol=1e-6 * step)
+        even_film = np.allclose(times[:, 0], np.arange(frames) * step, atol=1e-6 * step)
+        as_filmed = not timed and not uneven and even_film
         if not as_filmed:
-            last = max(read_until(model, once, c, times[-1], shown) for c in range(len(recording.channels)))
+            last = max(read_until(model, once, c, latest, shown) for c in range(len(recording.channels)))
             frames = int(np.ceil(last / step - 1e-6)) + 1 + SPARE
         starts = None if local is None else local[:, part]
         moves, of = distinct_motions(worlds, late, starts)
@@ -244,11 +248,16 @@ class Rollouts(Worlds, ABC):
             parameters = Parameters.join([p for _, p in worlds], repeat=count)
             began = recording.start is not None and recording.start.state != "moving"  # at rest
             rested = None if as_filmed else np.tile([self.start != "fit" or (began and not b.first) for b in blocks], k)
-            values = measured(parameters, recording, distort, grid, channels, times, shown, rested=rested)
+            at = np.tile(times, (1, k)) if uneven else times[:, 0]
+            values = measured(parameters, recording, distort, grid, channels, at, shown, rested=rested)
         elif as_filmed:
             values = plain[: len(times)]
+        elif uneven:
+            values = np.empty((len(times), *plain.shape[1:]))
+            for n, own in enumerate(times.T):
+                values[:, :, n::count] = spline(grid, plain[:, :, n::count])(own)
         else:
-            values = spline(grid, plain)(times)
+            values = spline(grid, plain)(times[:, 0])
         values = values.reshape(len(times), -1, k, count)
         tied = None
         if arrived is not None:

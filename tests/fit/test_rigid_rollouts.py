@@ -355,3 +355,26 @@ def test_a_filter_of_the_recorder_goes_on_from_segment_to_segment(effect, spread
     for block, a, b in zip(forward.blocks, plain, smooth, strict=True):
         expected = 0.5 * (spread * 0.003) ** 2 * CubicSpline(block.times, a[0])(block.times, 2)
         assert np.abs((b - a)[0] - expected)[:5].max() < 0.3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("effect", ["", "clock_rate", "exposure", "angle_scale"])
+def test_segments_of_a_clock_that_trembles_are_filmed_together_and_read_at_their_own_times(effect):
+    exact = swung(*hanging(3), duration=3.0)
+    rng = np.random.default_rng(2)
+    times = exact.times + 0.05 / RATE * rng.normal(size=len(exact.times)) * (np.arange(len(exact.times)) > 0)
+    curves = {n: CubicSpline(exact.times, c.values)(times) for n, c in exact.channels.items()}
+    channels = {n: replace(c, values=curves[n]) for n, c in exact.channels.items()}
+    forward = RigidRollouts(subject(3), [replace(exact, times=times, channels=channels)], segment=0.5, threads=1)
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    some = tuple(s for s in every if s.label == f"{effect} at the measurement")
+    strength = {"clock_rate": 0.01, "exposure": 4e-3, "angle_scale": 0.02}.get(effect)
+    theta = np.array([[f.start for f in forward.subject.nominals] + [strength] * (strength is not None)])
+    local = 1e-2 * rng.normal(size=(1, len(forward.blocks), forward.local))
+    together = forward.shoot(Hypothesis(some), theta, local)
+    m = forward.articulation.size
+    usual = np.concatenate([np.full(m, NOISE), 1e-3 * forward.readings.usual_rates(0)])
+    for b, values in enumerate(together.values):
+        alone = forward.shoot(Hypothesis(some), theta, local, [b])
+        assert np.abs(values - alone.values[0]).max() < 0.05 * NOISE  # 0.025
+        if (ends := together.ends[b]) is not None:
+            assert np.abs((ends - alone.ends[0]) / usual).max() < 0.8  # 0.62
