@@ -146,8 +146,10 @@ def _with_residual(forward: Rollouts, f: Fit, index: int, m: Motion) -> tuple[Mo
     path = track(forward, forward.recordings[index], np.concatenate([values[0] for values in shot.values]))
     wide = motion(forward, f, index, half=round(WIDER * m.half)) or m
     own = motion(forward, f, index, path=path, half=wide.half, frames=wide.times) if path is not None else None
-    needed, given = (_lacking(forward, f, [f.theta], index, one)[0].missing if one else 0.0 for one in (wide, own))
-    return m.part(np.isin(m.times, wide.times)), needed - given
+    residual = _lacking(forward, f, [f.theta], index, wide)[0].missing
+    if own is not None:
+        residual = residual - _lacking(forward, f, [f.theta], index, own)[0].missing
+    return m.part(np.isin(m.times, wide.times)), residual
 
 
 def _lacking(forward: Rollouts, f: Fit, thetas: Sequence[np.ndarray], index: int, m: Motion) -> list[Motion]:

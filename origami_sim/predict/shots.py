@@ -96,9 +96,9 @@ def joined(several: list[tuple]) -> tuple:
 TREMBLING = 0.3
 """Part of a frame by which times of blocks may differ that are filmed together: each is read at its own times.
 
-Where one ends is then read between frames: of a strip at 100 Hz whose clock trembles by a twentieth of a frame rates are
-off by up to 6e-4 of what is usual, less than forces of which nothing is said. Two flaps of 750 frames take 8 s, and 38 s
-where each segment is filmed alone."""
+Where one ends is then read between frames: of a strip at 100 Hz whose clock trembles by a twentieth of a frame, rates
+are off by up to 6e-4 of what is usual, less than forces of which nothing is said. Two flaps of 750 frames take 8 s, and
+38 s where each segment is filmed alone."""
 
 
 def by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
