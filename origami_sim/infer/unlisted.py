@@ -137,7 +137,9 @@ def crease_of_the_rest(forward: Predictor, f: Fit, hyper: Hyper = HYPER) -> str:
     """The crease at which such a moment explains most of what a fit leaves; "" where it explains nothing anywhere."""
     if any(s.effect == UNLISTED for s in f.hypothesis.suspects):
         return ""
-    found = max(beside(forward, f, anywhere(forward), hyper), key=lambda one: one[2], default=None)
+    low = {name for name, *orders in TERMS if max(orders) <= ANGLE // 3}  # these tell the crease
+    some = [s for s in anywhere(forward) if s.free[0].name in low]
+    found = max(beside(forward, f, some, hyper), key=lambda one: one[2], default=None)
     return found[0].site if found is not None and found[2] > 0.0 else ""
 
 
