@@ -38,7 +38,7 @@ Half and double take half and twice that; nothing is named by what is drawn."""
 WIDER = 2.0
 """Frames of the smoother for what the whole model lacks, over those that leave no more than noise of the motion.
 
-Of two flaps that swing (2 mrad, 150 Hz) bars are then a fifth; with three times as many frames a tenth."""
+Of two flaps that swing (2 mrad, 150 Hz) bars are then a sixth; with three times as many frames a fourteenth."""
 
 
 def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[Partial]:
@@ -143,7 +143,8 @@ def _with_residual(forward: Rollouts, f: Fit, index: int, m: Motion) -> tuple[Mo
     """What a fit lacks [m, n] along the motion of a recording, and the frames of that in which it is known."""
     mine = [b for b in f.blocks if forward.blocks[b].recording == index]
     shot = forward.shoot(f.hypothesis, f.theta[None], f.local[None], mine)
-    path = track(forward, forward.recordings[index], np.concatenate([values[0] for values in shot.values]))
+    values, recording = np.concatenate([v[0] for v in shot.values]), forward.recordings[index]
+    path = track(forward, recording, values) if len(values) == len(recording.times) else None
     wide = motion(forward, f, index, half=round(WIDER * m.half)) or m
     own = motion(forward, f, index, path=path, half=wide.half, frames=wide.times) if path is not None else None
     residual = _lacking(forward, f, [f.theta], index, wide)[0].missing

@@ -113,6 +113,15 @@ def test_what_it_gains_is_that_of_a_fit(fallen):
     assert gain["crease 1"] == pytest.approx(judged.total[best] - judged.total[frozenset()], rel=0.25)
 
 
+def test_how_large_coefficients_may_be_does_not_depend_on_how_tightly_segments_are_tied(fallen):
+    """Rows that tie segments are not readings: in their weights a moment that fits would be improbably large."""
+    forward, _, _, found = fallen
+    f = found.nodes[frozenset()].fit
+    tied = [f.reweighted(replace(f.weights, gap=gap)) for gap in (1e-5, 1e-2)]
+    spreads = [max(beside(forward, t, anywhere(forward)), key=lambda one: one[2])[0].free[0].spread for t in tied]
+    assert spreads[0] == pytest.approx(spreads[1], rel=0.1)  # 0.004
+
+
 def test_the_moment_is_named_in_the_sentence_and_in_the_patch(fallen):
     forward, given, base, found = fallen
     said = judge(forward, given, base, found, 1.0)
