@@ -69,6 +69,13 @@ def test_a_header_with_a_degree_sign_of_windows(write, swing):
         assert found.channels["theta"].values[0] == 1.5
 
 
+def test_rounded_time_stamps_are_read_as_an_even_grid(write):
+    times = np.arange(200) / 150.0
+    path = write("t,a\n" + "".join(f"{t:.6g},{np.sin(t):.9g}\n" for t in times))
+    assert np.ptp(np.diff(read_recording(path).times)) < 1e-12
+    assert np.abs(read_recording(path).times - times).max() < 1e-7
+
+
 def test_values_arrive_in_si_with_sign_offset_and_attachment(write):
     sidecar = """
 name = "turn"
