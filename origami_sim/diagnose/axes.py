@@ -19,15 +19,9 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.recording import Recording
 from origami_sim.recording.axes import EXPLAINED, FAR, alike, groups_of, orders, picture_of, reordered, words
 from origami_sim.recording.recording import Channel
+from origami_sim.recording.units import unit_factor
 
 Change = Callable[[Recording], Recording]
-
-CLOCKS = {1e-3: "1000 times too long", 1e3: "1000 times too short"}
-"""Factors by which times may be wrong: milliseconds read as seconds, and the reverse."""
-
-FIRST = 100
-"""Frames of a recording that tell whether its times are too short, of rigid panels: a motion that lasts 1000 times as
-long is predicted in a second or two, and of bars, which take steps of microseconds, it is not."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,10 @@ def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forw
     if given < max(FAR, EXPLAINED * moved):  # nothing can be so many times closer, or as it is most is explained
         return None
     same, found = replace(o, panels=forward.panels or o.panels), []
-    for what, remedy, change in changes(recordings[0], longer=forward.panels == "rigid"):
+    clocks = [("too long", clocked(unit_factor("ms")))]
+    if forward.panels == "rigid":  # of bars, which take steps of microseconds, a long motion is not predicted
+        clocks.append(("too short", clocked(1.0 / unit_factor("ms"), len(forward.blocks[0].times))))
+    for what, remedy, change in changes(recordings[0], clocks):
         changed = [change(r) for r in recordings]
         try:
             left, moved = missed(arranged(subject, changed, same)[0])
@@ -80,11 +77,11 @@ def missed(forward: Predictor) -> tuple[float, float]:
     return (float(every[0]) if np.isfinite(every[0]) else np.inf), float(every[1])
 
 
-def changes(recording: Recording, *, longer: bool = True) -> Iterator[tuple[str, str, Change]]:
+def changes(recording: Recording, clocks: Sequence[tuple[str, Change]]) -> Iterator[tuple[str, str, Change]]:
     """What may be wrong with a recording, in words, what then has to be stated, and the recording as it should be.
 
     Args:
-        longer: whether times may be too short, too.
+        clocks: how times may be 1000 times wrong, as milliseconds that were read as seconds, and as they should be.
     """
     for group in groups_of(list(recording.channels.values())):
         width = group[0].values.reshape(len(recording.times), -1).shape[1]
@@ -98,10 +95,8 @@ def changes(recording: Recording, *, longer: bool = True) -> Iterator[tuple[str,
             remedy = "Exchange their columns or tracks in the sidecar"
             yield f"Channels {a.name} and {b.name} are exchanged", remedy, exchanged(a.name, b.name)
     if not recording.by_step and all(d.times is None for d in recording.drive.values()):
-        for factor, words_of_it in CLOCKS.items():
-            if factor > 1.0 and not longer:
-                continue
-            yield f"Times are {words_of_it}", "State their unit or rate_hz under [time] in the sidecar", clocked(factor)
+        for what, change in clocks:
+            yield f"Times are 1000 times {what}", "State their unit or rate_hz under [time] in the sidecar", change
 
 
 def turned(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Change:
@@ -124,11 +119,11 @@ def exchanged(a: str, b: str) -> Change:
     return change
 
 
-def clocked(factor: float) -> Change:
-    """A recording of which all times are so many times as long, or the beginning of it if they get longer."""
+def clocked(factor: float, frames: int | None = None) -> Change:
+    """A recording, or the first frames of it, of which all times are so many times as long."""
 
     def change(r: Recording) -> Recording:
-        n = len(r.times) if factor < 1.0 else min(FIRST, len(r.times))
+        n = min(frames or len(r.times), len(r.times))
         channels = {name: replace(c, values=c.values[:n]) for name, c in r.channels.items()}
         drive = {name: d if d.constant else replace(d, values=d.values[:n]) for name, d in r.drive.items()}
         return replace(r, times=r.times[0] + factor * (r.times[:n] - r.times[0]), channels=channels, drive=drive)

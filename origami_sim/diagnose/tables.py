@@ -53,9 +53,9 @@ def table(
 def _why(forward: Predictor, key: Key, p: Posterior, judged: Judgement) -> str:
     """Why a row won or lost, in words."""
     f = p.nodes[key].fit
-    if f.hypothesis is judged.best.hypothesis and UNLISTED in f.hypothesis.effects:
-        return "no law of the catalogue; its coefficients are in the patch"
     if f.hypothesis is judged.best.hypothesis:
+        if UNLISTED in f.hypothesis.effects:
+            return "no law of the catalogue; its coefficients are in the patch"
         return "closest, but not enough" if judged.verdict in ("UNKNOWN", "UNTESTABLE") else "chosen"
     if any(f.hypothesis is t.hypothesis for t in judged.tied):
         return "not told from the best"
@@ -92,11 +92,11 @@ def _distrust(f: Fit) -> str:
 
 def numbers(f: Fit) -> list[Number]:
     """Fitted numbers with 95 % intervals, without the coefficients of a moment that no law gives."""
-    every = [
+    return [
         Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away))
         for n, t, low, high, away, b in zip(f.free, f.theta, *f.intervals(), f.strain, f.at_bound, strict=True)
+        if n.owner != UNLISTED
     ]
-    return [number for number, n in zip(every, f.free, strict=True) if n.owner != UNLISTED]
 
 
 def suspected(s: Signature, scores: np.ndarray, total: float) -> Suspected:

@@ -164,10 +164,10 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
             continue
         mine = slice(place[id(s)], place[id(s)] + len(s.size))
         loud = np.linalg.norm(np.concatenate(s.parts), axis=0)
-        axes = along_each_axis(s.suspect)
-        most = [_admissible(a, 10 * np.sign(z) * _typical(a)) / z for a, z in zip(axes, s.size, strict=True)]
-        most = most if _typical(s.suspect) else [np.inf]  # of a coefficient any size is plausible
-        reach = np.maximum(1.0, most)
+        reach = np.full(len(s.size), np.inf)  # of a coefficient that has no typical size any is plausible
+        if _typical(s.suspect):
+            each = zip(along_each_axis(s.suspect), s.size, strict=True)
+            reach = np.maximum(1.0, [_admissible(a, 10 * np.sign(z) * _typical(a)) / z for a, z in each])
         status, shows = "", (norm[mine] * reach >= SILENT) & (norm[mine] >= 1e-6 * loud)
         if not np.any(shows):
             status = (

@@ -96,10 +96,8 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
         may_be, total = beside, sum(v for c, v in classes.items() if any(c >= b for b in beside))
     left = budgets(best)
     named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
-    beyond = real_rest(p, best, left)
-    foreign = (
-        p.hyper.foreign(laws(beside[0] if beside else lead), beyond) if lead else imitated(p, chance, named, beyond)
-    )
+    rest = real_rest(p, best, left)
+    foreign = p.hyper.foreign(laws(beside[0] if beside else lead), rest) if lead else imitated(p, chance, named, rest)
 
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
         return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, classes, foreign)

@@ -38,7 +38,9 @@ Half and double take half and twice that; nothing is named by what is drawn."""
 WIDER = 2.0
 """Frames of the smoother for what the whole model lacks, over those that leave no more than noise of the motion.
 
-Of two flaps that swing (2 mrad, 150 Hz) bars are then a sixth; with three times as many frames a fourteenth."""
+Of two flaps that swing (2 mrad, 150 Hz) bars are a sixth of those with as many frames (half), and 2.4 times those with
+three times as many. It decides on what is drawn alone: a law is drawn along the motion as it is read elsewhere.
+"""
 
 
 def partials(forward: Predictor, shown: Sequence[tuple[Suspect, Fit]]) -> list[Partial]:

@@ -97,8 +97,10 @@ TREMBLING = 0.3
 """Part of a frame by which times of blocks may differ that are filmed together: each is read at its own times.
 
 Where one ends is then read between frames: of a strip at 100 Hz whose clock trembles by a twentieth of a frame, rates
-are off by up to 6e-4 of what is usual, less than forces of which nothing is said. Two flaps of 750 frames take 8 s, and
-38 s where each segment is filmed alone."""
+are off by up to 6e-4 of what is usual, less than forces of which nothing is said. Two flaps of 750 frames take 9 s, and
+39 s where each segment is filmed alone. With half, that strip's ten segments are seven groups (two here); double also
+groups those of a clock that trembles by a tenth (eight here).
+"""
 
 
 def by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
