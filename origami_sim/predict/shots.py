@@ -122,9 +122,7 @@ def by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
 
 def trembles(blocks: Sequence[Block]) -> bool:
     """Whether blocks that are filmed together have times of their own, for more than rounding."""
-    a = blocks[0]
-    slack = 1e-7 * max(1.0, a.times[-1])
-    return any(
-        abs(b.lasting - a.lasting) >= slack or np.any(np.abs(b.times - a.times) > slack + 1e-5 * b.times)
-        for b in blocks[1:]
-    )
+    times, lasting = np.stack([b.times for b in blocks]), np.array([b.lasting for b in blocks])
+    slack = 1e-7 * max(1.0, times[0, -1])
+    apart = np.abs(times - times[0]) > slack + 1e-5 * times
+    return bool(np.any(apart) or np.any(np.abs(lasting - lasting[0]) >= slack))

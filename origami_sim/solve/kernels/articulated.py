@@ -53,7 +53,7 @@ class Tree:
     stabilisation: scalar  # rate at which an open loop closes [1/s]
     softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
     stages: int  # S of a step; the last is the first of the next
-    tableau: wp.array2d(dtype=scalar)  # [S + 1, S + 1] time, then weights; the last row is the error's
+    tableau: wp.array(dtype=scalar)  # [(S + 1)^2] rows of time, then weights; the last row is the error's
     # [S, S] what weights of damped accelerations are more than those of others, on the diagonal their own; empty where
     # all are explicit
     implicit: wp.array2d(dtype=scalar)
@@ -126,21 +126,28 @@ PARTS = tuple(
 """Parts of a world's stretch, in order."""
 
 
-@wp.func
-def at(data: wp.array(dtype=scalar), i: int):
-    return data[i & NATURAL]
+@wp.func_native(snippet="return data.data[i];")
+def at(data: wp.array(dtype=scalar), i: int) -> scalar:
+    """A number of the buffer, which is dense: neither stride nor sign of the index are asked for."""
+    ...
+
+
+@wp.func_native(snippet="data.data[i] = x;")
+def put(data: wp.array(dtype=scalar), i: int, x: scalar):
+    """Sets a number of the buffer."""
+    ...
 
 
 @wp.func
 def vec_at(data: wp.array(dtype=scalar), i: int):
-    return vec3(data[i & NATURAL], data[(i + 1) & NATURAL], data[(i + 2) & NATURAL])
+    return vec3(at(data, i), at(data, i + 1), at(data, i + 2))
 
 
 @wp.func
 def put_vec(data: wp.array(dtype=scalar), i: int, v: vec3):
-    data[i & NATURAL] = v[0]
-    data[(i + 1) & NATURAL] = v[1]
-    data[(i + 2) & NATURAL] = v[2]
+    put(data, i, v[0])
+    put(data, i + 1, v[1])
+    put(data, i + 2, v[2])
 
 
 @wp.func
@@ -158,7 +165,7 @@ def put_mat(data: wp.array(dtype=scalar), i: int, m: mat33):
 @wp.func
 def copy(data: wp.array(dtype=scalar), target: int, source: int, count: int):
     for i in range(count):
-        data[(target + i) & NATURAL] = data[(source + i) & NATURAL]
+        put(data, target + i, at(data, source + i))
 
 
 @wp.func
@@ -187,7 +194,7 @@ def along_root(tree: Tree, k: int, origin: vec3):
 def unload(tree: Tree, w: int):
     """Clears the forces that never change."""
     for k in range(12 * tree.bodies):
-        tree.data[(w * tree.width + tree.steady + k) & NATURAL] = scalar(0.0)
+        put(tree.data, w * tree.width + tree.steady + k, scalar(0.0))
 
 
 @wp.func
@@ -250,7 +257,7 @@ def pose(tree: Tree, w: int):
         swing = swing + rate * wp.cross(before, a)
         put_vec(s, o + tree.alpha + 3 * b, swing)
         put_vec(s, o + tree.gain + 3 * b, pull - wp.cross(swing, r) - wp.cross(now, wp.cross(now, r)))
-        s[(o + tree.torque + j) & NATURAL] = scalar(0.0)
+        put(s, o + tree.torque + j, scalar(0.0))
         put_vec(s, o + tree.force + 3 * b, zero)
         put_vec(s, o + tree.moment + 3 * b, zero)
 
@@ -325,7 +332,7 @@ def accelerate(tree: Tree, stage: int, w: int):
     factor = o + tree.factor
     origin = vec_at(s, o + tree.y)
     for k in range(m * m):
-        s[(factor + k) & NATURAL] = scalar(0.0)
+        put(s, factor + k, scalar(0.0))
     for b in range(tree.first_body, tree.bodies):
         turn = mat_at(s, o + tree.turned + 9 * b)
         c = turn * vec_at(s, o + tree.centre + 3 * b) + vec_at(s, o + tree.placed + 3 * b) - origin
@@ -341,7 +348,7 @@ def accelerate(tree: Tree, stage: int, w: int):
         put_vec(s, o + tree.force + 3 * b, vec_at(s, o + tree.force + 3 * b) + pull - mass * a)
         spin = own * swing + wp.cross(omega, own * omega) + mass * wp.cross(c, a)
         put_vec(s, o + tree.moment + 3 * b, vec_at(s, o + tree.moment + 3 * b) + torque - spin)
-        s[(o + tree.heavy + b) & NATURAL] = mass
+        put(s, o + tree.heavy + b, mass)
         put_vec(s, o + tree.first + 3 * b, mass * c)
         put_mat(s, o + tree.second + 9 * b, own + outer_inertia(mass, c))
     # towards the root: what a joint carries is the sum of all beyond it
@@ -368,24 +375,24 @@ def accelerate(tree: Tree, stage: int, w: int):
                 a = vec_at(s, o + tree.hinge + 3 * (b - 1))
                 along = wp.cross(vec_at(s, o + tree.joint + 3 * (b - 1)), a)
                 load = at(s, o + tree.torque + b - 1)
-            s[(du + k) & NATURAL] = load + wp.dot(a, moment) + wp.dot(along, force)
+            put(s, du + k, load + wp.dot(a, moment) + wp.dot(along, force))
             momentum = heavy * along + wp.cross(a, first)
             angular = wp.cross(first, along) + second * a
             i = b
             while i > 0:
                 c = vec_at(s, o + tree.hinge + 3 * (i - 1))
                 by = wp.dot(c, angular) + wp.dot(wp.cross(vec_at(s, o + tree.joint + 3 * (i - 1)), c), momentum)
-                s[(factor + k * m + roots + i - 1) & NATURAL] = by
+                put(s, factor + k * m + roots + i - 1, by)
                 i = tree.parent[i]
             for r in range(roots):
                 by = wp.dot(tree.axes[r], angular) + wp.dot(along_root(tree, r, origin), momentum)
-                s[(factor + k * m + r) & NATURAL] = by
+                put(s, factor + k * m + r, by)
             k += 1
         p = tree.parent[b]
         if p >= tree.first_body:
             put_vec(s, o + tree.force + 3 * p, vec_at(s, o + tree.force + 3 * p) + force)
             put_vec(s, o + tree.moment + 3 * p, vec_at(s, o + tree.moment + 3 * p) + moment)
-            s[(o + tree.heavy + p) & NATURAL] = at(s, o + tree.heavy + p) + heavy
+            put(s, o + tree.heavy + p, at(s, o + tree.heavy + p) + heavy)
             put_vec(s, o + tree.first + 3 * p, vec_at(s, o + tree.first + 3 * p) + first)
             put_mat(s, o + tree.second + 9 * p, mat_at(s, o + tree.second + 9 * p) + second)
     factorise(s, factor, m, scalar(0.0))
@@ -400,7 +407,7 @@ def accelerate(tree: Tree, stage: int, w: int):
     last = at(s, o + tree.y + 6)
     put_vec(s, dy, vec_at(s, o + tree.speed))
     put_vec(s, dy + 3, scalar(0.5) * (last * omega + wp.cross(omega, q)))
-    s[(dy + 6) & NATURAL] = scalar(-0.5) * wp.dot(omega, q)
+    put(s, dy + 6, scalar(-0.5) * wp.dot(omega, q))
     copy(s, dy + POSE, o + tree.u + roots, tree.bodies - 1)
 
 
@@ -413,9 +420,9 @@ def factorise(s: wp.array(dtype=scalar), first: int, m: int, least: scalar):
             for k in range(j):
                 x = x - at(s, first + i * m + k) * at(s, first + j * m + k)
             if i == j:
-                s[(first + i * m + i) & NATURAL] = wp.sqrt(wp.max(x, least))
+                put(s, first + i * m + i, wp.sqrt(wp.max(x, least)))
             else:
-                s[(first + i * m + j) & NATURAL] = x / at(s, first + j * m + j)
+                put(s, first + i * m + j, x / at(s, first + j * m + j))
 
 
 @wp.func
@@ -425,7 +432,7 @@ def solve_lower(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         x = at(s, target + i)
         for k in range(i):
             x = x - at(s, factor + i * m + k) * at(s, target + k)
-        s[(target + i) & NATURAL] = x / at(s, factor + i * m + i)
+        put(s, target + i, x / at(s, factor + i * m + i))
 
 
 @wp.func
@@ -436,7 +443,7 @@ def solve_upper(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         x = at(s, target + i)
         for k in range(i + 1, m):
             x = x - at(s, factor + k * m + i) * at(s, target + k)
-        s[(target + i) & NATURAL] = x / at(s, factor + i * m + i)
+        put(s, target + i, x / at(s, factor + i * m + i))
 
 
 @wp.func
@@ -446,13 +453,13 @@ def multiply(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         x = scalar(0.0)
         for k in range(i, m):
             x = x + at(s, factor + k * m + i) * at(s, target + k)
-        s[(target + i) & NATURAL] = x
+        put(s, target + i, x)
     for back in range(m):
         i = m - 1 - back
         x = scalar(0.0)
         for k in range(i + 1):
             x = x + at(s, factor + i * m + k) * at(s, target + k)
-        s[(target + i) & NATURAL] = x
+        put(s, target + i, x)
 
 
 @wp.func
@@ -471,7 +478,7 @@ def constrain(tree: Tree, stage: int, w: int):
         row = o + tree.jacobian + i * m
         solved = o + tree.solved + i * m
         for k in range(m):
-            s[(row + k) & NATURAL] = scalar(0.0)
+            put(s, row + k, scalar(0.0))
         axis = tree.axes[3 * tree.roots + i]
         reference = vec_at(s, o + tree.reference + 3 * tree.joined[i, 0])
         gap = scalar(0.0)
@@ -494,12 +501,12 @@ def constrain(tree: Tree, stage: int, w: int):
                 bias += sign * wp.dot(axis, a + wp.cross(omega, wp.cross(omega, here)))
                 for k in range(tree.roots):
                     by = along_root(tree, k, origin) + wp.cross(tree.axes[k], here)
-                    s[(row + k) & NATURAL] = at(s, row + k) + sign * wp.dot(axis, by)
+                    put(s, row + k, at(s, row + k) + sign * wp.dot(axis, by))
             while b > 0:
                 arm = here - vec_at(s, o + tree.joint + 3 * (b - 1))
                 entry = row + tree.roots + b - 1
                 along = wp.dot(axis, wp.cross(vec_at(s, o + tree.hinge + 3 * (b - 1)), arm))
-                s[entry & NATURAL] = at(s, entry) + sign * along
+                put(s, entry, at(s, entry) + sign * along)
                 b = tree.parent[b]
         rate = scalar(0.0)
         for k in range(m):
@@ -510,25 +517,25 @@ def constrain(tree: Tree, stage: int, w: int):
         right = -(bias + scalar(2.0) * c * rate + c * c * gap)
         for k in range(m):
             right -= at(s, solved + k) * at(s, du + k)
-        s[(o + tree.pull + i) & NATURAL] = right
+        put(s, o + tree.pull + i, right)
         for j in range(i + 1):
             product = scalar(0.0)
             for k in range(m):
                 product += at(s, solved + k) * at(s, o + tree.solved + j * m + k)
-            s[(o + tree.gram + i * tree.rows + j) & NATURAL] = product
+            put(s, o + tree.gram + i * tree.rows + j, product)
             if i == j:
                 total += product
     soft = tree.softness * total / scalar(tree.rows)
     for i in range(tree.rows):
         k = o + tree.gram + i * tree.rows + i
-        s[k & NATURAL] = at(s, k) + soft
+        put(s, k, at(s, k) + soft)
     factorise(s, o + tree.gram, tree.rows, soft)
     solve_lower(s, o + tree.gram, o + tree.pull, tree.rows)
     solve_upper(s, o + tree.gram, o + tree.pull, tree.rows)
     for i in range(tree.rows):
         for k in range(m):
             z = at(s, o + tree.solved + i * m + k) * at(s, o + tree.pull + i)
-            s[(du + k) & NATURAL] = at(s, du + k) + z
+            put(s, du + k, at(s, du + k) + z)
 
 
 @wp.func
@@ -571,7 +578,7 @@ def bend(
     j = tree.joint_of[r]
     if j >= 0:
         k = w * tree.width + tree.torque + j
-        tree.data[k & NATURAL] = at(tree.data, k) + moment
+        put(tree.data, k, at(tree.data, k) + moment)
     else:
         n = hinges[r]
         g = kinematics.dihedral(X[n[0], w], X[n[1], w], X[n[2], w], X[n[3], w])

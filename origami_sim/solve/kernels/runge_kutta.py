@@ -16,6 +16,7 @@ from origami_sim.solve.kernels.articulated import (
     copy,
     factorise,
     multiply,
+    put,
     scalar,
     solve_lower,
     solve_upper,
@@ -53,7 +54,7 @@ def lengthen(tree: Tree, step: scalar, error: scalar, cut: int, w: int):
     longer = step * factor
     if cut == 1:
         longer = wp.max(longer, at(tree.data, k))
-    tree.data[k & NATURAL] = longer
+    put(tree.data, k, longer)
     return longer
 
 
@@ -82,14 +83,14 @@ def begin(
     s = tree.data
     o = w * tree.width
     for i in range(tree.effects):
-        s[(o + tree.spent + i) & NATURAL] = tree.tableau[tree.stages - 1, 1] * power[i, w]
-        s[(o + tree.power0 + i) & NATURAL] = power[i, w]
+        put(s, o + tree.spent + i, at(tree.tableau, (tree.stages - 1) * (tree.stages + 1) + 1) * power[i, w])
+        put(s, o + tree.power0 + i, power[i, w])
     copy(s, o + tree.y0, o + tree.y, POSE + tree.bodies - 1)
     copy(s, o + tree.u0, o + tree.u, tree.rates)
     for i in range(tree.hinges):
-        s[(o + tree.angles0 + i) & NATURAL] = angles[i, w]
+        put(s, o + tree.angles0 + i, angles[i, w])
     for i in range(tree.memories):
-        s[(o + tree.memory0 + i) & NATURAL] = memory[i, w]
+        put(s, o + tree.memory0 + i, memory[i, w])
     copy(s, o + tree.feet0, o + tree.feet, 3 * tree.feet_count)
 
 
@@ -110,7 +111,7 @@ def probe(tree: Tree, k: int, size: scalar, w: int):
     o = w * tree.width
     copy(s, o + tree.u, o + tree.u0, tree.rates)
     if k < tree.rates:
-        s[(o + tree.u + k) & NATURAL] = at(s, o + tree.u0 + k) + nudge_of(tree, k, size)
+        put(s, o + tree.u + k, at(s, o + tree.u0 + k) + nudge_of(tree, k, size))
 
 
 @wp.func
@@ -128,10 +129,10 @@ def probed(tree: Tree, k: int, size: scalar, w: int):
     else:
         nudge = nudge_of(tree, k, size)
         for i in range(m):
-            s[(change + i) & NATURAL] = (at(s, o + tree.damped + i) - at(s, change + i)) / nudge
+            put(s, change + i, (at(s, o + tree.damped + i) - at(s, change + i)) / nudge)
         multiply(s, o + tree.factor0, change, m)
         for i in range(m):
-            s[(o + tree.damping + i * m + k) & NATURAL] = at(s, change + i)
+            put(s, o + tree.damping + i * m + k, at(s, change + i))
 
 
 @wp.func
@@ -154,8 +155,8 @@ def begin_damped(tree: Tree, step: scalar, w: int):
                 x = step * tree.implicit[1, 1] * c
                 for k in range(j + 1):
                     x = x + at(s, o + tree.factor0 + i * m + k) * at(s, o + tree.factor0 + j * m + k)
-                s[(stiff + i * m + j) & NATURAL] = x
-        s[(o + tree.damped + i) & NATURAL] = -lost
+                put(s, stiff + i * m + j, x)
+        put(s, o + tree.damped + i, -lost)
     solve_lower(s, o + tree.factor0, o + tree.damped, m)
     solve_upper(s, o + tree.factor0, o + tree.damped, m)
     factorise(s, stiff, m, scalar(0.0))
@@ -186,12 +187,12 @@ def damp(tree: Tree, stage: int, h: scalar, w: int):
         x = scalar(0.0)
         for k in range(stage):
             x = x + tree.implicit[stage, k] * at(s, o + tree.damped + k * m + i)
-        s[(u + i) & NATURAL] = at(s, u + i) + h * x
+        put(s, u + i, at(s, u + i) + h * x)
     copy(s, mine, u, m)
     slow_down(tree, u, w)
     for i in range(m):
         change = at(s, u + i) - at(s, mine + i)
-        s[(mine + i) & NATURAL] = change / (h * tree.implicit[stage, stage])
+        put(s, mine + i, change / (h * tree.implicit[stage, stage]))
 
 
 @wp.func
@@ -240,11 +241,11 @@ def restart(tree: Tree, angles: wp.array2d(dtype=scalar), memory: wp.array2d(dty
     o = w * tree.width
     joints = tree.bodies - 1
     first = n * (tree.memories + joints)
-    s[(o + tree.span) & NATURAL] = scalar(wp.inf)
+    put(s, o + tree.span, scalar(wp.inf))
     for i in range(joints):
         tree.kept[(first + tree.memories + i) & NATURAL, w] = at(s, o + tree.u + i)
-        s[(o + tree.y + POSE + i) & NATURAL] = tree.starts[(2 * n * joints + i) & NATURAL, w]
-        s[(o + tree.u + i) & NATURAL] = tree.starts[((2 * n + 1) * joints + i) & NATURAL, w]
+        put(s, o + tree.y + POSE + i, tree.starts[(2 * n * joints + i) & NATURAL, w])
+        put(s, o + tree.u + i, tree.starts[((2 * n + 1) * joints + i) & NATURAL, w])
     for r in range(tree.joint_of.shape[0]):
         j = tree.joint_of[r]
         if j >= 0:
@@ -257,8 +258,9 @@ def restart(tree: Tree, angles: wp.array2d(dtype=scalar), memory: wp.array2d(dty
 def weighted(tree: Tree, first: int, count: int, row: int, stages: int):
     """Sum of a number's derivatives over the stages, by a row of the tableau."""
     x = scalar(0.0)
+    weights = row * (tree.stages + 1) + 1
     for k in range(stages):
-        x = x + tree.tableau[row, 1 + k] * at(tree.data, first + k * count)
+        x = x + at(tree.tableau, weights + k) * at(tree.data, first + k * count)
     return x
 
 
@@ -269,17 +271,17 @@ def go(tree: Tree, stage: int, h: scalar, w: int):
     o = w * tree.width
     n = POSE + tree.bodies - 1
     for i in range(tree.first_number, n):
-        s[(o + tree.y + i) & NATURAL] = at(s, o + tree.y0 + i) + h * weighted(tree, o + tree.dy + i, n, stage, stage)
+        put(s, o + tree.y + i, at(s, o + tree.y0 + i) + h * weighted(tree, o + tree.dy + i, n, stage, stage))
     m = tree.rates
     for i in range(m):
-        s[(o + tree.u + i) & NATURAL] = at(s, o + tree.u0 + i) + h * weighted(tree, o + tree.du + i, m, stage, stage)
+        put(s, o + tree.u + i, at(s, o + tree.u0 + i) + h * weighted(tree, o + tree.du + i, m, stage, stage))
     if tree.implicit.shape[0] > 0 and stage < tree.stages - 1:
         damp(tree, stage, h, w)
     if stage == tree.stages - 1:
         k = o + tree.y + 3
         q = wp.normalize(wp.quatd(at(s, k), at(s, k + 1), at(s, k + 2), at(s, k + 3)))
         for i in range(4):
-            s[(k + i) & NATURAL] = q[i]
+            put(s, k + i, q[i])
 
 
 @wp.func
@@ -299,7 +301,7 @@ def error_of(tree: Tree, h: scalar, size: scalar, w: int):
     m = tree.rates
     rates = o + tree.du + tree.stages * m
     for i in range(m):
-        tree.data[(rates + i) & NATURAL] = h * weighted(tree, o + tree.du + i, m, tree.stages, tree.stages)
+        put(tree.data, rates + i, h * weighted(tree, o + tree.du + i, m, tree.stages, tree.stages))
     if tree.implicit.shape[0] > 0:  # what is damped within the step is no error (Shampine & Baca 1984)
         slow_down(tree, rates, w)
     for i in range(m):

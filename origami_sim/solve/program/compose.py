@@ -153,7 +153,7 @@ class _Composer(Rigid, Sheets, Touching):
 
     def value(self, owner: str, name: str, entity: str) -> str:
         i = self.index[owner, name]
-        return f"P[(o{i} + {entity} * e{i}) & NATURAL]"
+        return f"articulated.at(P, o{i} + {entity} * e{i})"
 
     def hoist(self) -> str:
         """Parameter addresses of this world, read once."""

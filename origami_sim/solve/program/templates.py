@@ -207,8 +207,8 @@ def rigid({arguments}
                         if stage == first_stage and tree.implicit.shape[0] > 0:
                             runge_kutta.begin_damped(tree, step, w)
                         runge_kutta.go(tree, stage, step, w)
-                    h = tree.tableau[stage, 0] * step
-                    weighs = tree.tableau[final, 1 + stage]
+                    h = articulated.at(tree.tableau, stage * (tree.stages + 1)) * step
+                    weighs = articulated.at(tree.tableau, final * (tree.stages + 1) + 1 + stage)
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
                 last = stage == final
                 articulated.pose(tree, w)

@@ -93,7 +93,7 @@ class RigidBatch(Batch):
         tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
         tableau, more = additive() if self.implicit else (EXPLICIT, np.zeros((0, 0)))
-        tree.tableau, tree.implicit = constant(tableau, wp.float64), constant(more, wp.float64)
+        tree.tableau, tree.implicit = constant(tableau.ravel(), wp.float64), constant(more, wp.float64)
         tree.stages = stages = len(tableau) - 1
         tree.restarts = constant(np.zeros(0), wp.int32)
         tree.starts = tree.kept = constant(np.zeros((0, 1)), wp.float64)
