@@ -43,6 +43,9 @@ NUISANCE = 2.0
 CROSSED = 0.7
 """Largest overlap of two effects in one object: beyond, one hides the other."""
 
+BESIDE = 5.0
+"""d' that the catalogue leaves of a law outside which acts beside one of its own: clearly seen, and the smaller one."""
+
 ATTEMPTS = 12
 """Objects that are drawn until one suits its stratum."""
 
@@ -88,6 +91,7 @@ def cells(structures=STRUCTURES, kinds=tuple(PROPORTIONS)) -> dict[str, list[tup
         "outside": [(d, m, s) for s in structures for m in table(s, True) for d in LEVELS[2:]],
         "confounded": pairs,
         "double": [(m, n, s) for s in structures for m in table(s) for n in table(s) if n != m],
+        "beside": [(m, n, s) for s in structures for m in table(s) for n in table(s, True)],
     }
     return {k: v for k, v in out.items() if k in kinds and v}
 
@@ -288,6 +292,27 @@ def doubled(first: str, second: str, structure: str, rng: np.random.Generator) -
     return case, account, None
 
 
+def beside(first: str, other: str, structure: str, rng: np.random.Generator) -> tuple[Case, dict, None]:
+    """An object with an effect, and a smaller one outside the catalogue.
+
+    Raises:
+        Unsuited: no level is well above what is outside, or one hides the other.
+    """
+    o = drawn_object(structure, rng)
+    case = case_of(o, drawn_factors(o, rng))
+    second = unlike(case, chosen(o, other, rng, True), BESIDE, rng)
+    above = [level for level in LEVELS if level > 1.5 * second["d"]]
+    if not above:
+        raise Unsuited(f"{other} is no smaller effect in {structure}")
+    account, mine = concealed(case, chosen(o, first, rng), float(rng.choice(above)), rng)
+    now = entry(second["mechanism"], second["strength"], second["place"], second["extra"])
+    theirs = case.signature([now], fresh=True)
+    account |= {"second": second, "overlap": overlap(mine, theirs)}
+    if account["overlap"] > CROSSED or account["d"] < second["d"]:
+        raise Unsuited("one effect hides the other")
+    return case, account, None
+
+
 # --- a case
 
 
@@ -351,8 +376,8 @@ def drawn(kind: str, cell: tuple, rng: np.random.Generator) -> tuple[Case, dict,
         try:
             if kind == "confounded":
                 return confounded(PAIRS[cell[0]], cell[2], rng)
-            if kind == "double":
-                return doubled(*cell, rng)
+            if kind in ("double", "beside"):
+                return (doubled if kind == "double" else beside)(*cell, rng)
             return null(*cell, rng) if kind == "null" else single(*cell, rng, outside=kind == "outside")
         except (Unsuited, Unstable) as error:
             why = error

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-PROPORTIONS = {"single": 240, "null": 100, "outside": 60, "confounded": 40, "double": 40}
+PROPORTIONS = {"single": 240, "null": 100, "outside": 60, "confounded": 40, "double": 40, "beside": 40}
 """Cases of each kind in the full battery."""
 
 FULL = sum(PROPORTIONS.values())

@@ -17,7 +17,7 @@ answer; the score opens the answers at the end, and checks them against digests 
 DEVELOPMENT = 1000
 """Seeds below this are for development; a seed from here on is sealed: it counts once."""
 
-KINDS = ("single", "null", "outside", "confounded", "double")
+KINDS = ("single", "null", "outside", "confounded", "double", "beside")
 RIGID = ("hanging_strip", "pendulum_chain", "magnetic_strip", "box", "bi_fold", "crawler")
 STRUCTURES = (*RIGID, "mae_cantilever", "de_bender", "crease_coupon")
 """As the truth names them."""

@@ -15,7 +15,7 @@ from origami_sim.errors import InputError
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="origami-proof", description=__doc__)
-    parser.add_argument("--cases", type=int, help="cases to draw (default 12; 480 are the full battery)")
+    parser.add_argument("--cases", type=int, help="cases to draw (default 12; 520 are the full battery)")
     parser.add_argument("--seed", type=int, default=1, help=f"from {DEVELOPMENT} on: a sealed run (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="cases at a time on this machine (default 1)")
     parser.add_argument("--cluster", metavar="WHERE", help="dask: local, local:WORKERS, or a scheduler's address")

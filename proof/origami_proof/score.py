@@ -125,7 +125,7 @@ def _named(explanations: list, names: set[str]) -> bool:
 
 _CONCEALED = ("case", "kind", "null", "structure", "mechanism", "site", "d_wanted", "d")
 _OUTCOMES = ("top1", "inside", "wrong", "blamed", "alarm", "found_site", "covered", "unknown", "correct")
-_OUTCOMES += ("double", "said", "placed")
+_OUTCOMES += ("double", "said", "placed", "beside", "beside_alone")
 _NUMBERS = (
     "seen",
     "removed",
@@ -154,7 +154,8 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         `top1`, `inside` (truth in the stated 95 % set), `wrong` (confidently, also of what says that nothing is
         missing), `blamed` (one explanation is named, and it is not the truth), `alarm`, `found_site` (where the effect
         is right), `placed` (the same, right or not), `covered`,
-        `unknown`, `double`, `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
+        `unknown`, `double`, `beside` (the law of the catalogue is named first, alone or with others), `beside_alone`
+        (no other is named for what acts outside of it), `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
         is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
         wrongly, missed); concealed `strength`, recovered `value` with `low` and `high`, `recovery` (relative error);
@@ -198,6 +199,9 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
     elif kind == "double":
         second = set(answer["second"]["names"])
         right = row["double"] = any(_both(e, names, second) for e in explanations)
+    elif kind == "beside":
+        right = row["beside_alone"] = contains
+        row["beside"] = any(effect in names for e in explanations[:1] for effect, _ in e)
     elif kind == "confounded":
         rival = set(answer["rival"]["names"])
         row["said"] = contains and _named(explanations, rival)
@@ -294,6 +298,8 @@ TARGETS: dict[str, tuple[str, tuple[float, float] | None]] = {
     "separated": ("named alone with what separates it", (0.80, 1.0)),
     "resolved": ("suggested experiment resolves a tie", (0.80, 1.0)),
     "double": ("both of two effects named", None),
+    "beside": ("law beside one outside named", None),
+    "beside_alone": ("and no other for what is outside", None),
 }
 """What is counted, and within which shares it should lie."""
 
@@ -322,6 +328,8 @@ def scores(rows: Sequence[dict]) -> dict:
         "separated": told("separated", rows),
         "resolved": told("resolved", rows),
         "double": [bool(r["double"]) for r in rows if r["kind"] == "double"],
+        "beside": told("beside", rows),
+        "beside_alone": told("beside_alone", rows),
     }
     out: dict = {"proportions": {}}
     for key, (title, target) in TARGETS.items():
@@ -392,8 +400,8 @@ def _grouped(rows: Sequence[dict], key: str, what: str) -> dict:
 
 def _concealed(r: dict) -> str:
     """What was concealed, as the row of the confusion table."""
-    if r["kind"] == "double":
-        return "two effects"
+    if r["kind"] in ("double", "beside"):
+        return "two effects" if r["kind"] == "double" else "one beside one outside"
     return f"{r['null']} (null)" if r["kind"] == "null" else r["mechanism"]
 
 
@@ -479,7 +487,7 @@ def text_of(board: dict) -> str:
 
 def _wanted(r: dict) -> tuple:
     """What should be true of a case, by its kind."""
-    return r["top1"], r["said"], r["double"], r["unknown"] if r["kind"] == "outside" else None
+    return r["top1"], r["said"], r["double"], r.get("beside"), r["unknown"] if r["kind"] == "outside" else None
 
 
 def _counted(p: dict) -> str:

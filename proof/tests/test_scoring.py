@@ -148,6 +148,17 @@ def test_two_effects_are_right_only_together():
     assert not row["double"] and row["wrong"]
 
 
+def test_beside_a_law_outside_the_catalogue_one_of_it_is_named_alone_or_with_an_imitation():
+    answer = {**ANSWER, "kind": "beside", "second": {"names": []}}
+    row = judge(answer, diagnosis("MECHANISM", ["crease_friction at fold2"], 0.95))
+    assert row["beside"] and row["beside_alone"] and not row["wrong"]
+    row = judge(answer, diagnosis("SEVERAL", ["crease_friction at fold2", "air_drag at all panels"], 0.6))
+    assert row["beside"] and not row["beside_alone"] and not row["correct"]
+    row = judge(answer, diagnosis("UNKNOWN", ["crease_friction at fold2"], None))
+    assert not row["beside"] and row["correct"] is None
+    assert score.scores([row])["proportions"]["beside"]["count"] == 1
+
+
 def test_a_failed_diagnosis_counts_as_a_miss():
     rows = [judge(ANSWER, {"failed": "out of memory"})]
     board = score.scores(rows)

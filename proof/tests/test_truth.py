@@ -510,7 +510,7 @@ def test_an_experiment_is_made_of_the_same_object(truth, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["single", "double", "confounded", "outside", "null"])
+@pytest.mark.parametrize("kind", ["single", "double", "confounded", "outside", "null", "beside"])
 def test_a_case_is_the_same_for_the_same_seed_and_tells_nothing(truth, tmp_path, kind):
     kept = []
     for n in range(2):
