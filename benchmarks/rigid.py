@@ -29,7 +29,7 @@ ERROR, LOOSE = 1e-3, 10.0 ** -np.arange(3, 9)
 def double_chain():
     """The scene pendulum_chain, both arms let go."""
     module = scene_module("pendulum_chain")
-    model, parameters, drive = module.build(scene_settings(module))
+    model, parameters, drive = module.build(scene_settings(module).with_panels("elastic"))
     return model, parameters, drive, [1.2, 0.7]
 
 

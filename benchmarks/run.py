@@ -2,8 +2,8 @@
 
     python benchmarks/run.py [--quick] [--device cuda:0] [--only rollout,startup,scaling,commands]
 
-With a CUDA device only the rollout on that device is measured and compared with the CPU; that needs warp and numpy
-alone, with the repository's root on PYTHONPATH.
+With a CUDA device only the rollout on that device is measured and compared with the CPU; that needs warp, numpy
+and scipy alone, with the repository's root on PYTHONPATH.
 """
 
 import argparse
