@@ -65,7 +65,7 @@ def lagging(times: np.ndarray, values: np.ndarray, lag: np.ndarray) -> np.ndarra
     decay, behind = np.exp(-h / lag), np.diff(values, axis=0) / h * lag  # of what falls behind a ramp
     out = np.empty(np.broadcast_shapes(values.shape, (1, len(lag))))
     out[0], out[1:] = values[0], values[1:] - behind - (values[:-1] - behind) * decay
-    below = np.append(-decay, np.zeros_like(decay[:1]), axis=0)
+    below = np.broadcast_to(np.append(-decay, np.zeros_like(decay[:1]), axis=0), out.shape)
     for column, own in zip(out.T, below.T, strict=True):
         column[:] = solve_banded((1, 0), np.stack([np.ones_like(own), own]), column, check_finite=False)
     return out

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.drive import CHANNELS, Drive, ramp, series, sine
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
+from origami_sim.effects._signals import scaled
 from origami_sim.model import Parameters
 from origami_sim.model.distort import distorted
 from origami_sim.recording.recording import CHANNEL_KINDS
@@ -51,6 +52,18 @@ def everything():
 
 
 # --- all of them ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_one_strength_distorts_each_world_of_a_drive_as_alone(name):
+    effect, factors = get(name), np.array([1.0, 1.5])
+    values = {p.name: p.default for p in effect.parameters} | {effect.fitted[0]: 0.1}
+    both, *alone = (scaled(everything(), everything().signals, f) for f in (factors, factors[:1], factors[1:]))
+    out = through(name, both, **values)
+    for world, one in enumerate(through(name, a, **values) for a in alone):
+        for channel in one.signals:
+            found, expected = at(out, channel), at(one, channel)[:, 0]
+            assert np.allclose(found[:, world % found.shape[1]], expected, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", [*DRIVES, *MEASUREMENTS])
