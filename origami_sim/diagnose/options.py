@@ -18,7 +18,7 @@ class Options:
         segment: length of a segment [s], each with a start of its own; None: what can be predicted.
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; what was recorded faster is averaged to it.
-        fits: sets of effects that are fitted at most, and as many if others are more probable then.
+        fits: sets of effects that are fitted at most since one took the lead; as many more if those are more probable.
         threads: see `Batch`.
         possible: what the set-up can do in a further recording; None: what the scene says, else the defaults. What a
             sidecar states goes before either.

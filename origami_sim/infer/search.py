@@ -27,17 +27,16 @@ from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
 from origami_sim.infer.posterior import CREDIBLE, Estimate, Key, Node, Posterior
-from origami_sim.infer.proposals import UNFITTED, in_place_of, named, proposed
+from origami_sim.infer.proposals import ROUGH, UNFITTED, in_place_of, named, proposed
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
 
 FITS = 16
-"""Sets that are fitted at most, and as many if others are more probable then: without a fit none can be named."""
+"""Sets that are fitted at most since one took the lead for which the one before is not worth a fit (`UNFITTED`).
 
-ROUGH = 0.01
-"""Part of what is missed by which steps improve the first fit of a set, at least; it is carried on in its own noise."""
-
+As many more if others are more probable then: without a fit none can be named.
+"""
 
 def search(
     forward: Predictor,
@@ -64,10 +63,10 @@ def search(
         _begun(out, forward, calm)
     elif given is not None and strained(base):
         _about_given(out, forward, base, given)
-    count = extended(out, forward, range(most), progress=progress)
-    while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
-        count = extended(out, forward, range(count, most), progress=progress)
     for _ in range(most):  # what is named has to be fitted, however many were
+        extended(out, forward, most, progress=progress)
+        while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
+            extended(out, forward, most, progress=progress)
         if (key := out.most_probable) in out.nodes:
             break
         _tried(out, forward, key)
@@ -171,23 +170,19 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
 
 
 def extended(
-    out: Posterior, forward: Predictor, places: range, *, progress: Callable[[float], None] | None = None
-) -> int:
-    """Fits sets, the n-th of a search in each place, until none that has not been fitted holds much of the posterior.
-
-    Returns:
-        the place that comes next.
-    """
-    for n in places:
+    out: Posterior, forward: Predictor, most: int, *, progress: Callable[[float], None] | None = None
+) -> None:
+    """Fits sets until none that has not been fitted holds much of the posterior, or so many in turn did not lead."""
+    while out.futile < most:
         if progress:
-            progress(n / places.stop)
+            progress(out.futile / most)
         if _again(out, forward):
+            out.futile += 1
             continue
-        key = proposed(out, n)
+        key = proposed(out, out.futile)
         if key is None:
-            return n
+            return
         _tried(out, forward, key)
-    return places.stop
 
 
 def _again(out: Posterior, forward: Predictor) -> bool:
@@ -211,6 +206,7 @@ def _again(out: Posterior, forward: Predictor) -> bool:
 def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     """Fits a set, and keeps by how much it is better than was thought."""
     labels, promise, estimate, estimated = out.labels(key), out.promised(key), out.estimates[key], out.total[key]
+    best = out.total[out.leader]
     out.hoped[labels] = max(promise, out.hoped.get(labels, -np.inf))
     swapped = in_place_of(out, max(out.total, key=lambda k: out.total[k])).get(key)
     fitted = _finished(out, forward, _fitted(out, forward, key, estimate))
@@ -218,6 +214,7 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
         again = _finished(out, forward, continued_from(out, forward, key, within), within.fit.weights)
         if not again.failed and (fitted.failed or log_evidence(again) > log_evidence(fitted)):
             fitted = again
+    out.futile += 1
     if fitted.failed:
         out.failed[key] = fitted.failed
         out.drop(key)
@@ -231,6 +228,8 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)
+    if out.total[out.leader] > best - np.log(UNFITTED):  # what stands beside it is known only now
+        out.futile = 0
     if key == out.leader:
         _with_seen_components(out, forward, key)
 

@@ -78,6 +78,26 @@ def test_what_the_refitted_model_cannot_tell_from_the_best_is_fitted_in_its_plac
     assert proposed(out, 0) == (late if same else None)
 
 
+@pytest.mark.parametrize(
+    ("explained", "of_first", "wanted"),
+    [
+        (3500.0, None, "first"),  # estimated at 6.2 below: within a hundredth of what the exchanged effect explains
+        (200.0, None, "none"),
+        (3500.0, -7.0, "none"),  # the first exchange came out as estimated, or worse
+        (3500.0, -2.0, "second"),  # better than estimated by what others need
+    ],
+)
+def test_in_the_place_of_a_strong_effect_one_that_may_do_the_same_is_fitted(explained, of_first, wanted):
+    """Derivatives tell what a late field does in the place of a motion blur to a part of what either explains."""
+    best, first, second = frozenset({RUB, SCALE}), frozenset({RUB, DRAG}), frozenset({RUB, LOSS})
+    fitted = {best: 0.0} | ({} if of_first is None else {first: of_first})
+    estimated = {k: v for k, v in {first: -6.2, second: -6.4, frozenset({RUB}): -explained}.items() if k not in fitted}
+    out = posterior(fitted, estimated)
+    cast(Any, out.nodes[best]).instead = {first: -6.2, second: -6.4}
+    found = {"first": first, "second": second, "none": None}
+    assert [proposed(out, n) for n in range(2)] == [found[wanted]] * 2
+
+
 def test_what_promises_a_part_of_the_posterior_is_fitted():
     other = frozenset({DRAG})
     assert proposed(posterior({BEST: 0.0}, {other: -1.0}), 0) == other
