@@ -410,7 +410,7 @@ def _fitted(out: Posterior, forward: Predictor, key: Key, estimate: Estimate) ->
     given, rough = out.begun.get(key), out.rough and len(suspects) == 1  # several begin from a calm fit
     if len(suspects) == 1 and strained(parent):
         given = scanned(forward, hypothesis, by, parent.local, given)
-    if given is not None:
+    if given is not None and not key < estimate.parent:  # there a larger set found where it may be
         return elsewhere(forward, fit(forward, hypothesis, by, theta=given, local=parent.local), rough)
     # derivatives by the numbers of the model and by starts hardly change with an effect
     known = replace(line.reweighted(node.fit.weights, by), steps=np.concatenate(steps))
