@@ -109,17 +109,18 @@ class BarRollouts(Rollouts):
         pace = shots.pace or stable_step(model, parameters).dt
         substeps = max(1, int(np.ceil(step / pace * (1 - 1e-12))))
         raw: list[np.ndarray] = []
+        models = [m for m, _ in shots.worlds]
         calm = min(self._calm_frames(recording, len(shots.blocks[0].times)), shots.frames - 1)
         if calm:
             quiet, damped = calmed(model, parameters)
             finer = max(substeps, int(np.ceil(step / stable_step(quiet, damped).dt * (1 - 1e-12))))
             batch = self.batch(quiet, damped, drive, _with_effects(state, quiet), threads=shots.threads)
-            raw += film(batch, recording, calm + 1, finer, step)
+            raw += film(batch, recording, calm + 1, finer, step, models)
             state = _with_effects(batch.state(), model, step=calm * substeps)
         batch = self.batch(model, parameters, drive, state, threads=shots.threads)
         begin = state.x.copy() if self.start == "rest" else None
         left = shots.frames - sum(map(len, raw))
-        raw += film(batch, recording, left, substeps, step, first=not calm, begin=begin)
+        raw += film(batch, recording, left, substeps, step, models, first=not calm, begin=begin)
         out = np.concatenate(raw)
         out[:, :, batch.status() >= 0] = np.nan
         return Simulated(out)

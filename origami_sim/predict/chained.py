@@ -129,11 +129,12 @@ def channels_of(
     if chained.dt != chained.step or not steady or any(get(e).family == "drive" for e in model.effects):
         return None
     starts = forward.state(chained.shots(worlds, range(len(blocks))))
-    first = pictured(model, recording, starts.x[None], starts.angles[None])[0]
+    models = [m for m, _ in worlds]
+    first = pictured([m for m in models for _ in blocks], recording, starts.x[None], starts.angles[None])[0]
     angles = turned[np.array(chained.begins[1:-1], int) - 1][:, forward.articulation.creases]
     shift = turned_by(angles - np.stack([b.pose.angles for b in blocks])[1:])
     rates = ended[1:] - np.stack([b.rates for b in blocks])[1:, :, None]
-    later = pictured(model, recording, x, turned)
+    later = pictured(models, recording, x, turned)
     return Seen(first.reshape(-1, len(worlds), len(blocks)), later, np.concatenate([shift, rates], axis=1))
 
 

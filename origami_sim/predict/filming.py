@@ -1,5 +1,7 @@
 """Films of rollouts: channels of a batch from frame to frame, at the times of a recording or finer."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from origami_sim.effects import get
@@ -51,6 +53,7 @@ def film(
     frames: int,
     substeps: int,
     step: float,
+    models: Sequence[Model],
     *,
     first: bool = True,
     begin: np.ndarray | None = None,
@@ -58,27 +61,61 @@ def film(
     """Channels of the next frames and what else is asked of markers (`pictured`), in parts [f, D + k, W].
 
     With the present state as the first frame, if `first`. Displacements are counted since `begin`, see `read`.
+
+    Args:
+        models: of each rollout, one (W,) or of so many equal groups, one after the other.
     """
     model, out, left = batch.model, [], frames
+    models = [m for m in models for _ in range(batch.worlds // len(models))]
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
     limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
     if first:
         batch.advance(0, step / substeps, limit)
         x, angles = batch.motion()
-        out.append(pictured(model, recording, x[None], angles[None], begin))
+        out.append(pictured(models, recording, x[None], angles[None], begin))
         left -= 1
     most = max(1, int(FILMED / (24 * len(model.position) * batch.worlds)))
     while left > 0:
         part = min(left, most)
-        out.append(pictured(model, recording, *batch.film(part, substeps, step / substeps, limit), begin))
+        out.append(pictured(models, recording, *batch.film(part, substeps, step / substeps, limit), begin))
         left -= part
     return out
 
 
 def pictured(
-    model: Model, recording: Recording, x: np.ndarray, angles: np.ndarray | None, begin: np.ndarray | None = None
+    models: Sequence[Model],
+    recording: Recording,
+    x: np.ndarray,
+    angles: np.ndarray | None,
+    begin: np.ndarray | None = None,
 ) -> np.ndarray:
-    """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W]."""
+    """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W].
+
+    Args:
+        models: of each world (W,): a marker is at a point of a body, which lies elsewhere among the nodes of another.
+    """
+    alike: dict[bytes, list[int]] = {}
+    for w, model in enumerate(models):
+        alike.setdefault(model.position.tobytes(), []).append(w)
+    if len(alike) == 1:
+        return _pictured(models[0], recording, x, angles, begin)
+    parts = [
+        _pictured(
+            models[mine[0]],
+            recording,
+            x[:, :, mine],
+            None if angles is None else angles[:, :, mine],
+            None if begin is None else begin[:, mine],
+        )
+        for mine in alike.values()
+    ]
+    out = np.empty((len(x), parts[0].shape[1], len(models)))
+    for mine, part in zip(alike.values(), parts, strict=True):
+        out[:, :, mine] = part
+    return out
+
+
+def _pictured(model: Model, recording: Recording, x: np.ndarray, angles, begin) -> np.ndarray:
     parts = [channel_values(model, recording, x, angles, begin), depths(model, recording, x)]
     if any(get(e).on_body for e in model.effects):
         parts.append(turned_axes(model, recording, x))

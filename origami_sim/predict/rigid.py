@@ -216,14 +216,14 @@ class RigidRollouts(Rollouts):
         state = self.state(shots)
         drive = self.driven(shots)
         batch = self.batch(model, parameters, drive, state, tolerance=self.blur, threads=shots.threads)
-        begun, arrived, raw = 0, [], []
+        begun, arrived, raw, models = 0, [], [], [m for m, _ in shots.worlds]
         stops = [shots.ends + n for n in ((0, 1, 2) if shots.clocked else (1,))] if shots.ends else []
         for frame in stops:
-            raw += film(batch, recording, frame - begun, 1, shots.step, first=not begun)
+            raw += film(batch, recording, frame - begun, 1, shots.step, models, first=not begun)
             arrived.append(self._arrived(shots, batch.state()))
             begun = frame
         if shots.frames > begun:
-            raw += film(batch, recording, shots.frames - begun, 1, shots.step, first=not begun)
+            raw += film(batch, recording, shots.frames - begun, 1, shots.step, models, first=not begun)
         ends = np.stack(arrived) if arrived else None
         out = np.concatenate(raw)
         lost = batch.status() >= 0

@@ -6,17 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from origami_sim.design.build import Sheet
 from origami_sim.diagnose import Subject, diagnose
 from origami_sim.diagnose.arrange import arranged, starting
 from origami_sim.diagnose.options import Options
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp
-from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.bodies import rigid
 from origami_sim.observation.observe import observe
+from origami_sim.pattern import strip
+from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
@@ -105,3 +108,24 @@ def test_markers_that_scatter_across_the_plane_of_the_motion_do_not_hide_that_it
     }
     subject = Subject.from_model(loaded, pushed, push)
     assert starting(subject, [Recording("pushed", made.times, channels)]) == "rest"
+
+
+def test_a_marker_from_a_hinge_stays_on_its_body_beside_worlds_of_other_lengths():
+    """Worlds of several lengths run in one batch: each is read by its own geometry, as where it runs alone."""
+
+    def build(values):
+        lengths = [0.02, values["length"], 0.04]
+        sheet = Sheet(strip(lengths, 0.02), thickness=1e-3, panels="rigid").crease(stiffness=1e-3)
+        model, parameters = sheet.name("crease", ["upper", "lower"]).fix(panels=[0]).build()
+        return model, parameters, Drive()
+
+    free = Free("nominal", "length", "m", 0.05, 1e-3, spread=1e-3)
+    times = np.arange(60) / 100.0
+    at = {"panel": 1, "from": "upper", "distance": 0.03}
+    flat = np.tile([0.05, 0.01, 0.0], (60, 1))
+    recording = Recording("film", times, {"m": Channel("m", "marker", flat, "m", NOISE, at)})
+    forward = RigidRollouts(Subject(build, (free,), "device", build), [recording])
+    one, other = np.array([0.05]), np.array([0.055])
+    beside, alone = (forward.shoot(Hypothesis(), thetas) for thetas in ([one, other], [other]))
+    assert np.array_equal(beside.values[0][1], alone.values[0][0])
+    assert np.abs(beside.values[0][1] - beside.values[0][0]).max() < 1e-12, "flat, it is where it was"
