@@ -132,6 +132,8 @@ class Effect:
             model's axes x, y and z as the panel has turned them.
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
+        across: another effect whose vector this one turns: of its own components, as many as are fitted are suspected
+            of those across that vector.
         stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
         needs: parameters of which one has to differ from zero for the law to give anything (empty: the strength, and
             what is fitted with it and has its unit); elsewhere the law is not called.
@@ -163,6 +165,7 @@ class Effect:
     channels: tuple[str, ...] = ()
     on_body: bool = False
     fitted: tuple[str, ...] = ()
+    across: str = ""
     stated: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     uneven: bool = False

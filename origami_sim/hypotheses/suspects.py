@@ -60,8 +60,9 @@ def suspects(
             sites = _channel_sites(recordings[0], effect.channels)
             if effect.on_body and len(sites) > 1:  # each marker is beside its own point
                 sites = sites[1:]
+        fitted = _across(effect, parameters) or effect.fitted
         for site, kind, entities in sites:
-            free = tuple(_free(name, p, entities) for p in effect.fitted)
+            free = tuple(_free(name, p, entities) for p in fitted)
             found.append(Suspect(name, site, kind, free, entities, _among(effect.family, sites, entities)))
         parts = stretches(model, effect.family) if effect.uneven else []
         for site, kind, entities in parts:
@@ -93,6 +94,16 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
             )
         out.append(Suspect(name, site, kind, (strength,), entities, len(each), more=True))
     return out
+
+
+def _across(effect: Effect, parameters: Parameters | None) -> tuple[str, ...]:
+    """Components of an effect's vector across that of another, which they turn; none if there is no such vector."""
+    owner = effect.across
+    if not owner or parameters is None or (owner, f"{owner}_x") not in parameters:
+        return ()
+    size = [float(np.abs(parameters[owner, f"{owner}_{axis}"]).mean()) for axis in "xyz"]
+    most = "xyz"[int(np.argmax(size))]
+    return tuple(p.name for p in effect.parameters if p.name[-2:] in {"_x", "_y", "_z"} - {f"_{most}"})
 
 
 def _tells(model: Model, name: str, effect: Effect) -> bool:

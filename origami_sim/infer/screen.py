@@ -269,7 +269,8 @@ def _affordable(forward: Predictor, base: Fit, s: Suspect, change: float, least:
 
 def _typical(s: Suspect) -> float:
     """A noticeable strength; ten times as much is the most that is plausible."""
-    return max(abs(get(s.effect).parameter(f.name).typical or 0.0) for f in s.strengths)
+    effect = get(s.effect)
+    return max(abs(effect.parameter(n).typical or 0.0) for n in (*effect.fitted[:1], *(f.name for f in s.strengths)))
 
 
 def _admissible(s: Suspect, change: float) -> float:

@@ -133,6 +133,16 @@ def test_what_has_a_direction_is_absent_in_all_its_components(scenes):
     assert [s.free[0].name[-1] for s in along_each_axis(stray)] == ["x", "y", "z"], "each is simulated by itself"
 
 
+@pytest.mark.parametrize(("pull", "lean"), [((0, 0, -9.81), "xy"), ((9.81, 0, 0), "yz"), ((0, 9.81, 0), "xz")])
+def test_gravity_is_suspected_to_lean_across_itself(pull, lean):
+    """Along itself a lean would be another strength of gravity, which a wrong clock looks like."""
+    model, parameters = Sheet(strip([0.02, 0.02], 0.02), thickness=1e-3).crease(stiffness=1e-3).gravity(pull).build()
+    channel = Channel("a", "crease_angle", np.zeros(5), "rad", 1e-3, {"crease": 0})
+    every = suspects(model, [Recording("r", np.arange(5.0), {"a": channel})], Drive(), parameters)
+    (tilt,) = (s for s in every if s.effect == "gravity_tilt")
+    assert [f.name for f in tilt.strengths] == [f"tilt_{axis}" for axis in lean]
+
+
 def test_uneven_effects_are_those_of_families_with_stretches():
     uneven = {n for n, e in CATALOGUE.items() if e.uneven}
     assert uneven >= UNEVEN and all(CATALOGUE[n].family in ("crease", "bend", "triangle") for n in uneven)
