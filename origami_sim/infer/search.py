@@ -38,6 +38,7 @@ FITS = 16
 As many more if others are more probable then: without a fit none can be named.
 """
 
+
 def search(
     forward: Predictor,
     base: Fit,
@@ -169,9 +170,7 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
     return some
 
 
-def extended(
-    out: Posterior, forward: Predictor, most: int, *, progress: Callable[[float], None] | None = None
-) -> None:
+def extended(out: Posterior, forward: Predictor, most: int, *, progress: Callable[[float], None] | None = None) -> None:
     """Fits sets until none that has not been fitted holds much of the posterior, or so many in turn did not lead."""
     while out.futile < most:
         if progress:

@@ -162,7 +162,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
     common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares, "chance": chance}
-    beyond = (MORE_LAWS if more_laws else "") + _unlisted(d)
+    over = over_noise(forward, best)
+    beyond = f" What it leaves is {over:.1f} times the noise." if over > FAR else ""
+    beyond += (MORE_LAWS if more_laws else "") + _unlisted(d)
     suspects = shown.hypothesis.suspects
     chosen = [s.label for s in suspects]
     if d.word == "UNTESTABLE":

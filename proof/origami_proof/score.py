@@ -155,8 +155,8 @@ def judge(answer: dict, found: dict, others: dict[str, dict] | None = None) -> d
         missing), `blamed` (one explanation is named, and it is not the truth), `alarm`, `found_site` (where the effect
         is right), `placed` (the same, right or not), `covered`,
         `unknown`, `double`, `beside` (the law of the catalogue is named first, alone or with others), `beside_alone`
-        (no other is named for what acts outside of it), `said` (a tie of a confounded pair), `decided` (by the experiment that separates: the truth
-        is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
+        (no other is named for what is outside), `said` (a tie of a confounded pair), `decided` (by the experiment that
+        separates: the truth is in the stated set, its rival is not), `separated` and `resolved` (named alone after the
         experiment that separates, or that a tie with the truth in it suggested); `elements` (named rightly,
         wrongly, missed); concealed `strength`, recovered `value` with `low` and `high`, `recovery` (relative error);
         `seen` (score of the truth in the screening over d'); `left`, of an effect outside the catalogue, the part of
