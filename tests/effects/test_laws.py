@@ -396,3 +396,12 @@ def test_adhesion_pulls_up_to_its_limit_and_fades():
     values = {("adhesion", "pull_off"): 0.3, ("adhesion", "reach"): 4e-5}
     pull = foot(values, [-1e-4, 0.0, 1e-5, 2e-5, 4e-5, 1e-4])["adhesion"]
     assert pull == pytest.approx([-0.3, -0.3, -0.225, -0.15, 0, 0], abs=1e-12)
+
+
+def test_a_crease_table_follows_a_smooth_law_to_the_fourth_power_of_its_spacing():
+    angles = np.linspace(-2.0, 2.0, 41)
+    table = {("crease_table", "resisting_moment"): np.sin(2 * TABLE_ANGLES)[None, None]}
+    spacing = TABLE_ANGLES[1] - TABLE_ANGLES[0]
+    assert -hinge_moment("crease_table", table, angles) == pytest.approx(
+        np.sin(2 * angles), abs=(2 * spacing) ** 4 / 300
+    )
