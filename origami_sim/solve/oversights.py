@@ -1,4 +1,4 @@
-"""What a designer may have overlooked, in sentences: drives that move nothing, and what is inside the ground."""
+"""What a designer may have overlooked, in sentences: idle drives, what is inside the ground, tables left."""
 
 import numpy as np
 
@@ -188,6 +188,33 @@ def below_the_ground(model: Model, parameters: Parameters, x: np.ndarray) -> lis
             "it has no contact point there: Sheet.ground() gives one to every node, and both_sides=True to both sides."
         )
     return notes
+
+
+def beyond_crease_tables(model: Model, parameters: Parameters, angles: np.ndarray) -> list[str]:
+    """Where a motion leaves the table of a crease, beyond which its moment goes straight on.
+
+    Args:
+        angles: [F, C + Q, W] of the hinges in the frames, creases first [rad].
+    """
+    if "crease_table" not in model.laws:
+        return []
+    own = parameters.of("crease_table")
+    tabled = np.any(own["resisting_moment"], axis=-1)
+    seen = np.nan_to_num(angles[:, : len(model.creases)])  # worlds that went unstable are like flat ones
+    ends = own["angle_min"], own["angle_max"]
+    over = np.where(tabled, np.maximum(ends[0] - seen.min(axis=0), seen.max(axis=0) - ends[1]), -np.inf)
+    left = np.flatnonzero(over.max(axis=1, initial=-np.inf) > 1e-9)
+    if not len(left):
+        return []
+    c, w = np.unravel_index(int(over.argmax()), over.shape)
+    low, high = (np.degrees(np.broadcast_to(e, over.shape)[c, w]) for e in ends)
+    first, last = np.degrees([seen[:, c, w].min(), seen[:, c, w].max()])
+    at = first if low - first > last - high else last
+    others = f", and {len(left) - 1} more creases leave theirs" if len(left) > 1 else ""
+    return [
+        f"{model.name('crease', int(c))} folds to {at:.4g} deg, and the table of its moment goes from {low:.4g} to "
+        f"{high:.4g} deg{others}: beyond, the moment goes straight on, which may be wrong."
+    ]
 
 
 def _size(model: Model) -> float:

@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from origami_sim.design.build import Sheet
 from origami_sim.design.dielectric import Stack
-from origami_sim.drive import Drive
+from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.pattern import strip
 from origami_sim.physics.materials import EPS0, layered_rigidity
+from origami_sim.solve.motion.quasistatic import quasistatic
 from origami_sim.solve.statics.equilibria import equilibrium
 
 SIZE = {"layers": 6, "notch": "5 mm"}
@@ -62,6 +64,32 @@ def test_a_notch_bends_in_proportion_to_its_length_and_groups_are_apart():
     assert both[1] / both[0] == pytest.approx(2.0, rel=1e-3)
     second = equilibrium(model, parameters, Drive(voltage=[0.0, 1000.0])).angles[:2]
     assert second == pytest.approx([0.0, both[1]], abs=1e-6)
+
+
+def flap(voltage: float, **options) -> float:
+    sheet = Sheet(strip([0.02, 0.03], 0.019), thickness=5e-4, material="pdms", triangulation="center", panels="rigid")
+    sheet.electrode(**{**SIZE, "side": -1, **options}).fix(panels=[0]).gravity()
+    return float(np.degrees(equilibrium(*sheet.build(), Drive(voltage=voltage)).angles[0]))
+
+
+@pytest.mark.parametrize(("voltage", "table"), [(3e3, 2e-3), (4e3, 1e-3), (6e3, 1e-3), (8e3, 1e-3), (1e4, 1e-3)])
+def test_a_hinge_lifts_a_flap_to_where_the_section_balances_its_weight(voltage, table):
+    stack = Stack(6, 272.8e-6, 62e-6, 1.6e9 / (1 - 0.3**2), (0.19e6 / 3,), (2.0,))
+    electric = 4.7 * EPS0 * (voltage / 272.8e-6) ** 2 * stack.height * stack.lever * 0.019
+    weight = 1010 * 5e-4 * 0.019 * 0.03 * 9.80665 * 0.015
+
+    def missing(angle):
+        return 0.019 * stack.passive_moment(np.array([angle / 5e-3]))[0][0] + weight * np.cos(angle) - electric
+
+    assert flap(voltage) == pytest.approx(np.degrees(brentq(missing, -0.1, 3.0)), abs=3e-4)
+
+
+def test_a_run_notes_where_a_hinge_leaves_its_table():
+    model, parameters = hinge(side=-1, reach=61.0).build()
+    *_, note = quasistatic(model, parameters, Drive(voltage=ramp("6 kV", "1 s")), [0.0, 0.5, 1.0]).notes
+    assert "table of its moment goes from -17.48 to 17.48 deg" in note
+    within = quasistatic(*hinge(side=-1).build(), Drive(voltage=ramp("6 kV", "1 s")), [0.0, 0.5, 1.0])
+    assert not any("table" in n for n in within.notes)
 
 
 def test_a_bare_stack_only_resists():

@@ -20,6 +20,7 @@ from origami_sim.solve.motion.accuracy import check_accuracy, energy_error, refi
 from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
 from origami_sim.solve.oversights import (
     below_the_ground,
+    beyond_crease_tables,
     idle_drives,
     outside_tables,
     refuse_start_inside_the_ground,
@@ -399,6 +400,7 @@ def _simulated(
             *said,
             *idle_drives(model, parameters, drive),
             *below_the_ground(model, parameters, last.x),
+            *beyond_crease_tables(model, parameters, np.stack([e.angles for _, e in record])),
             *(batch.notes() if isinstance(batch, Implicit) else []),
         ],
     )

@@ -24,7 +24,12 @@ from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
-from origami_sim.solve.oversights import below_the_ground, idle_drives, refuse_start_outside_tables
+from origami_sim.solve.oversights import (
+    below_the_ground,
+    beyond_crease_tables,
+    idle_drives,
+    refuse_start_outside_tables,
+)
 from origami_sim.solve.statics.settling import Settling, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
 from origami_sim.solve.watch import Met, continued, watch_of, with_memory
@@ -434,6 +439,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
     )
     out.notes = [f"Quasi-static: {len(times)} frames, {march.steps} equilibria.", *(f"{j}." for j in march.jumps)]
     out.notes += [*idle_drives(model, parameters, drive), *below_the_ground(model, parameters, out.x[-1])]
+    out.notes += beyond_crease_tables(model, parameters, out.angles)
     out.notes += _left_out(out, march, states)
     return out
 
