@@ -147,7 +147,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         for panel in np.flatnonzero(d.owner[cell] == number):
             sheet.patch(int(panel), thickness=s.patch_thickness, size=(d.length[cell[panel]], size / panels),
                         poling=(s.heading * sign, 0, 0), remanence=s.remanence * factor,
-                        density=s.patch_density)  # fmt: skip
+                        density=s.patch_density, overhang=True)  # fmt: skip
 
     feet, foot = (_corner_feet if s.guided else _pads)(s, d, sheet)
     belly, under = (_borders if s.guided else _underside)(s, d, sheet, cell)

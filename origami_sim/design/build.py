@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from origami_sim.design.dielectric import Electrodes
 from origami_sim.design.ground import Contact, Ground, Grounds
-from origami_sim.design.masses import Stated, positive
+from origami_sim.design.masses import LEVEL, Stated, positive
 from origami_sim.design.shell import Shell, assign, matrices, plates, stated
 from origami_sim.design.statements import statement
 from origami_sim.design.thick import Hinge, Thick
@@ -261,20 +261,21 @@ class Sheet(Grounds, Electrodes, Thick):
         remanence: float | None = None,
         density: float | None = None,
         side: int = 1,
+        overhang: bool = False,
     ) -> "Sheet":
         """Bonds a rectangular patch, magnetised if its material is, on one side of a panel.
 
         Args:
             panel: face index. thickness: of the patch [m].
             poling: direction of the remanence in the reference state (any length); zero for no magnet.
-            size: extent along x and y in the reference state [m] (default: the panel's bounding box).
+            size: extent along x and y in the reference state [m], up to the panel's bounding box (the default).
             centre: its middle in the reference state [m] (default: the panel's centroid).
-            remanence: [T], default the material's. side: +1 on the top, -1 below.
+            remanence: [T], default the material's. side: +1 on the top, -1 below. overhang: whether it may be larger.
         """
         m = _material(material, panel)
         nodes = self._nodes_of(panel)
-        box = self.mesh.vertices[nodes]
-        extent = np.asarray(np.ptp(box, axis=0)[:2] if size is None else size, float)
+        box = np.ptp(self.mesh.vertices[nodes], axis=0)[:2]
+        extent = np.asarray(box if size is None else size, float)
         density = m.density if density is None else density
         if side not in (1, -1):
             raise InputError("a patch lies on one side", field="side", value=side, allowed="1 (top), -1 (below)")
@@ -284,6 +285,13 @@ class Sheet(Grounds, Electrodes, Thick):
                 field=f"patch on panel {panel}",
                 value=[float(v) for v in (thickness, *extent, density)],
                 allowed="> 0",
+            )
+        if not overhang and np.any(extent > box * (1 + LEVEL)):
+            raise InputError(
+                "a patch is no larger than its panel",
+                field=f"size of the patch on panel {panel}",
+                value=extent.tolist(),
+                allowed=f"up to ({box[0]:.6g}, {box[1]:.6g}) m, or overhang=True",
             )
         self._patches[panel] = {
             "thickness": float(thickness),

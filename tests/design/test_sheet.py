@@ -323,6 +323,10 @@ def sheet(**options) -> Sheet:
         (lambda: sheet().patch(2, thickness=1e-3), r"no such panel.*2.*0 to 1"),
         (lambda: sheet().patch(0, thickness=-1e-3), r"patch needs positive.*panel 0"),
         (lambda: sheet().patch(0, thickness=1e-3, size=(0.01, 0.0)), r"patch needs positive"),
+        (
+            lambda: sheet().patch(0, thickness="1 mm", size=("50 mm", "5 mm")),
+            r"no larger than its panel \(field 'size of the patch on panel 0', value \[0.05, 0.005\]\); allowed: up",
+        ),
         (lambda: sheet().patch(0, thickness=1e-3, density=0.0), r"patch needs positive"),
         (lambda: sheet().patch(0, thickness=1e-3, side=2), r"one side.*2.*top"),
         (lambda: sheet().patch(0, thickness=1e-3, material="iron"), r"unknown material.*iron"),
