@@ -32,7 +32,7 @@ class InputError(ValueError):
         if allowed is not None:
             sentence += f"; allowed: {_brief(allowed, 1200)}"
         super().__init__(sentence + ".")
-        self.file, self.field, self.value, self.allowed = file, field, value, allowed
+        self.what, self.file, self.field, self.value, self.allowed = what, file, field, value, allowed
 
 
 class DiskFull(InputError):

@@ -16,7 +16,7 @@ UNITS: dict[str, dict[str, float]] = {
     "current": {"A": 1.0, "mA": 1e-3},
     "magnetic moment": {"A m^2": 1.0, "mA m^2": 1e-3},
     "acceleration": {"m/s^2": 1.0, "g0": 9.80665},
-    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
+    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     "temperature": {"K": 1.0},
     "ratio": {"1": 1.0, "%": 1e-2},
     "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6},

@@ -7,7 +7,7 @@ import pytest
 from origami_sim.quantities import converted, parsed
 from origami_sim.units import UNITS, si_unit, unit_factor
 
-PREFIXES = {"": 1.0, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+PREFIXES = {"": 1.0, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "G": 1e9}
 SYMBOLS = {
     **dict.fromkeys(("m", "s", "N", "T", "V", "A", "Pa", "K", "Hz", "rad", "1"), 1.0),
     "g": 1e-3,  # SI counts in kilograms

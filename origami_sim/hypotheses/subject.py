@@ -207,12 +207,17 @@ def spreads(settings: Settings, priors: Mapping[str, float | str], *, source: ob
 
 def _spread(s: Setting, given: float | str, settings: Settings, source: object) -> float:
     text = str(given).strip()
-    allowed = f"a standard deviation in {s.unit}, with a unit, or in % of {s.value:g}"
+    allowed = f"a standard deviation in {s.unit}, with a unit, or 10% for a share of {s.value:g}"
     if text.endswith("%"):
         if not s.value:
             raise InputError("no share of zero", file=source, field=f"priors.{s.name}", value=given, allowed=s.unit)
         return _positive(s.name, text[:-1], given, allowed, source) * 0.01 * abs(float(s.value))
-    return _positive(s.name, str(_parse(s, text, Path(str(source or settings.file)))), given, allowed, source)
+    try:
+        number = str(_parse(s, text, Path(str(source or settings.file))))
+    except InputError as error:
+        share = f"{error.allowed}, or 10% for a share of {s.value:g}"
+        raise InputError(error.what, file=error.file, field=f"priors.{s.name}", value=given, allowed=share) from None
+    return _positive(s.name, number, given, allowed, source)
 
 
 def _positive(name: str, text: str, given: object, allowed: str, source: object = None) -> float:

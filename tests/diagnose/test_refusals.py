@@ -148,6 +148,10 @@ def test_bad_recordings_are_one_sentence(case, tmp_path, capfd):
         (("--model", "pendulum_chain", "--prior", "mass_1"), "not a prior"),
         (("--model", "pendulum_chain", "--prior", "mass_1=-1%"), "not a standard deviation"),
         (("--model", "pendulum_chain", "--prior", "mass_1=2 mm"), "wrong unit"),
+        (
+            ("--model", "pendulum_chain", "--prior", "mass_1=10percent"),
+            "allowed: kg, g, mg, or 10% for a share",
+        ),
         (("--model", "pendulum_chain", "--prior", "nothing=1"), "for a number of the model"),
         (("--model", "pendulum_chain", "--prior", "clock_delay.delay=5ms"), "clock_delay.clock_delay"),
         (("--model", "pendulum_chain", "--prior", "clock_delay.clock_delay=5mm"), "wrong unit"),
