@@ -62,8 +62,12 @@ class Masses(Statements):
 
     @statement(acceleration="m/s^2")
     def gravity(self, acceleration: Sequence[float] | np.ndarray = (0.0, 0.0, -G)) -> Self:
-        """Weight of sheet and patches; acceleration [m/s^2]."""
-        gx, gy, gz = acceleration
+        """Weight of sheet and patches; acceleration (3,) [m/s^2].
+
+        Raises:
+            InputError: no vector of three finite numbers.
+        """
+        gx, gy, gz = _place(acceleration, "acceleration", "gravity is a vector").tolist()
         self._gravity = (gx, gy, gz)
         return self.set("gravity", gravity_x=gx, gravity_y=gy, gravity_z=gz)
 

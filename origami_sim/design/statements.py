@@ -4,7 +4,7 @@ import copy
 import functools
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
@@ -36,9 +36,8 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
         def stated(self: S, *args: P.args, **kwargs: P.kwargs) -> R:
             try:
                 given = dict(signature.bind(self, *args, **kwargs).arguments)
-            except TypeError:
-                method(self, *args, **kwargs)  # says it by its name
-                raise
+            except TypeError as e:
+                raise _misfit(name, signature, kwargs, e) from None
             del given["self"]
             given = {n: list(v) if isinstance(v, Iterator) else v for n, v in given.items()}
             given |= given.pop(free, {}) if free else {}
@@ -59,6 +58,20 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
         return stated
 
     return wrap
+
+
+def _misfit(name: str, signature: inspect.Signature, given: Mapping[str, Any], error: TypeError) -> InputError:
+    """The refusal of a statement that was made with arguments it does not have, or without one that it needs."""
+    known = [n for n in signature.parameters if n != "self"]
+    strange = next((n for n in given if n not in known), None)
+    if strange is None:
+        return InputError(f"Sheet.{name} cannot be stated so ({error})", allowed=", ".join(known))
+    return InputError(
+        f"Sheet.{name} has no such argument{nearest(strange, known)}",
+        field=strange,
+        value=given[strange],
+        allowed=", ".join(known),
+    )
 
 
 class Statements(ABC):
