@@ -293,6 +293,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(args) -> int:
     from origami_sim.device.device import device_module
     from origami_sim.device.scene import scene_settings
+    from origami_sim.results.rescue import not_over_a_sound_run
     from origami_sim.results.run_folder import check_writable
 
     given = Path(args.scene)
@@ -323,6 +324,7 @@ def _run(args) -> int:
     folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
     outcome = module.run(settings, progress=_Bar(name))
+    folder = not_over_a_sound_run(folder, outcome.trajectory)
     kept = _save(folder, name, outcome, settings.as_dict(), args.set)
     if hasattr(module, "draw") and kept == folder:
         module.draw(settings, outcome, folder)

@@ -1,13 +1,23 @@
-"""Keeping what was computed where the disk is full: without the replay, then in the folder for temporary files."""
+"""Keeping what was computed: of a run that failed beside an earlier one, and where the disk is full what fits."""
 
+import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from origami_sim.errors import DiskFull
-from origami_sim.results.run_folder import save_run
+from origami_sim.results.run_folder import MANIFEST, save_run
 from origami_sim.solve.motion.dynamics import Trajectory
+
+
+def not_over_a_sound_run(folder: Path, trajectory: Trajectory) -> Path:
+    """Where a run goes: into the folder, or beside it if it failed and a run that did not fail is there."""
+    try:
+        earlier = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["failures"]
+    except (OSError, ValueError, LookupError, TypeError):  # no run there, or a damaged one
+        return folder
+    return folder.with_name(f"{folder.name}-failed") if trajectory.failures and not earlier else folder
 
 
 def save_somewhere(

@@ -261,6 +261,21 @@ def test_code_3_names_world_time_place_and_cause(call, tmp_path):
     assert load_run(tmp_path / "runs" / "fold_file").trajectory.failures  # kept, to see what happened
 
 
+def test_a_run_that_fails_leaves_an_earlier_result(call, tmp_path):
+    assert call("run", "fold_file", *QUICK)[0] == 0
+    before = contents(tmp_path)
+    for _ in range(2):
+        code, out, _ = call("run", "fold_file", "--set", "crease_stiffness=100", "--set", "membrane=1e-5", *QUICK)
+        assert code == 3 and "run folder: runs/fold_file-failed" in out
+    assert before.items() <= contents(tmp_path).items()
+    assert load_run(tmp_path / "runs" / "fold_file-failed").trajectory.failures
+    (tmp_path / "runs" / "fold_file" / "notes.txt").write_text("mine")
+    assert call("run", "fold_file", *QUICK)[0] == 0  # replaces the run, and nothing else
+    after = contents(tmp_path)
+    assert after["runs/fold_file/manifest.json"] != before["runs/fold_file/manifest.json"]
+    assert (tmp_path / "runs" / "fold_file" / "notes.txt").read_text() == "mine"
+
+
 def test_code_130_and_earlier_results_untouched_after_an_interrupt(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     before = contents(tmp_path)
