@@ -75,8 +75,8 @@ def read(path, *, size: float | None = None, scale: float | None = None, merge: 
     if chosen is not None:
         across = chosen * float(np.linalg.norm(np.ptp(best.vertices, axis=0)))
         best.notes.append(
-            f"points within {across * 1e3:.2g} mm were merged, since the panels close best so: "
-            f"{pattern.vertex_count} vertices became {best.vertex_count} (merge=)."
+            f"points within {across * 1e3:.2g} mm of each other or of a line were taken to meet, since the panels "
+            f"close best so: {pattern.vertex_count} vertices before, {best.vertex_count} after (merge=)."
         )
     return best
 

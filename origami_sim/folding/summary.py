@@ -107,7 +107,9 @@ def _verdict(folding: Folding, missed: int, order, creases) -> str:
     if not missed:
         worst = np.degrees(folding.errors.max())
         whole = "" if not folding.torn else ", but only by tearing the sheet"
-        return f"All {count} creases fold to within {max(worst, 0.01):.2f} deg of their targets{whole}."
+        whose = "The crease folds" if count == 1 else f"All {count} creases fold"
+        within = f"within {max(worst, 0.01):.2f} deg of {'its target' if count == 1 else 'their targets'}"
+        return f"{whose} to {within}{whole}."
     first = {name: column[order[0]] for name, column in creases.items()}
     wrong = int(np.sum((creases["angle_deg"] * creases["target_deg"] < 0) & (np.abs(creases["angle_deg"]) > 1.0)))
     popped = f" {wrong} of them have popped to the other side." if wrong else ""

@@ -9,13 +9,15 @@ from ..errors import InputError
 from .assemble import assemble
 from .checks import COORDINATE_LIMIT, check_number
 from .crease_pattern import Pattern
-from .holes import facets_of_holes
+from .holes import cut_noted, facets_of_holes, holes_noted
 from .planar import drop_holes, merge_distance, planar_faces, split_segments
 from .sizing import metres_of
 from .topology import edge_key, face_sides
 
 PRIORITY = "BCMVFU"
 """Which assignment an edge keeps where lines lie on each other."""
+FIRST = "the first of border, cut, mountain, valley, flat and unassigned is kept"
+"""The same in words."""
 MAX_SEGMENTS = 20_000
 
 
@@ -90,13 +92,13 @@ def drawn_pattern(
     facets, holed = facets_of_holes(points, np.array(list(chosen)))
     if holed:
         chosen |= {key: ("F", 1.0) for key in facets}
-        notes.append(f"{holed} panels with a hole or a loose part in them were cut into facets.")
+        notes.append(cut_noted(holed))
     found = planar_faces(points, np.array(list(chosen)), file=file)
     faces, holes = drop_holes(found, {key for key, (letter, _) in chosen.items() if letter == "B"})
     if not faces:
         raise InputError("the lines enclose no face", file=file, allowed="a closed black border")
     if holes:
-        notes.append(f"{holes} regions enclosed by border lines alone were taken as holes.")
+        notes.append(holes_noted(holes, "lines"))
     beside = Counter(edge_key(*side) for face in faces for side in face_sides(face))
     edges = [key for key in chosen if beside[key]]
     if len(edges) < len(chosen):
@@ -159,7 +161,8 @@ def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:
     drawn = [strokes[s] for *_, s in pieces]
     stays, conflicts = foremost([piece[:2] for piece in pieces], drawn, lambda n: PRIORITY.index(drawn[n][0]))
     if conflicts:
-        notes.append(f"{conflicts} edges are drawn twice in different colours or opacities: {PRIORITY} in order.")
+        edges = "1 edge is" if conflicts == 1 else f"{conflicts} edges are"
+        notes.append(f"{edges} drawn twice in different colours or opacities; {FIRST}.")
     return {key: drawn[n] for key, n in stays.items()}
 
 

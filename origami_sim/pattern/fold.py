@@ -16,10 +16,10 @@ from ..files import read_bytes
 from .assemble import assemble
 from .checks import check_vertices
 from .crease_pattern import ASSIGNMENTS, Pattern
-from .drawn import PRIORITY, foremost
+from .drawn import FIRST, PRIORITY, foremost
 from .files import write_atomic
 from .fold_json import Frame, main_frame, parse_json, resolve_frame
-from .holes import facets_of_holes
+from .holes import cut_noted, facets_of_holes, holes_noted
 from .noding import is_planar, node_edges
 from .planar import drop_holes, planar_faces
 from .sizing import metres_of
@@ -223,8 +223,10 @@ def _distinct(listed: _Edges, notes) -> list[int]:
     """Return which edges stay, in order, if of those between the same two vertices one does."""
     stays, differ = foremost(listed.pairs, listed.letters or "U" * len(listed.pairs), listed.rank)
     if len(stays) < len(listed.pairs):
-        contrary = f", {differ} of them with different letters: {PRIORITY} in order" if differ else ""
-        notes.append(f"{len(listed.pairs) - len(stays)} edges were listed more than once and are one{contrary}.")
+        contrary = f", {differ} of them with different letters; {FIRST}" if differ else ""
+        more = len(listed.pairs) - len(stays)
+        edges = "1 edge was listed twice and is" if more == 1 else f"{more} edges were listed more than once and are"
+        notes.append(f"{edges} one{contrary}.")
     return sorted(stays.values())
 
 
@@ -277,7 +279,7 @@ def _derived_faces(vertices, listed: _Edges, keys, notes, file):
         pairs = np.array(pieces, dtype=np.int64)
     facets, holed = facets_of_holes(points, pairs)
     if holed:
-        notes.append(f"{holed} panels with a hole or a loose part in them were cut into facets.")
+        notes.append(cut_noted(holed))
         for key, value in keys.items():
             if key.startswith("edges_") and isinstance(value, list) and len(value) == len(pairs):
                 keys[key] = [*value, *[None] * len(facets)]
@@ -293,7 +295,7 @@ def _derived_faces(vertices, listed: _Edges, keys, notes, file):
         )
     notes.append(f"faces_vertices is not given: {len(faces)} faces derived from the edges.")
     if holes:
-        notes.append(f"{holes} regions enclosed by border edges alone were taken as holes.")
+        notes.append(holes_noted(holes, "edges"))
     return vertices, listed, faces
 
 

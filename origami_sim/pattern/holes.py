@@ -69,3 +69,20 @@ def _triangulated(points, shell, inner) -> list[tuple[int, int]]:
             return []
         edges += [edge_key(a, b) for a, b in face_sides(corners)]
     return edges
+
+
+def holes_noted(count: int, drawn: str) -> str:
+    """The sentence on regions that are holes, of a pattern of "lines" or "edges"."""
+    if count == 1:
+        return f"1 region enclosed by border {drawn} alone was taken as a hole."
+    return f"{count} regions enclosed by border {drawn} alone were taken as holes."
+
+
+def cut_noted(count: int) -> str:
+    """The sentence on panels that `facets_of_holes` cut."""
+    panels = (
+        "1 panel with a hole or a loose part in it was"
+        if count == 1
+        else (f"{count} panels with a hole or a loose part in them were")
+    )
+    return f"{panels} cut into facets."

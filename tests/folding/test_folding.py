@@ -162,7 +162,7 @@ def test_halves_of_a_split_vertex_are_merged(tmp_path):
     pattern = read(drawn(tmp_path / "split.svg", lines))
     middle = pattern.vertices.mean(axis=0)
     assert np.sum(np.linalg.norm(pattern.vertices - middle, axis=1) < 0.05) == 1
-    assert any("were merged" in note for note in pattern.notes)
+    assert any("were taken to meet" in note for note in pattern.notes)
     assert fold(pattern).reached
 
 

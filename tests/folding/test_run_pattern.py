@@ -64,6 +64,11 @@ def test_a_pattern_that_does_not(call, three):
     assert re.search(r"target_deg +angle_deg +error_deg", out)
 
 
+def test_one_crease_is_said_in_the_singular(call, tmp_path):
+    code, out, _ = call("run", drawn(tmp_path / "one.svg", [*frame(40, 10), ("V", 20, 0, 20, 10, 0.5)]))
+    assert code == 0 and re.search(r"The crease folds to within 0\.01 deg of its target\.", out)
+
+
 def test_panels_that_pass_through_each_other(call, tmp_path):
     """Of three panels turned by 150 degrees the last goes through the first; by 60 degrees they are an open roll."""
     for share, expected in ((1 / 3, 0), (5 / 6, 1)):

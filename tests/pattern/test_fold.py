@@ -408,7 +408,7 @@ def test_of_equal_edges_the_one_with_an_angle_stays():
     )
     pattern = fold_pattern(again)
     assert np.degrees(pattern.fold_angles[4]) == pytest.approx(-40)
-    assert any("listed more than once and are one." in n for n in pattern.notes)
+    assert any("1 edge was listed twice and is one." in n for n in pattern.notes)
 
 
 @pytest.mark.parametrize("words", BAD)

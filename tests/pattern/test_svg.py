@@ -189,7 +189,10 @@ def test_what_is_left_out_is_told(tmp_path):
     )
     pattern = read_svg(svg(tmp_path, body))
     text = " ".join(pattern.notes)
-    assert all(words in text for words in ("orange", "enclose nothing", "<text>", "without stroke", "drawn twice"))
+    assert all(
+        words in text for words in ("orange", "enclose nothing", "<text>", "without stroke", "1 edge is drawn twice")
+    )
+    assert "the first of border, cut, mountain, valley" in text
     assert pattern.face_count == 1
     assert set(pattern.assignments) == {"B"}
 
@@ -253,7 +256,7 @@ def test_a_panel_with_a_hole_is_cut_into_facets(tmp_path, inner, faces_of_hole):
     area = sum(np.linalg.norm(area_vector(pattern.vertices, f)) for f in pattern.faces)
     hole = 400.0 if "rect" in inner else 250.0
     assert area == pytest.approx(8000.0 - hole * (1 - faces_of_hole))
-    assert any("1 panels with a hole" in note for note in pattern.notes)
+    assert any("1 panel with a hole" in note for note in pattern.notes)
     assert all(len(set(f)) == len(f) for f in pattern.faces)
     triangulate(pattern)
 
