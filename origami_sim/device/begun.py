@@ -16,14 +16,15 @@ MOVING = 2.0
 def begun(model: Model, recording: Recording) -> State | None:
     """The state at the recorded fold angles and their rates; None where the model starts as it does by itself.
 
-    That is where no fold angle is recorded or the first frame shows the reference state, and for devices that nothing
-    holds, that close loops or that start in a state of their own. Where the sidecar states the start, it is that: at
-    the angles that it states, and at rest unless it is moving. Creases of which nothing is told are as in the reference
-    state.
+    That is where no fold angle is recorded or stated, or where the first frame shows the reference state; and for
+    devices that nothing holds, that close loops or that start in a state of their own. Where the sidecar states the
+    start, it is that: at the angles that it states, and at rest unless it is moving. Creases of which nothing is told
+    are as in the reference state.
     """
     arm, told = Articulation(model), recording.start
     folds = {n: c for n, c in recording.channels.items() if c.kind == "crease_angle"}
-    if arm.floating or len(arm.open) or not folds or not np.array_equal(model.begins, model.position):
+    stated = told.angles if told is not None else {}
+    if arm.floating or len(arm.open) or not (folds or stated) or not np.array_equal(model.begins, model.position):
         return None
     pose = arm.reference()
     joints = {n: j for n, c in folds.items() if (j := _joint(arm, c.attachment.get("crease"))) is not None}
@@ -31,12 +32,12 @@ def begun(model: Model, recording: Recording) -> State | None:
     if told is None and all(abs(first[n] - pose.angles[j, 0]) <= CLEAR * folds[n].noise for n, j in joints.items()):
         return None
     by, rate = np.zeros((2, arm.size, 1))
-    found = initial_angles(recording, float(recording.times[0]))
+    found = initial_angles(recording, float(recording.times[0])) if folds else {}
     for name, joint in joints.items():
         by[joint] = found[name].angle - pose.angles[joint]
         if (told is None or told.state == "moving") and abs(found[name].rate) > MOVING * found[name].rate_error:
             rate[joint] = found[name].rate
-    for crease, angle in told.angles.items() if told is not None else ():
+    for crease, angle in stated.items():
         joint = _joint(arm, int(crease) if crease.isdecimal() else crease)
         if joint is not None:
             by[joint] = angle - pose.angles[joint]
