@@ -82,7 +82,7 @@ def table_basis(angle: np.ndarray, first: float, last: float) -> np.ndarray:
     k = np.clip(np.floor(s).astype(int), 0, KNOTS - 2)
     t = s - k
     one = np.eye(KNOTS)
-    slope = np.gradient(one, axis=0)
+    slope = np.array(np.gradient(one, axis=0))
     slope[2:-2] = (8 * (one[3:-1] - one[1:-3]) - (one[4:] - one[:-4])) / 12
     before, after = (t < 0)[:, None], (t > 1)[:, None]
     m0, m1, d0, d1, t = one[k], one[k + 1], slope[k], slope[k + 1], t[:, None]
