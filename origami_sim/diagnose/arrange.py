@@ -15,8 +15,8 @@ from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model.articulation import Articulation
+from origami_sim.observation.channels import stacked, units_of
 from origami_sim.predict.bars import BarRollouts
-from origami_sim.predict.channels import stacked, units_of
 from origami_sim.predict.prescribed import curves
 from origami_sim.predict.rigid import RigidRollouts
 from origami_sim.predict.rollouts import Rollouts

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.signal import hilbert, savgol_coeffs, savgol_filter
 from scipy.stats import spearmanr
 
-from origami_sim.predict.channels import component_names, stacked
+from origami_sim.observation.channels import component_names, stacked
 from origami_sim.recording import Recording
 from origami_sim.recording.recording import CHANNEL_KINDS
 

@@ -43,7 +43,7 @@ from origami_sim.locate.meeting import meetings
 from origami_sim.locate.onset import onset
 from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located
-from origami_sim.predict.channels import stacked, units_of
+from origami_sim.observation.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis

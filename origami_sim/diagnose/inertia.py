@@ -12,7 +12,7 @@ from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Subject
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
-from origami_sim.predict.channels import stacked
+from origami_sim.observation.channels import stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording

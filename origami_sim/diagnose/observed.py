@@ -9,8 +9,8 @@ from origami_sim.drive.sources import STRENGTHS
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
+from origami_sim.observation.channels import stacked
 from origami_sim.observation.observe import _index, body_point
-from origami_sim.predict.channels import stacked
 from origami_sim.predict.starts import channel_tangent, seen_first
 from origami_sim.predict.track import PATH
 from origami_sim.recording import Channel, Recording, by_component

@@ -13,7 +13,7 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Block, Predictor
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
 from origami_sim.model import Model, dihedral_angles
-from origami_sim.predict.channels import stacked
+from origami_sim.observation.channels import stacked
 from origami_sim.predict.starts import channel_tangent
 from origami_sim.recording import Channel
 from origami_sim.report.diagnosis import Diagnosis

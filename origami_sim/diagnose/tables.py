@@ -11,7 +11,7 @@ from origami_sim.infer.screen import Signature
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.verdict import Judgement, log_odds
 from origami_sim.infer.words import kind
-from origami_sim.predict.channels import units_of
+from origami_sim.observation.channels import units_of
 from origami_sim.report.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 
 

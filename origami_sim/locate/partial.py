@@ -23,7 +23,7 @@ from origami_sim.locate.locate_curves import places
 from origami_sim.locate.places import Curve, Partial, Place, clock
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
-from origami_sim.predict.channels import units_of
+from origami_sim.observation.channels import units_of
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.predict.track import track
 from origami_sim.solve.batch import Batch

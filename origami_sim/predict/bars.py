@@ -10,7 +10,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
-from origami_sim.predict.channels import stacked
+from origami_sim.observation.channels import stacked
 from origami_sim.predict.filming import film
 from origami_sim.predict.rollouts import Rollouts
 from origami_sim.predict.shots import Shots, Simulated

@@ -17,8 +17,8 @@ from origami_sim.hypotheses.spectra import with_spectra
 from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
+from origami_sim.observation.channels import angle_mask, stacked
 from origami_sim.observation.observe import Poses, read_channel
-from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of
 from origami_sim.predict.measured import at_channel, continuous
 from origami_sim.predict.thresholds import within_reach

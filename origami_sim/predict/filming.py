@@ -6,7 +6,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.model import Model
-from origami_sim.predict.channels import channel_values, depths, turned_axes
+from origami_sim.observation.channels import channel_values, depths, turned_axes
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from origami_sim.effects import Effect, get
 from origami_sim.model import Model, Parameters
-from origami_sim.predict.channels import angle_mask, marked
+from origami_sim.observation.channels import angle_mask, marked
 from origami_sim.recording import Channel, Recording
 
 ROUNDING = 1e-9

@@ -14,8 +14,8 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
+from origami_sim.observation.channels import angle_mask, stacked
 from origami_sim.predict.begun import with_begins
-from origami_sim.predict.channels import angle_mask, stacked
 from origami_sim.predict.drives import drive_of, reaching
 from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline

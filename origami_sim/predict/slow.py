@@ -11,7 +11,7 @@ from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.distort import distorted
-from origami_sim.predict.channels import depths, turned_axes
+from origami_sim.observation.channels import depths, turned_axes
 from origami_sim.predict.curves import PIECES, Balance, Curves, channels_of, measures_force
 from origami_sim.predict.measured import measured
 from origami_sim.predict.track import coordinates

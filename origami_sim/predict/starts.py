@@ -9,7 +9,7 @@ import numpy as np
 
 from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation, Pose
-from origami_sim.predict.channels import angle_mask, channel_values, stacked
+from origami_sim.observation.channels import angle_mask, channel_values, stacked
 from origami_sim.predict.track import placed
 from origami_sim.recording import Recording
 from origami_sim.threads import shared

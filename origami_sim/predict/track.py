@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation, Pose
+from origami_sim.observation.channels import angle_mask, channel_values, stacked
 from origami_sim.observation.observe import body_point
-from origami_sim.predict.channels import angle_mask, channel_values, stacked
 from origami_sim.recording import Recording
 
 PATH = "crease_angle"
