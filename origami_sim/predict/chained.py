@@ -130,7 +130,7 @@ def channels_of(
         return None
     starts = forward.state(chained.shots(worlds, range(len(blocks))))
     models = [m for m, _ in worlds]
-    first = pictured([m for m in models for _ in blocks], recording, starts.x[None], starts.angles[None])[0]
+    first = pictured(models, recording, starts.x[None], starts.angles[None])[0]
     angles = turned[np.array(chained.begins[1:-1], int) - 1][:, forward.articulation.creases]
     shift = turned_by(angles - np.stack([b.pose.angles for b in blocks])[1:])
     rates = ended[1:] - np.stack([b.rates for b in blocks])[1:, :, None]

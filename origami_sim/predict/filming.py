@@ -7,6 +7,7 @@ import numpy as np
 from origami_sim.effects import get
 from origami_sim.model import Model
 from origami_sim.observation.channels import channel_values, depths, turned_axes
+from origami_sim.predict.shots import by_geometry
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 
@@ -63,10 +64,9 @@ def film(
     With the present state as the first frame, if `first`. Displacements are counted since `begin`, see `read`.
 
     Args:
-        models: of each rollout, one (W,) or of so many equal groups, one after the other.
+        models: see `pictured`.
     """
     model, out, left = batch.model, [], frames
-    models = [m for m in models for _ in range(batch.worlds // len(models))]
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1)[:, 0], axis=-1)
     limit = 0.5 * lengths.min(initial=np.inf) * substeps / step
     if first:
@@ -92,27 +92,19 @@ def pictured(
     """All components, the depth of every marker in a picture and, if asked for, every marker's axes, [F, D + k, W].
 
     Args:
-        models: of each world (W,): a marker is at a point of a body, which lies elsewhere among the nodes of another.
+        models: of so many equal groups of the W worlds, one after the other. A marker is at a point of a body, which
+            lies elsewhere among the nodes of a body of other lengths.
     """
-    alike: dict[bytes, list[int]] = {}
-    for w, model in enumerate(models):
-        alike.setdefault(model.position.tobytes(), []).append(w)
+    alike, each = by_geometry(models), x.shape[2] // len(models)
     if len(alike) == 1:
         return _pictured(models[0], recording, x, angles, begin)
-    parts = [
-        _pictured(
-            models[mine[0]],
-            recording,
-            x[:, :, mine],
-            None if angles is None else angles[:, :, mine],
-            None if begin is None else begin[:, mine],
-        )
-        for mine in alike.values()
-    ]
-    out = np.empty((len(x), parts[0].shape[1], len(models)))
-    for mine, part in zip(alike.values(), parts, strict=True):
-        out[:, :, mine] = part
-    return out
+    columns = [(np.array(mine)[:, None] * each + np.arange(each)).ravel() for mine in alike.values()]
+    parts = []
+    for mine, at in zip(alike.values(), columns, strict=True):
+        turned = None if angles is None else angles[:, :, at]
+        begun = None if begin is None else begin[:, at]
+        parts.append(_pictured(models[mine[0]], recording, x[:, :, at], turned, begun))
+    return np.concatenate(parts, axis=2)[:, :, np.argsort(np.concatenate(columns))]
 
 
 def _pictured(model: Model, recording: Recording, x: np.ndarray, angles, begin) -> np.ndarray:

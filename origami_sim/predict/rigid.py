@@ -25,7 +25,7 @@ from origami_sim.predict.chained import (
 from origami_sim.predict.filming import film
 from origami_sim.predict.memories import Motion, in_parts
 from origami_sim.predict.rollouts import Rollouts
-from origami_sim.predict.shots import Shots, Simulated, joined_poses, of_worlds
+from origami_sim.predict.shots import Shots, Simulated, by_geometry, joined_poses, of_worlds
 from origami_sim.predict.starts import spans
 from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
@@ -294,10 +294,7 @@ class RigidRollouts(Rollouts):
         base = joined_poses([b.pose for b in after])
         rates = np.stack([b.rates for b in after], axis=1)
         out = np.empty((2 * arm.size, state.worlds))
-        alike: dict[bytes, list[int]] = {}
-        for n, (own, _) in enumerate(shots.worlds):
-            alike.setdefault(own.position.tobytes(), []).append(n)
-        for key, mine in alike.items():
+        for key, mine in by_geometry([own for own, _ in shots.worlds]).items():
             at = (np.array(mine)[:, None] * count + np.arange(count)).ravel()
             own, b = self._arms[key], np.tile(np.arange(count), len(mine))
             pose = own.poses_of(state.x[:, at], state.angles[:, at])

@@ -20,7 +20,16 @@ from origami_sim.predict.drives import drive_of, reaching
 from origami_sim.predict.filming import even, film_step, interpolated
 from origami_sim.predict.measured import continuous, lateness, measured, read_until, spline
 from origami_sim.predict.memories import Motion, memories
-from origami_sim.predict.shots import Shots, Simulated, by_length, joined, joined_poses, remembering, trembles
+from origami_sim.predict.shots import (
+    Shots,
+    Simulated,
+    by_geometry,
+    by_length,
+    joined,
+    joined_poses,
+    remembering,
+    trembles,
+)
 from origami_sim.predict.starts import CAREFUL, Readings, seen_first, spans
 from origami_sim.predict.stated import stated
 from origami_sim.predict.thresholds import within_reach
@@ -294,10 +303,7 @@ class Rollouts(Worlds, ABC):
         base, rates = joined_poses([b.pose for b in blocks]), np.stack([b.rates for b in blocks], axis=1)
         x = np.empty((len(model.position), len(worlds) * count, 3))
         v = np.empty_like(x)
-        alike: dict[bytes, list[int]] = {}
-        for n, (own, _) in enumerate(worlds):
-            alike.setdefault(own.position.tobytes(), []).append(n)
-        for key, mine in alike.items():
+        for key, mine in by_geometry([own for own, _ in worlds]).items():
             if key not in self._arms:
                 self._arms[key] = Articulation(worlds[mine[0]][0])
             arm = self._arms[key]

@@ -93,6 +93,14 @@ def joined(several: list[tuple]) -> tuple:
     return made, arrived, several[0][2]
 
 
+def by_geometry(models: Sequence[Model]) -> dict[bytes, list[int]]:
+    """Which models have the same reference positions, by these."""
+    out: dict[bytes, list[int]] = {}
+    for n, model in enumerate(models):
+        out.setdefault(model.position.tobytes(), []).append(n)
+    return out
+
+
 TREMBLING = 0.3
 """Part of a frame by which times of blocks may differ that are filmed together: each is read at its own times.
 

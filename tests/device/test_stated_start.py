@@ -19,4 +19,4 @@ def test_a_device_that_markers_show_begins_at_the_angles_that_are_stated(stated)
     if not stated:
         assert found is None
     else:
-        assert found is not None and found.angles[0, 0] == pytest.approx(0.4, abs=1e-12) and not np.any(found.v)
+        assert found is not None and found.angles[0, 0] == pytest.approx(0.4, abs=1e-15) and not np.any(found.v)

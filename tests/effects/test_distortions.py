@@ -63,7 +63,7 @@ def test_one_strength_distorts_each_world_of_a_drive_as_alone(name):
     for world, one in enumerate(through(name, a, **values) for a in alone):
         for channel in one.signals:
             found, expected = at(out, channel), at(one, channel)[:, 0]
-            assert np.allclose(found[:, world % found.shape[1]], expected, rtol=1e-12, atol=1e-15)
+            assert np.allclose(found[:, world % found.shape[1]], expected, rtol=1e-15, atol=0.0)
 
 
 @pytest.mark.parametrize("name", [*DRIVES, *MEASUREMENTS])
