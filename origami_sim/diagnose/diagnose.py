@@ -107,7 +107,7 @@ def _diagnosed(
         keep.follow(forward)
     compared = share_compared(forward)
     frames = sum(len(r.times) for r in recordings)
-    noted = [f"{compared:.0%} of {frames:,} frames are compared.", *noted]
+    noted = [f"{compared:.0%} of {frames:,} frames are compared.", *standing(forward), *noted]
     listens = "Whether a drive listens to the device could not be told"
     loop = attempt(noted, listens, lambda: closed_loop(recordings), None)
     noted += [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
@@ -284,10 +284,19 @@ def possible_of(source: Source) -> Possible:
 
 
 def share_compared(forward: Predictor) -> float:
-    """Part of the frames with a value that are compared."""
-    seen = sum(np.any(b.seen(), axis=1).sum() for b in forward.blocks)
+    """Part of the frames with a value that are compared, or repeat one that is."""
+    seen = sum(np.any(b.counted(), axis=1).sum() for b in forward.blocks)
     whole = sum(np.any(np.isfinite(stacked(r)[0]), axis=1).sum() for r in forward.recordings)
     return float(min(seen / max(whole, 1), 1.0))
+
+
+def standing(forward: Predictor) -> list[str]:
+    """Notes on components whose readings stand on a step of the sensor, and then count once."""
+    each = [np.sum(b.repeats, axis=0) for b in forward.blocks if b.repeats is not None]
+    text = "{:,} readings of '{}' only repeat others, as its sensor stands on a step for long: these count once."
+    return (
+        [text.format(n, c) for n, c in zip(np.sum(each, axis=0), forward.components, strict=True) if n] if each else []
+    )
 
 
 def scored(p: Posterior) -> list[tuple[Signature, np.ndarray]]:

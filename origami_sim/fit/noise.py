@@ -55,6 +55,14 @@ Shorter events (an impact, a snap) are the object's. A median of three exceeds 4
 in one recording of 3000 out of three; with 4 frames impacts would be bursts.
 """
 
+STANDS = 16
+"""Frames in which a reading does not change from which on they count once.
+
+Of swings over 0.6 to 30 steps with noise of 0 to 0.8 of one, numbers of least squares are off by 1.0 to 1.5 of what is
+stated, by 4 where a swing is below a step (6 with all frames). Half: by 2 there, and all are known less well by up to
+a quarter, as noise itself makes a reading stand for 8 frames; double: by 5.
+"""
+
 RARE = 1e-4
 """Segments with a power, in any octave, that noise as in the median segment has more rarely than this are left out: an
 impact passed through. At 1e-2 noise itself is trimmed, at 1e-8 an impact of ten times the noise stays in."""
@@ -158,6 +166,22 @@ def numbered(times: np.ndarray, frame: float) -> np.ndarray:
     """Numbers (n,) of frames at increasing times [s]: neighbours differ by whole numbers, by one at least."""
     steps = np.maximum(np.round(np.diff(times) / frame), 1).astype(np.int64)
     return np.concatenate([[0], np.cumsum(steps)])
+
+
+def without_repeats(values: np.ndarray) -> np.ndarray:
+    """Readings (n, D) of which a sensor that stands on one of its steps for `STANDS` frames or more counts once.
+
+    Its error is the same in all of these frames, so that they tell no more than the one in the middle, which is kept;
+    the others are nan. Taken for as many readings, they would tell of motions far below the step.
+    """
+    out = values.copy()
+    for d, column in enumerate(values.T):
+        rounding = 8.0 * np.finfo(float).eps * np.abs(column[np.isfinite(column)]).max(initial=0.0)
+        moved = ~(np.abs(np.diff(column)) <= rounding)
+        for run in np.split(np.arange(len(column)), np.flatnonzero(moved) + 1):
+            if len(run) >= STANDS:
+                out[np.delete(run, len(run) // 2), d] = np.nan
+    return out
 
 
 def noise_of(

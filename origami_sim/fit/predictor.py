@@ -31,6 +31,7 @@ class Block:
         lasting: time until the next segment begins, if it is tied to this one [s].
         begin: (D,) what was measured at the first frame, which tells the turn of angles.
         shows: [D, m] derivatives of the channels by the coordinates at the start; None where that is not fitted.
+        repeats: [n, D] which values are missing as they repeat one that is there, see `without_repeats`; None: none.
     """
 
     recording: int
@@ -45,6 +46,7 @@ class Block:
     lasting: float = 0.0
     begin: np.ndarray | None = None
     shows: np.ndarray | None = None
+    repeats: np.ndarray | None = None
 
     def rows(self, before: bool, after: bool) -> Rows:
         """How many rows of a least-squares problem it has, tied or not to the segments before and after it."""
@@ -75,6 +77,10 @@ class Block:
     def seen(self) -> np.ndarray:
         """[n, D] which values were measured."""
         return np.isfinite(self.values)
+
+    def counted(self) -> np.ndarray:
+        """[n, D] which values were measured, with those that repeat one."""
+        return self.seen() if self.repeats is None else self.seen() | self.repeats
 
 
 @dataclass(frozen=True, eq=False)

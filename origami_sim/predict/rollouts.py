@@ -9,6 +9,7 @@ from scipy.signal import savgol_filter
 
 from origami_sim.drive import Drive
 from origami_sim.effects import get
+from origami_sim.fit.noise import without_repeats
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, Suspect
 from origami_sim.hypotheses.suspects import at_several_times, told_apart
@@ -94,8 +95,10 @@ class Rollouts(Worlds, ABC):
             wide = np.hypot(CAREFUL * np.where(told, found.error, 0.0), np.maximum(usual, np.abs(rates)))
             known = np.concatenate([spans(arm, self.model), wide])
         times = recording.times[part] - recording.times[first]
-        begin = seen_first(values[part])
-        block = Block(index, first, times, values[part].copy(), noise, pose, rates, known, begin=begin, shows=shows)
+        read = values[part]
+        kept = without_repeats(read)
+        also = {"begin": seen_first(read), "shows": shows, "repeats": np.isnan(kept) & np.isfinite(read)}
+        block = Block(index, first, times, kept, noise, pose, rates, known, **also)
         if found is None or first > 0:
             return block
         return stated(self, block, self.readings.usual_rates(index), found.error, found.shown)

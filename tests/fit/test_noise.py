@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from origami_sim.errors import InputError
 from origami_sim.fit.colour import MEDIAN, all_colours
-from origami_sim.fit.noise import Burst, Noise, infer, noise_of, portmanteau
+from origami_sim.fit.noise import Burst, Noise, infer, noise_of, portmanteau, without_repeats
 from origami_sim.recording import Camera, Channel, Recording, noise_report
 
 RATE = 240.0
@@ -317,3 +317,52 @@ def test_the_colours_are_a_prior_of_unit_mass_and_unit_variance():
     rng = np.random.default_rng(0)
     x = median_of_three(rng.normal(size=400_000))
     assert [np.mean(x[1:] * x[:-1]), np.mean(x[2:] * x[:-2])] == pytest.approx(MEDIAN, abs=0.01)
+
+
+def quantised(deviation: float, amplitude: float, period: float, rng: np.random.Generator) -> tuple:
+    """Readings (400,) of a dying swing in steps of 1, its three numbers, and its derivatives by them [400, 3]."""
+    t = np.arange(400)
+    wave = np.array([np.sin(2 * np.pi * t / period), np.cos(2 * np.pi * t / period)]) * np.exp(-t / 200)
+    design = np.column_stack([np.ones(400), *wave])
+    phase = rng.uniform(0, 2 * np.pi)
+    truth = np.array([rng.uniform(), amplitude * np.cos(phase), amplitude * np.sin(phase)])
+    return np.round(design @ truth + deviation * rng.standard_normal(400)), truth, design
+
+
+def error_over_stated(read: np.ndarray, truth: np.ndarray, design: np.ndarray, deviation: float) -> float:
+    """Mean square error of least squares, over what white noise would give."""
+    seen = np.isfinite(read)
+    a = design[seen] / np.hypot(deviation, 1 / np.sqrt(12))
+    error = np.linalg.lstsq(design[seen], read[seen])[0] - truth
+    return float(np.sum((a @ error) ** 2)) / np.linalg.matrix_rank(a)
+
+
+@pytest.mark.parametrize(("deviation", "amplitude", "most"), [(0.0, 0.0, 1.1), (0.02, 3.0, 1.6), (0.3, 3.0, 1.1)])
+def test_readings_that_stand_on_a_step_tell_no_more_than_is_true(deviation, amplitude, most):
+    rng = np.random.default_rng(5)
+    every, once = [], []
+    for _ in range(200):
+        read, truth, design = quantised(deviation, amplitude, 200.0, rng)
+        design = design if amplitude else design[:, :1]
+        every.append(error_over_stated(read, truth[: design.shape[1]], design, deviation))
+        once.append(
+            error_over_stated(without_repeats(read[:, None])[:, 0], truth[: design.shape[1]], design, deviation)
+        )
+    assert np.sqrt(np.mean(once)) < most
+    if deviation < 0.1:
+        assert np.sqrt(np.mean(every)) > 1.5 * most  # as many readings as frames would tell too much
+
+
+def test_readings_that_noise_moves_all_count():
+    rng = np.random.default_rng(6)
+    read = quantised(0.5, 3.0, 200.0, rng)[0][:, None]
+    assert np.isfinite(without_repeats(read)).mean() > 0.95
+    smooth = rng.standard_normal((400, 2))
+    smooth[7, 1] = np.nan
+    np.testing.assert_array_equal(without_repeats(smooth), smooth)
+
+
+def test_what_stands_is_kept_in_the_middle():
+    read = np.array([*range(5), *[9.0] * 21, 3.0, np.nan, *[np.nan] * 20, 4.0])[:, None]
+    kept = without_repeats(read)[:, 0]
+    assert np.flatnonzero(np.isfinite(kept)).tolist() == [0, 1, 2, 3, 4, 15, 26, 48]
