@@ -7,8 +7,11 @@ import pytest
 from effects.kit import lengths, make_model, quiet, start
 from solve.runs import G
 
+from origami_sim import Sheet, strip
 from origami_sim.drive import Drive, ramp
+from origami_sim.model import State
 from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.statics.equilibria import equilibrium
 
 
 def plate(**options):
@@ -171,3 +174,33 @@ def test_adhesion_lets_go_at_its_pull_off_force():
     assert not r.failures
     assert np.all(lifted == (pull > 1.0 + 1e-9)) or np.abs(pull[np.argmax(lifted)] - 1.0) <= 0.01
     assert lifted[-1] and not lifted[0]
+
+
+def sled(**ground):
+    sheet = Sheet(strip([0.01] * 4, 0.02), thickness=1e-3, material="pdms", panels=ground.pop("panels", "elastic"))
+    return sheet.crease(stiffness=5e-3).ground(**ground).build()
+
+
+@pytest.mark.parametrize("panels", ["elastic", "rigid"])
+def test_a_sled_may_slide_on_level_ground_and_friction_is_named(panels):
+    """Three motions along the ground cost nothing: no instability, and friction, which is left out, would hold them."""
+    found = equilibrium(*sled(panels=panels, friction=0.5))
+    assert found.converged and found.stable and found.neutral == 3
+    assert found.frictionless and "Friction on the ground is left out: it would hold" in found.message
+    assert "3 neutral modes" in repr(found) and "rad" in repr(found) and len(repr(found)) < 400
+    assert not equilibrium(*sled(panels=panels, friction=0.0)).frictionless
+
+
+def test_a_slope_has_no_rest_without_friction_and_that_is_said():
+    found = equilibrium(*sled(friction=0.5, tilt=0.1), max_iterations=50)
+    assert not found.converged and "Friction on the ground is left out, which may hold" in found.message
+
+
+def test_rigid_panels_that_turn_far_on_their_way_are_judged_by_a_symmetric_tangent():
+    """A sled that is put down at an angle lies down, and may slide as one may that lay before."""
+    model, parameters = sled(panels="rigid", friction=0.0)
+    turn = np.array([[np.cos(0.4), 0.0, np.sin(0.4)], [0.0, 1.0, 0.0], [-np.sin(0.4), 0.0, np.cos(0.4)]])
+    placed = (model.position - model.position.mean(axis=0)) @ turn.T + [0.0, 0.0, 0.008]
+    found = equilibrium(model, parameters, state=State.at_rest(model, position=placed))
+    assert found.converged and found.stable and found.neutral == 3
+    assert np.ptp(found.x[:, 2]) < 2e-3  # thickness and sink

@@ -28,14 +28,15 @@ a sheet has such constraints, and so has every symmetric one; above by 10^4 wher
 class RigidSystem:
     """Moments of one world as functions of its coordinates: shifts and turns of the root, then fold angles [rad].
 
-    Shifts are in units of the device's size. Coordinates are zero in the state that the system is made with. Loops
-    are constraints: all states are on their manifold, and moments are those along it.
+    Shifts are in units of the device's size. Coordinates are zero at positions `x` [N, 3], which go along with every
+    step: where they are zero, and only there, moments are the energy's derivatives by them, and the tangent of a
+    balanced state is symmetric. Loops are constraints: all states are on their manifold, and moments along it.
     """
 
     def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State):
         self.model, self.parameters, self.state = model, parameters, state
         self.tree = t = Topology(model)
-        self.x = state.x[:, 0]
+        self.x, self.folds = state.x[:, 0], state.angles[: len(model.creases), 0].copy()
         self.size = float(np.ptp(self.x, axis=0).max(initial=0.0)) or 1.0
         self.count = len(t.turns) + len(t.joints)
         worlds = 2 * self.count + 1
@@ -61,24 +62,31 @@ class RigidSystem:
         slope = (found[:, self.count + 1 :] - found[:, 1 : self.count + 1]) / (2 * STEP)
         return along.T @ found[:, 0], along.T @ slope @ along, along, x[:, 0], angles[:, 0]
 
-    def _stepped(self, q: np.ndarray, step: np.ndarray, time: float) -> tuple | None:
-        """Coordinates a step away with all loops closed, and the moments there; None where loops do not close."""
-        moved = closed(self.tree, self.x, q + step)
-        return None if moved is None else (moved, *self.moments(moved, time))
+    def _stepped(self, step: np.ndarray, time: float) -> tuple | None:
+        """The moments a step away with all loops closed; None where loops do not close."""
+        q = closed(self.tree, self.x, step)
+        if q is None:
+            return None
+        begin = self.x, self.folds
+        self.folds = self._angles(q)
+        self.x = self.tree.moved(begin[0][:, None], q[:, None])[:, 0]
+        found = self.moments(np.zeros(self.count), time)
+        self.x, self.folds = begin
+        return found
 
     def _angles(self, q: np.ndarray) -> np.ndarray:
         """Fold angles [C] at q, not wrapped."""
-        out = self.state.angles[: len(self.model.creases), 0].copy()
+        out = self.folds.copy()
         for c, j in enumerate(self.tree.joint_of):
             out[c] += q[len(self.tree.turns) + j]
         return out
 
     def settle(self, time: float, tolerance: float, max_iterations: int, unstable: bool) -> dict:
         """The equilibrium near the start, as the fields of an `Equilibrium`."""
-        q, shift, pushes, history, message = np.zeros(self.count), 0.0, 0, [], ""
+        start, shift, pushes, history, message = np.zeros(self.count), 0.0, 0, [], ""
         converged, values, mode = False, np.full(1, np.nan), np.zeros(self.count)
         scale = target = 0.0
-        f, k, along, x, angles = self.moments(q, time)
+        f, k, along, x, angles = self.moments(start, time)
         while True:
             history.append(float(np.abs(f).max(initial=0.0)))
             scale = max(scale, history[-1], float(np.abs(k).max(initial=0.0)))
@@ -103,19 +111,20 @@ class RigidSystem:
                 step = np.linalg.lstsq(k + shift * np.eye(len(k)), f, rcond=None)[0]
                 step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
             work, step = step @ f, along @ step
-            new = self._stepped(q, step, time)
+            new = self._stepped(step, time)
             for _ in range(30):
                 # along the way the moment must not have turned against the step by half of what it was
                 ahead = unstable or history[-1] <= target
-                if new is not None and (ahead or self._ahead(new, step, work)) and self._clear(x, new[4]):
+                if new is not None and (ahead or self._ahead(new, step, work)) and self._clear(x, new[3]):
                     break
                 step = 0.5 * step
                 work *= 0.5
-                new = self._stepped(q, step, time)
+                new = self._stepped(step, time)
             if new is None:
                 message = "loops of panels cannot close on the way"
                 break
-            q, f, k, along, x, angles = new
+            f, k, along, x, angles = new
+            self.x, self.folds = x, angles
         neutral = int((np.abs(values) <= NEUTRAL * np.abs(values).max(initial=1e-300)).sum())
         stable = converged and bool(np.all(values >= -NEUTRAL * np.abs(values).max(initial=0.0)))
         if converged:
@@ -127,7 +136,7 @@ class RigidSystem:
         state.x, state.v, state.a = x[:, None].copy(), np.zeros_like(state.x), np.zeros_like(state.x)
         state.angles[: len(angles), 0] = angles
         state.status = np.full((2, 1), -1, np.int32)
-        shape = np.einsum("mna,m->na", self.tree.positions(self.x, q[:, None])[1][:, :, 0], mode)
+        shape = np.einsum("mna,m->na", self.tree.rates(x[:, None])[:, :, 0], mode)
         return {
             "state": state,
             "angles": state.angles[:, 0],
@@ -151,7 +160,7 @@ class RigidSystem:
     @staticmethod
     def _ahead(new: tuple, step: np.ndarray, work: float) -> bool:
         """Whether moments after a step have not turned against it by half of the work that they promised."""
-        _, f, _, along, *_ = new
+        f, _, along, *_ = new
         return bool(np.all(np.isfinite(f)) and (along.T @ step) @ f >= -0.5 * abs(work))
 
 

@@ -16,8 +16,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from origami_sim.drive import Drive, Signal
+from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.model.clearance import gaps
 from origami_sim.model.contact import engaged, may_touch
 from origami_sim.model.distort import distorted
 from origami_sim.solve.oversights import refuse_start_outside_tables
@@ -142,7 +144,27 @@ def equilibrium(
         again = _settled(other, own, drive, time, start, world, *options)
         found = replace(again, state=without_memory(model, again.state), touching=said)
     found.wall = clock.perf_counter() - began
-    return found
+    return _with_friction_named(model, parameters, found, at)
+
+
+def _with_friction_named(model: Model, parameters: Parameters, found: Equilibrium, world: int) -> Equilibrium:
+    """The equilibrium, which says where it has left out friction on the ground."""
+    laws = [get(e) for e in model.laws]
+    own = parameters.world(world) if parameters.worlds > 1 else parameters
+    slips = [np.any(own[e.name, p.name]) for e in laws if e.family == "coefficient" for p in e.strengths]
+    if not any(slips) or not any(e.family == "tangent" for e in laws) or not np.all(np.isfinite(found.x)):
+        return found
+    if not np.any(gaps(model, own, found.state.x) < 0):
+        return found
+    if found.neutral and found.converged:
+        said = "Friction on the ground is left out: it would hold what may slide here."
+    elif found.converged:
+        said = "Friction on the ground is left out: with it, a device also rests beside this equilibrium."
+    else:
+        said = (
+            "Friction on the ground is left out, which may hold the device: quasistatic() and simulate() follow that."
+        )
+    return replace(found, frictionless=True, message=f"{found.message} {said}")
 
 
 def _settled(model, parameters, drive, time, state, world, tolerance, max_iterations, unstable) -> Equilibrium:

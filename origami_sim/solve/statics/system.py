@@ -59,9 +59,11 @@ def _every_two(groups: np.ndarray) -> np.ndarray:
     return np.stack(np.broadcast_arrays(g[:, :, None], g[:, None, :])).reshape(2, -1)
 
 
-@dataclass
+@dataclass(repr=False)
 class Equilibrium:
     """An equilibrium, or where the search for it stopped.
+
+    Printed, it is a line or two; its numbers are in the attributes.
 
     Attributes:
         state: one world at rest, from which a simulation can start.
@@ -78,6 +80,8 @@ class Equilibrium:
         reactions: [N, 3] forces that the supports exert on held axes [N]; nan for rigid panels, which share them.
         message: what happened, in a sentence. wall: time that it took [s].
         touching: which panels met, so that it was found with contact that nobody had stated; empty if none did.
+        frictionless: whether it touches a ground with friction, which is left out: with it, a device rests in a range
+            of states around this one, and on a slope that has none without it.
     """
 
     state: State
@@ -95,6 +99,16 @@ class Equilibrium:
     message: str
     wall: float = 0.0
     touching: str = ""
+    frictionless: bool = False
+
+    def __repr__(self) -> str:
+        unit = "N m/rad" if np.all(np.isnan(self.reactions)) else "N/m"
+        said = [f"Equilibrium: {self.message}"]
+        if len(self.angles):
+            said.append(f"{len(self.angles)} hinge angles from {self.angles.min():.4g} to {self.angles.max():.4g} rad")
+        if np.all(np.isfinite(self.eigenvalues[:1])) and len(self.eigenvalues):
+            said.append(f"lowest eigenvalue {self.eigenvalues[0]:.3g} {unit}")
+        return f"{said[0]} {'; '.join(said[1:])}{'.' * (len(said) > 1)} {self.touching}".strip()
 
     @property
     def x(self) -> np.ndarray:
