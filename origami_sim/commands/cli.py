@@ -9,13 +9,13 @@ import functools
 import gc
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from origami_sim import __version__
+from origami_sim.commands.progress import Bar
 from origami_sim.errors import InputError
 from origami_sim.results.printing import print_json as _print_json
 
@@ -35,23 +35,6 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str):
         print(f"origami-sim: {InputError(f'{message}; see {self.prog} --help')}", file=sys.stderr)
         sys.exit(BAD_INPUT)
-
-
-class _Bar:
-    """A progress line on standard error, only where somebody watches."""
-
-    def __init__(self, label: str):
-        self.label, self.shown, self.began = label, -1, time.perf_counter()
-        self.watched = sys.stderr.isatty()
-
-    def __call__(self, fraction: float):
-        percent = int(100 * fraction)
-        if self.watched and percent != self.shown:
-            self.shown = percent
-            sys.stderr.write(f"\r{self.label}: {percent:3d} %")
-            if fraction >= 1:
-                sys.stderr.write(f" in {time.perf_counter() - self.began:.1f} s\n")
-            sys.stderr.flush()
 
 
 _DIAGNOSE_HELP = """\
@@ -320,10 +303,10 @@ def _run(args) -> int:
                 print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
         return OK
     if pattern:
-        return module.run(args, settings, _Bar(name))
+        return module.run(args, settings, Bar(name))
     folder = Path(args.out or f"runs/{name}")
     check_writable(folder)
-    outcome = module.run(settings, progress=_Bar(name))
+    outcome = module.run(settings, progress=Bar(name))
     folder = not_over_a_sound_run(folder, outcome.trajectory)
     kept = _save(folder, name, outcome, settings.as_dict(), args.set)
     if hasattr(module, "draw") and kept == folder:
@@ -456,7 +439,7 @@ def _stride(args) -> int:
     if args.cycles is not None and args.cycles < 1:
         raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
     cycles = args.cycles or len(stored.reference(args.scene)["strides_mm"])
-    motion = module.walk(settings, cycles=cycles, progress=_Bar(args.scene))
+    motion = module.walk(settings, cycles=cycles, progress=Bar(args.scene))
     report = stored.check(args.scene, strides(motion, settings.frequency), settings=settings)
     _print_json(report.to_json()) if args.json else print(report.text())
     return OK if report.passed else NO
@@ -566,7 +549,7 @@ def _replicate(module, settings, recording: "Recording", start: float, duration:
 
     first = float(recording.times[0]) + start
     part = recording.window(first, first + duration)
-    motion, used = module.replicate(settings, part, progress=_Bar("replicate"))
+    motion, used = module.replicate(settings, part, progress=Bar("replicate"))
     return compare(part, observe(motion, part), threshold=threshold), motion, used, part
 
 

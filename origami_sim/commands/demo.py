@@ -9,7 +9,6 @@ from origami_sim.commands.cli import (
     COMPARED_SECONDS,
     OK,
     STAND_IN_SECONDS,
-    _Bar,
     _print_json,
     _replicate,
     _save,
@@ -19,6 +18,7 @@ from origami_sim.commands.cli import (
     _tell,
 )  # fmt: skip
 from origami_sim.commands.demo_page import Section, write_report
+from origami_sim.commands.progress import Bar
 from origami_sim.device.scene import recordings_folder, scene_module, scene_settings
 from origami_sim.recording import read_recording, stand_in_double_pendulum
 from origami_sim.recording.stand_in import write_stand_in_sidecar
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         module = scene_module(name)
         settings = scene_settings(module)
         say(f"== {name}", flush=True)
-        outcome = module.run(settings, progress=_Bar(name))
+        outcome = module.run(settings, progress=Bar(name))
         _save(out / name, name, outcome, settings.as_dict(), [])
         if not args.json:
             _tell(args, outcome, out / name)

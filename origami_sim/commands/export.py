@@ -4,6 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
+from origami_sim.commands.progress import Bar
 from origami_sim.errors import InputError
 
 SUMMARY = "Write a run as glTF, OBJ, FOLD or a moving picture"
@@ -27,7 +28,7 @@ def register(parser: argparse.ArgumentParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
-    from origami_sim.commands.cli import OK, _Bar, _print_json
+    from origami_sim.commands.cli import OK, _print_json
     from origami_sim.results.run_folder import load_run
     from origami_sim.view.export import export as write
 
@@ -49,7 +50,7 @@ def export(args: argparse.Namespace) -> int:
         stop=args.stop,
         world=args.world,
         title=str(run.manifest["scene"]),
-        progress=_Bar(Path(args.to).name),
+        progress=Bar(Path(args.to).name),
         **how,
     )
     size = file.stat().st_size

@@ -14,6 +14,7 @@ import pytest
 
 from origami_sim import __version__
 from origami_sim.commands import cli
+from origami_sim.commands.progress import Bar
 from origami_sim.device import scene
 from origami_sim.device.scene import read_calibration, scene_module
 from origami_sim.drive import Drive, series
@@ -193,16 +194,29 @@ def test_screenshot_of_a_run(call, tmp_path):
 
 
 def test_progress_is_shown_only_to_somebody_who_watches(capsys, monkeypatch):
-    cli._Bar("box")(0.5)
+    Bar("box")(0.5)
     assert capsys.readouterr().err == ""
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    bar = cli._Bar("box")
+    bar = Bar("box")
     bar(0.5)
     bar(0.5)
     bar(1.0)
     shown = capsys.readouterr().err
     assert shown.count("50 %") == 1
     assert re.search(r"100 % in [\d.]+ s\n$", shown)
+
+
+def test_a_long_run_says_how_long_it_will_take(capsys, monkeypatch):
+    clock = iter([0.0, 10.0, 40.0, 80.0, 400.0])
+    monkeypatch.setattr("origami_sim.commands.progress.time.perf_counter", lambda: next(clock))
+    bar = Bar("sheet")
+    for done in (0.025, 0.1, 0.2, 1.0):  # nobody watches: once, when it has taken long
+        bar(done)
+    assert capsys.readouterr().err == "sheet: 10.0% done in 40 s, about 6 min left\n"
+    clock = iter([0.0, 40.0])
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    Bar("sheet")(0.5)
+    assert "50 %, about 40 s left" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("panels", ["rigid", "elastic"])
@@ -279,7 +293,7 @@ def test_a_run_that_fails_leaves_an_earlier_result(call, tmp_path):
 def test_code_130_and_earlier_results_untouched_after_an_interrupt(call, tmp_path):
     assert call("run", "fold_file", "--out", "here", *QUICK)[0] == 0
     before = contents(tmp_path)
-    watch = "import origami_sim.commands.cli as c\nc._Bar.__call__ = lambda self, f: print(f, flush=True)\nc.main()"
+    watch = "import origami_sim.commands.cli as c\nc.Bar.__call__ = lambda self, f: print(f, flush=True)\nc.main()"
     arguments = ["run", "fold_file", "--out", "here", "--set", "fold_time=100"]
     process = subprocess.Popen(
         [sys.executable, "-c", watch, *arguments],

@@ -3,169 +3,31 @@
 The panels form a tree. Its coordinates are the pose of the root panel, as far as that can move, and one angle for each
 crease of the tree. Bodies are numbered from the root outwards, joint b - 1 carries body b. All velocities and moments
 are taken about the origin O, the root's centre at that instant, in the axes of the world; composite inertias are then
-plain sums (Featherstone 2008, chapters 6 and 8). Loops are closed by constraint forces.
-
-What belongs to a world lies in one stretch of one buffer, so that threads share no memory; `Tree` has the places of its
-parts in that stretch.
+plain sums (Featherstone 2008, chapters 6 and 8). Loops are closed by constraint forces (`loops`).
 """
 
 import warp as wp
 
-from origami_sim import _warp  # noqa: F401  settings
 from origami_sim.physics import kinematics
-
-scalar = wp.float64
-vec3 = wp.vec3d
-mat33 = wp.mat33d
-
-POSE = wp.constant(7)
-"""Numbers of the root's pose before the joint angles: place of its centre, then a unit quaternion."""
-
-NATURAL = wp.constant(0x7FFFFFFF)
-"""Masked with this, an index is seen to be no negative one, and an access is spared that test."""
-
-
-@wp.struct
-class Tree:
-    """Topology, and where in a world's stretch of the buffer its numbers lie.
-
-    B bodies, J = B - 1 joints, d rates of the root, m = d + J rates in all, R constraint rows. Shapes are per world.
-    """
-
-    data: wp.array(dtype=scalar)  # [W width] the buffer
-    width: int
-    bodies: int
-    roots: int
-    rates: int
-    rows: int
-    follows: int  # 1: the root turns about its own centre
-    first_body: int  # that moves: 1 where the root is held, of which all stays as it is
-    first_number: int  # of the coordinates that changes: then the first joint's angle
-    parent: wp.array(dtype=wp.int32)  # [B]
-    body_of: wp.array(dtype=wp.int32)  # [N] body that carries a node
-    moving: wp.array(dtype=wp.int32)  # nodes of the bodies that move, body after body: corners, then mass points
-    corners: int  # how many of them are corners
-    joint_of: wp.array(dtype=wp.int32)  # [C] joint of a crease, -1 where it closes a loop
-    # [3 d + R] angular velocities of the root for unit rates, velocities of its centre besides, points about which it
-    # turns where those do not move with it; then directions in which constraints hold
-    axes: wp.array(dtype=vec3)
-    joined: wp.array2d(dtype=wp.int32)  # [R, 3] node at which two bodies are joined, the bodies; -1: the ground
-    stabilisation: scalar  # rate at which an open loop closes [1/s]
-    softness: scalar  # of the constraints, relative to their mean mobility: which of redundant ones bear the load
-    stages: int  # S of a step; the last is the first of the next
-    tableau: wp.array(dtype=scalar)  # [(S + 1)^2] rows of time, then weights; the last row is the error's
-    # [S, S] what weights of damped accelerations are more than those of others, on the diagonal their own; empty where
-    # all are explicit
-    implicit: wp.array2d(dtype=scalar)
-    # steps at whose begin a held tree moves on from elsewhere, R of them; what memory and rates were before
-    restarts: wp.array(dtype=wp.int32)
-    starts: wp.array2d(dtype=scalar)  # [R 2 J, W] coordinates, then rates
-    kept: wp.array2d(dtype=scalar)  # [R (M + J), W]
-    # bodies
-    reference: int  # [N, 3] nodes
-    middle: int  # [3] the root's centre
-    axis: int  # [J, 3]
-    pivot: int  # [J, 3]
-    start: int  # [C] crease angles in the reference state
-    mass: int  # [B]
-    centre: int  # [B, 3]
-    inertia: int  # [B, 9] about the centre
-    steady: int  # [B, 12] sum of forces on nodes that never change, and of the nodes' places times them
-    # coordinates and rates, now and at the step's begin; their derivatives at the stages; length of the next step
-    y: int  # [7 + J]
-    u: int  # [m]
-    y0: int
-    u0: int
-    dy: int  # [S + 1, 7 + J], the last of probes
-    du: int  # [S + 1, m], the last of probes and of the error
-    # where steps are implicit in damping: its matrix, accelerations by it at the stages, the factor of the mass matrix
-    # at the step's begin, and that of the damped one
-    damping: int  # [m, m]
-    damped: int  # [S, m]
-    factor0: int  # [m, m]
-    stiff: int  # [m, m]
-    span: int
-    # what a step changes besides, to go back to
-    hinges: int  # number of hinge angles
-    memories: int
-    feet_count: int
-    effects: int
-    angles0: int
-    memory0: int
-    feet: int  # [K, 3] contact points now
-    feet0: int  # and at the step's begin
-    power0: int  # [E]
-    spent: int  # [E] mean power of each effect in a step, by the weights of its stages
-    # of one evaluation
-    turned: int  # [B, 9]
-    placed: int  # [B, 3] x = turned reference + placed
-    hinge: int  # [J, 3] axis now
-    joint: int  # [J, 3] pivot now, from O
-    omega: int  # [B, 3]
-    speed: int  # [B, 3] velocity at O
-    alpha: int  # [B, 3] angular acceleration if rates did not change
-    gain: int  # [B, 3] the same of the body's point at O
-    force: int  # [B, 3]
-    moment: int  # [B, 3] about O
-    torque: int  # [J]
-    heavy: int  # [B] composite mass, first moment [B, 3], inertia [B, 9] about O
-    first: int
-    second: int
-    factor: int  # [m, m] mass matrix, then its Cholesky factor
-    jacobian: int  # [R, m] of the constraints
-    solved: int  # [R, m] its product with the inverse factor
-    gram: int  # [R, R]
-    pull: int  # [R] constraint forces
-
-
-PARTS = tuple(
-    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du damping damped factor0 stiff "
-    "span angles0 memory0 feet feet0 power0 spent turned placed hinge joint omega speed alpha gain force moment torque "
-    "heavy first second factor jacobian solved gram pull".split()
+from origami_sim.solve.kernels.loops import constrain
+from origami_sim.solve.kernels.tree import (
+    NATURAL,
+    POSE,
+    Tree,
+    along_root,
+    at,
+    copy,
+    factorise,
+    mat_at,
+    put,
+    put_mat,
+    put_vec,
+    scalar,
+    solve_lower,
+    solve_upper,
+    vec3,
+    vec_at,
 )
-"""Parts of a world's stretch, in order."""
-
-
-@wp.func_native(snippet="return data.data[i];")
-def at(data: wp.array(dtype=scalar), i: int) -> scalar:
-    """A number of the buffer, which is dense: neither stride nor sign of the index are asked for."""
-    ...
-
-
-@wp.func_native(snippet="data.data[i] = x;")
-def put(data: wp.array(dtype=scalar), i: int, x: scalar):
-    """Sets a number of the buffer."""
-    ...
-
-
-@wp.func
-def vec_at(data: wp.array(dtype=scalar), i: int):
-    return vec3(at(data, i), at(data, i + 1), at(data, i + 2))
-
-
-@wp.func
-def put_vec(data: wp.array(dtype=scalar), i: int, v: vec3):
-    put(data, i, v[0])
-    put(data, i + 1, v[1])
-    put(data, i + 2, v[2])
-
-
-@wp.func
-def mat_at(data: wp.array(dtype=scalar), i: int):
-    return wp.matrix_from_rows(vec_at(data, i), vec_at(data, i + 3), vec_at(data, i + 6))
-
-
-@wp.func
-def put_mat(data: wp.array(dtype=scalar), i: int, m: mat33):
-    put_vec(data, i, m[0])
-    put_vec(data, i + 3, m[1])
-    put_vec(data, i + 6, m[2])
-
-
-@wp.func
-def copy(data: wp.array(dtype=scalar), target: int, source: int, count: int):
-    for i in range(count):
-        put(data, target + i, at(data, source + i))
 
 
 @wp.func
@@ -179,15 +41,6 @@ def rotation(axis: vec3, angle: scalar):
     """Rotation by an angle about a unit axis (Rodrigues)."""
     k = wp.skew(axis)
     return wp.identity(n=3, dtype=scalar) + wp.sin(angle) * k + (scalar(1.0) - wp.cos(angle)) * (k * k)
-
-
-@wp.func
-def along_root(tree: Tree, k: int, origin: vec3):
-    """Velocity of the root's centre for a unit rate."""
-    out = tree.axes[tree.roots + k]
-    if tree.follows == 0:
-        out = out + wp.cross(tree.axes[k], origin - tree.axes[2 * tree.roots + k])
-    return out
 
 
 @wp.func
@@ -409,133 +262,6 @@ def accelerate(tree: Tree, stage: int, w: int):
     put_vec(s, dy + 3, scalar(0.5) * (last * omega + wp.cross(omega, q)))
     put(s, dy + 6, scalar(-0.5) * wp.dot(omega, q))
     copy(s, dy + POSE, o + tree.u + roots, tree.bodies - 1)
-
-
-@wp.func
-def factorise(s: wp.array(dtype=scalar), first: int, m: int, least: scalar):
-    """Cholesky factor of a symmetric matrix [m, m] of which the lower triangle is given, in its place."""
-    for i in range(m):
-        for j in range(i + 1):
-            x = at(s, first + i * m + j)
-            for k in range(j):
-                x = x - at(s, first + i * m + k) * at(s, first + j * m + k)
-            if i == j:
-                put(s, first + i * m + i, wp.sqrt(wp.max(x, least)))
-            else:
-                put(s, first + i * m + j, x / at(s, first + j * m + j))
-
-
-@wp.func
-def solve_lower(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
-    """Solves with a Cholesky factor [m, m], in place."""
-    for i in range(m):
-        x = at(s, target + i)
-        for k in range(i):
-            x = x - at(s, factor + i * m + k) * at(s, target + k)
-        put(s, target + i, x / at(s, factor + i * m + i))
-
-
-@wp.func
-def solve_upper(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
-    """Solves with a transposed Cholesky factor [m, m], in place."""
-    for back in range(m):
-        i = m - 1 - back
-        x = at(s, target + i)
-        for k in range(i + 1, m):
-            x = x - at(s, factor + k * m + i) * at(s, target + k)
-        put(s, target + i, x / at(s, factor + i * m + i))
-
-
-@wp.func
-def multiply(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
-    """Multiplies with the matrix [m, m] of a Cholesky factor, in place."""
-    for i in range(m):
-        x = scalar(0.0)
-        for k in range(i, m):
-            x = x + at(s, factor + k * m + i) * at(s, target + k)
-        put(s, target + i, x)
-    for back in range(m):
-        i = m - 1 - back
-        x = scalar(0.0)
-        for k in range(i + 1):
-            x = x + at(s, factor + i * m + k) * at(s, target + k)
-        put(s, target + i, x)
-
-
-@wp.func
-def constrain(tree: Tree, stage: int, w: int):
-    """Adds the forces that keep loops closed to the half-solved accelerations of the open tree.
-
-    With M = L L^T, S = J L^-T: (S S^T + soft) pull = -(bias + 2 c rate + c^2 gap + S z), z += S^T pull (Baumgarte).
-    """
-    s = tree.data
-    o = w * tree.width
-    m = tree.rates
-    du = o + tree.du + stage * m
-    origin = vec_at(s, o + tree.y)
-    total = scalar(0.0)
-    for i in range(tree.rows):
-        row = o + tree.jacobian + i * m
-        solved = o + tree.solved + i * m
-        for k in range(m):
-            put(s, row + k, scalar(0.0))
-        axis = tree.axes[3 * tree.roots + i]
-        reference = vec_at(s, o + tree.reference + 3 * tree.joined[i, 0])
-        gap = scalar(0.0)
-        bias = scalar(0.0)
-        here = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-        for side in range(2):
-            b = int(tree.joined[i, 1 + side])
-            sign = scalar(1.0)
-            if side == 1:
-                sign = scalar(-1.0)
-            x = reference
-            if b >= 0:
-                x = mat_at(s, o + tree.turned + 9 * b) * reference + vec_at(s, o + tree.placed + 3 * b)
-            if side == 0:
-                here = x - origin
-            gap += sign * wp.dot(axis, x)
-            if b >= 0:
-                omega = vec_at(s, o + tree.omega + 3 * b)
-                a = vec_at(s, o + tree.gain + 3 * b) + wp.cross(vec_at(s, o + tree.alpha + 3 * b), here)
-                bias += sign * wp.dot(axis, a + wp.cross(omega, wp.cross(omega, here)))
-                for k in range(tree.roots):
-                    by = along_root(tree, k, origin) + wp.cross(tree.axes[k], here)
-                    put(s, row + k, at(s, row + k) + sign * wp.dot(axis, by))
-            while b > 0:
-                arm = here - vec_at(s, o + tree.joint + 3 * (b - 1))
-                entry = row + tree.roots + b - 1
-                along = wp.dot(axis, wp.cross(vec_at(s, o + tree.hinge + 3 * (b - 1)), arm))
-                put(s, entry, at(s, entry) + sign * along)
-                b = tree.parent[b]
-        rate = scalar(0.0)
-        for k in range(m):
-            rate += at(s, row + k) * at(s, o + tree.u + k)
-        copy(s, solved, row, m)
-        solve_lower(s, o + tree.factor, solved, m)
-        c = tree.stabilisation
-        right = -(bias + scalar(2.0) * c * rate + c * c * gap)
-        for k in range(m):
-            right -= at(s, solved + k) * at(s, du + k)
-        put(s, o + tree.pull + i, right)
-        for j in range(i + 1):
-            product = scalar(0.0)
-            for k in range(m):
-                product += at(s, solved + k) * at(s, o + tree.solved + j * m + k)
-            put(s, o + tree.gram + i * tree.rows + j, product)
-            if i == j:
-                total += product
-    soft = tree.softness * total / scalar(tree.rows)
-    for i in range(tree.rows):
-        k = o + tree.gram + i * tree.rows + i
-        put(s, k, at(s, k) + soft)
-    factorise(s, o + tree.gram, tree.rows, soft)
-    solve_lower(s, o + tree.gram, o + tree.pull, tree.rows)
-    solve_upper(s, o + tree.gram, o + tree.pull, tree.rows)
-    for i in range(tree.rows):
-        for k in range(m):
-            z = at(s, o + tree.solved + i * m + k) * at(s, o + tree.pull + i)
-            put(s, du + k, at(s, du + k) + z)
 
 
 @wp.func

@@ -8,7 +8,7 @@ that it changed.
 import warp as wp
 
 from origami_sim import _warp  # noqa: F401  settings
-from origami_sim.solve.kernels.articulated import (
+from origami_sim.solve.kernels.tree import (
     NATURAL,
     POSE,
     Tree,

@@ -11,7 +11,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import centred, eccentric
 from origami_sim.solve.batch import _FIRST, Batch
-from origami_sim.solve.kernels import articulated
+from origami_sim.solve.kernels.tree import PARTS, POSE, Tree
 from origami_sim.solve.rigid.tableaus import EXPLICIT, additive
 from origami_sim.solve.rigid.topology import Topology, check_inertia
 
@@ -73,10 +73,10 @@ class RigidBatch(Batch):
         """The tree on the device, its bodies shaped and placed as in a state."""
         t, model, w, x = self.tree_of, self.model, self.worlds, state.x
         joints, rates = len(t.joints), len(t.joints) + len(t.turns)
-        tree = articulated.Tree()
+        tree = Tree()
         tree.bodies, tree.roots, tree.rates, tree.rows = len(t.parent), len(t.turns), rates, len(t.row_node)
         held = not len(t.turns)
-        tree.first_body, tree.first_number = int(held), int(articulated.POSE) if held else 0
+        tree.first_body, tree.first_number = int(held), int(POSE) if held else 0
         tree.hinges, tree.memories = len(state.angles), len(state.memory)
         tree.feet_count, tree.effects = len(model.contacts), len(self.program.effects)
         tree.follows, tree.stabilisation, tree.softness = int(t.follows), STABILISATION, SOFTNESS
@@ -141,10 +141,11 @@ class RigidBatch(Batch):
                 "torque": joints,
             },
             **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
-            **{"heavy": tree.bodies, "factor": rates**2, "gram": tree.rows**2, "pull": tree.rows},
+            **{"heavy": tree.bodies, "factor": rates**2, "gram": min(tree.rows, rates) ** 2},
+            **{"pull": tree.rows, "found": rates},
         }
         columns, place = [], 0
-        for name in articulated.PARTS:
+        for name in PARTS:
             setattr(tree, name, place)
             a = np.zeros((sizes[name], w)) if name in sizes else given[name]
             part = np.moveaxis(a, 1, 0).reshape(w, -1)

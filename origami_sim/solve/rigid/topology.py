@@ -16,7 +16,7 @@ class Topology:
         joints: (crease, sign of its angle) of each joint.
         turns, shifts, pivots: [d, 3] of the rates of the root. follows: whether it turns about its own centre.
         floating: whether nothing holds it; shifts of what is held are in metres.
-        root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `articulated.Tree`.
+        root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `kernels.tree.Tree`.
     """
 
     def __init__(self, model: Model):

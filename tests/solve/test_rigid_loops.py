@@ -1,0 +1,20 @@
+"""Rigid panels in sheets of many closed loops."""
+
+import numpy as np
+import pytest
+
+from origami_sim import Sheet, miura, simulate
+
+
+@pytest.mark.parametrize(("cells", "duration"), [(2, 0.3), (6, 0.02)])
+def test_many_loops_keep_their_energy_and_fold_as_one(cells, duration):
+    """Sheets of 16 and of 144 panels, with far more constraints than rates, keep the one motion of their cells."""
+    sheet = Sheet(miura(cells, cells, 0.03, 0.03, 1.0, fold_angle=0.8), thickness=5e-4, panels="rigid")
+    model, parameters = sheet.crease(stiffness=1e-3).build()
+    parameters.set("crease", "rest_angle", 1.2 * parameters["crease", "rest_angle"])
+    run = simulate(model, parameters, duration=duration, rate=100.0)
+    half = np.abs(np.tan(0.5 * run.creases[:, :, 0]))
+    ratio = half.min(axis=1) / half.max(axis=1)
+    assert not run.failures and np.ptp(half[:, 0]) > 0.05
+    assert ratio == pytest.approx(ratio[0], rel=1e-9)
+    assert np.ptp(run.energy_balance()) < 1e-5 * run.energies["kinetic"].max()
