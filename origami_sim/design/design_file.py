@@ -101,13 +101,24 @@ def read_design(path: str | Path) -> Design:
         run = as_table(data.get("run", {}), "run", path)
         for key in run:
             check_known(key, ("duration", "rate"), "run", path)
+        lasts = float(converted(run.get("duration", 0.0), "s", "run.duration"))
+        rate = float(converted(run.get("rate", 60.0), "Hz", "run.rate"))
+        _check_run(lasts, rate)
         return Design(
             source,
             read_drive(as_table(data.get("drive", {}), "drive", path), path),
-            float(converted(run.get("duration", 0.0), "s", "run.duration")),
-            float(converted(run.get("rate", 60.0), "Hz", "run.rate")),
+            lasts,
+            rate,
             str(data.get("about", "")),
         )
+
+
+def _check_run(duration: float, rate: float) -> None:
+    """Refuses a duration [s] that is negative, and frames per second that are not positive."""
+    if not 0 <= duration < np.inf:
+        raise InputError("a run lasts no such time", field="run.duration", value=duration, allowed=">= 0 s")
+    if not 0 < rate < np.inf:
+        raise InputError("a run needs frames", field="run.rate", value=rate, allowed="> 0 frames per second")
 
 
 def write_design(
@@ -128,8 +139,9 @@ def write_design(
         The file.
 
     Raises:
-        InputError: a drive or parameters whose worlds differ.
+        InputError: a drive or parameters whose worlds differ, a negative duration, a rate that is not positive.
     """
+    _check_run(duration, rate)
     lines = [f"about = {_toml(about)}"] if about else []
     if isinstance(source, Sheet):
         given = {n: v for n, v in source.made.items() if v is not None}

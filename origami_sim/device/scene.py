@@ -21,6 +21,7 @@ from origami_sim.model.bodies import rigid
 from origami_sim.quantities import parsed
 from origami_sim.solve.motion.accuracy import check_accuracy
 from origami_sim.solve.motion.dynamics import Trajectory, simulate
+from origami_sim.solve.motion.frames import check_frames, check_memory
 from origami_sim.solve.motion.quasistatic import quasistatic
 from origami_sim.solve.statics.equilibria import equilibrium
 
@@ -386,7 +387,8 @@ def motion_of(
     A quasi-static motion that is held on after the scene's `duration` [s] has frames at even ratios of time from there.
 
     Raises:
-        InputError: what `simulate` and `quasistatic` refuse; a step or an accuracy given for a quasi-static motion.
+        InputError: what `simulate` and `quasistatic` refuse, frames that are not positive or find no memory; a step or
+            an accuracy given for a quasi-static motion.
     """
     if s.motion != "quasistatic":
         return simulate(
@@ -407,6 +409,8 @@ def motion_of(
             value="quasistatic",
             allowed="dynamic",
         )
+    check_frames(duration, rate, s.file)
+    check_memory(model, max(parameters.worlds, drive.worlds), duration, rate)
     end = s.until or duration
     times = np.arange(round(duration * rate) + 1) / rate
     if end < times[-1]:

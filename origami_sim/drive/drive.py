@@ -28,6 +28,9 @@ the numbers of the sources, `source_0_strength`, `source_0_x`, ...
 
 The origin is the age [s] of the device at the start: laws of time count from it.
 """
+FOREVER = 1e9
+"""Instant to which the end of a ramp is held [s], as if for ever: thirty years."""
+
 UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1", "origin": "s"}
 """SI unit of each family of channels, which is what stands before the first underscore."""
 
@@ -159,11 +162,12 @@ def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
 def ramp(final, duration: float | str, *, start=0.0) -> Signal:
     """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s")."""
     final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
-    if not duration > 0:
-        raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed="> 0 s")
+    if not 0 < duration < FOREVER:
+        allowed = f"above 0, below {FOREVER:g} s"
+        raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed=allowed)
     return Signal(
         offset=start,
-        times=np.array([0.0, duration, 1e9]),
+        times=np.array([0.0, duration, FOREVER]),
         values=np.array([0.0, 1.0, 1.0]),
         scale=np.subtract(final, start),
     )

@@ -48,6 +48,14 @@ class Way:
     dt: float | None = None
     threads: int | None = None
 
+    def __post_init__(self):
+        if not 0 < self.rate < np.inf:
+            raise InputError("a motion needs frames", field="rate", value=self.rate, allowed="> 0 frames per second")
+        if self.duration is not None and not 0 < self.duration < np.inf:
+            raise InputError(
+                "a motion lasts no such time", field="duration", value=self.duration, allowed="> 0 s, or None"
+            )
+
 
 @dataclass
 class Found:

@@ -54,15 +54,19 @@ def moving_picture(
         how: passed to `Artist`: width, height [px], colour ("kind" or "strain"), labels.
 
     Raises:
-        InputError: an unknown suffix, a length that is not positive, MP4 without PyAV.
+        InputError: an unknown suffix, a length or a rate that is not positive, MP4 without PyAV.
     """
     if suffix not in RATE:
         raise InputError("no such moving picture", field="suffix", value=suffix, allowed=", ".join(RATE))
     if seconds is not None and not 0 < seconds <= 600:
         raise InputError("no such length", field="seconds", value=seconds, allowed="above 0, up to 600 s")
+    rate = RATE[suffix] if rate is None else rate
+    if not 0 < rate <= 1000:
+        raise InputError(
+            "no such number of pictures", field="rate", value=rate, allowed="above 0, up to 1000 per second"
+        )
     if suffix == ".mp4":
         _pyav()
-    rate = rate or RATE[suffix]
     artist = Artist(film, **how)
     chosen, each = frames_of(film, seconds, rate)
     pictures, last = [], {}

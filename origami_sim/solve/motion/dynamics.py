@@ -17,6 +17,7 @@ from origami_sim.model.distort import distorted
 from origami_sim.quantities import converted
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.motion.accuracy import check_accuracy, energy_error, refined, warning
+from origami_sim.solve.motion.frames import check_frames, check_memory
 from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
 from origami_sim.solve.oversights import (
     below_the_ground,
@@ -208,9 +209,9 @@ def simulate(
         progress: called with the fraction done.
 
     Raises:
-        InputError: duration or rate not positive, no such method, a step above the limit, a drive that ends early,
-            worlds that differ, no such accuracy, a start inside the ground; implicit: another device, spectral radius
-            or tolerance out of bounds.
+        InputError: duration or rate not positive, more frames than there is memory for, no such method, a step above
+            the limit, a drive that ends early, worlds that differ, no such accuracy, a start inside the ground;
+            implicit: another device, spectral radius or tolerance out of bounds.
     """
     dt = converted(dt, "s", "dt")
     options: dict[str, Any] = {
@@ -292,9 +293,7 @@ def _simulated(
     progress: Callable[[float], None] | None,
 ) -> Trajectory:
     """One run, with the error of its energy balance."""
-    for name, value in (("duration", duration), ("rate", rate)):
-        if not (value > 0 and np.isfinite(value)):
-            raise InputError("a run needs a positive number", field=name, value=value, allowed="> 0")
+    check_frames(duration, rate)
     chosen = stable_step(model, parameters)
     if method not in ("explicit", "implicit"):
         raise InputError("no such method", field="method", value=method, allowed="explicit, implicit")
@@ -322,6 +321,7 @@ def _simulated(
     if state is None:
         worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
+    check_memory(model, state.worlds, duration, rate)
     first = max(state.step, 0)
     drive_end = (first * step if state.step > 0 else 0.0) + frames * frame_time
     drive.require(drive_end)
