@@ -274,6 +274,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(args) -> int:
+    from origami_sim.commands import again
     from origami_sim.device.device import device_module
     from origami_sim.device.scene import scene_settings
     from origami_sim.results.rescue import not_over_a_sound_run
@@ -290,7 +291,9 @@ def _run(args) -> int:
         raise InputError("only a pattern leaves this open", field="--touch", value=args.touch, allowed=states)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
     settings = settings.with_panels(args.panels or settings.panels)
-    settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, args.until)
+    settings = settings.with_motion(
+        "quasistatic" if args.quasistatic else settings.motion, args.until or settings.until
+    )
     if args.accuracy is not None:
         settings = settings.with_accuracy(args.accuracy)
     if args.settings:
@@ -308,7 +311,9 @@ def _run(args) -> int:
     check_writable(folder)
     outcome = module.run(settings, progress=Bar(name))
     folder = not_over_a_sound_run(folder, outcome.trajectory)
-    kept = _save(folder, name, outcome, settings.as_dict(), args.set)
+    design, why = again.design_of(module, settings, outcome)
+    kept = _save(folder, name, outcome, settings.as_dict(), args.set, again.origin(args, module, settings, why))
+    again.keep(kept, design)
     if hasattr(module, "draw") and kept == folder:
         module.draw(settings, outcome, folder)
     _tell(args, outcome, kept)
@@ -454,7 +459,9 @@ def _demo(args) -> int:
 # parts ---------------------------------------------------------------------------------------------------------------
 
 
-def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str]) -> Path | None:
+def _save(
+    folder: Path, scene: str, outcome: "Outcome", settings: dict, overrides: list[str], device: dict
+) -> Path | None:
     """Saves a run and returns where: elsewhere, or nowhere, if the disk is full."""
     from origami_sim.results.rescue import save_somewhere
 
@@ -465,7 +472,7 @@ def _save(folder: Path, scene: str, outcome: "Outcome", settings: dict, override
         scene=scene,
         tables=outcome.tables,
         units=outcome.units or _units(outcome.tables),
-        settings={**settings, "overrides": dict(o.split("=", 1) for o in overrides)},
+        settings={**settings, "overrides": dict(o.split("=", 1) for o in overrides), "device": device},
     )
 
 

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         settings = scene_settings(module)
         say(f"== {name}", flush=True)
         outcome = module.run(settings, progress=Bar(name))
-        _save(out / name, name, outcome, settings.as_dict(), [])
+        _save(out / name, name, outcome, settings.as_dict(), [], {})
         if not args.json:
             _tell(args, outcome, out / name)
         sections.append(Section.of(name, module, outcome, out / name))

@@ -58,6 +58,7 @@ class Design:
     Attributes:
         source: the sheet, or model and parameters.
         duration, rate: of its motion [s], [1/s]; duration 0: as long as the drive takes. about: free text.
+        motion: "dynamic" or "quasistatic", the latter held on `until` [s]. accuracy: of a dynamic one, see `simulate`.
     """
 
     source: Sheet | tuple[Model, Parameters]
@@ -65,6 +66,9 @@ class Design:
     duration: float = 0.0
     rate: float = 60.0
     about: str = ""
+    motion: str | None = None
+    until: float | None = None
+    accuracy: float | None = None
 
     @property
     def sheet(self) -> Sheet:
@@ -100,7 +104,7 @@ def read_design(path: str | Path) -> Design:
         source = read_model(data, path) if "model" in data else _sheet(data, path)
         run = as_table(data.get("run", {}), "run", path)
         for key in run:
-            check_known(key, ("duration", "rate"), "run", path)
+            check_known(key, ("duration", "rate", "motion", "until", "accuracy"), "run", path)
         lasts = float(converted(run.get("duration", 0.0), "s", "run.duration"))
         rate = float(converted(run.get("rate", 60.0), "Hz", "run.rate"))
         _check_run(lasts, rate)
@@ -110,6 +114,9 @@ def read_design(path: str | Path) -> Design:
             lasts,
             rate,
             str(data.get("about", "")),
+            run.get("motion"),
+            run.get("until") and float(converted(run["until"], "s", "run.until")),
+            run.get("accuracy") and float(converted(run["accuracy"], "1", "run.accuracy")),
         )
 
 
@@ -129,6 +136,9 @@ def write_design(
     duration: float = 0.0,
     rate: float = 60.0,
     about: str = "",
+    motion: str | None = None,
+    until: float | None = None,
+    accuracy: float | None = None,
 ) -> Path:
     """Writes a sheet as it was stated, or a model, and its drive, as a file that `read_design` and commands read.
 
@@ -148,7 +158,9 @@ def write_design(
         lines += [f"sheet = {_toml(given)}", "statements = ["]
         lines += [f"  {_toml({name: arguments})}," for name, arguments in source.statements]
         lines += ["]"]
-    lines += ["", "[run]", f"duration = {_toml(duration)}", f"rate = {_toml(rate)}", "", "[drive]"]
+    lines += ["", "[run]", f"duration = {_toml(duration)}", f"rate = {_toml(rate)}"]
+    how = {"motion": motion, "until": until, "accuracy": accuracy}
+    lines += [*(f"{n} = {_toml(v)}" for n, v in how.items() if v is not None), "", "[drive]"]
     drive = drive or Drive()
     signals = {n: s for n, s in drive.signals.items() if not n.startswith("source_")}
     if drive.placed:

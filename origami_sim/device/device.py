@@ -14,6 +14,7 @@ Nothing is executed but a file or module that the user names: a sidecar only say
 import importlib
 import importlib.util
 import inspect
+import json
 import os
 import re
 import sys
@@ -61,6 +62,9 @@ PAST = 1.0
 Half notes what is pressed flat by strong magnets, double lets a panel of 3 cm pass by half a millimetre more.
 """
 
+KEPT = "device.toml"
+"""Design file in a run folder, of the device as it was run."""
+
 _LAST = 1e8
 """Instants beyond it [s] stand for ever, as the end of a `ramp` does."""
 
@@ -74,7 +78,7 @@ def device_module(given: str) -> ModuleType:
 
     Args:
         given: a scene's name; a Python file, "my_flap.py", or one of its functions, "my_flap.py:half_open"; a module
-            that can be imported, "package.module:function"; a design file, "my_flap.toml".
+            that can be imported, "package.module:function"; a design file, "my_flap.toml"; the folder of a run.
 
     Raises:
         InputError: there is none, it cannot be loaded, or it has no `build`.
@@ -83,6 +87,8 @@ def device_module(given: str) -> ModuleType:
         return scene_module(given)
     place, _, function = given.rpartition(":") if re.search(r":\w+$", given) else (given, "", "")
     path = Path(place)
+    if path.is_dir() and not function:
+        return _run_again(path)
     if path.suffix == ".toml" and not function:
         return _module(path.stem, path, _designed(read_design(path)), {})
     if path.suffix == ".py":
@@ -114,7 +120,29 @@ def is_device(given: str) -> bool:
     """Whether a name is of a device file, a module's function or a design, not of a scene or a calibration of one."""
     if given.endswith(".toml"):
         return is_design(Path(given))
+    if given not in NAMES and Path(given).is_dir():
+        return True
     return bool(re.search(r"\.py$|:\w+$", given))
+
+
+def _run_again(folder: Path) -> ModuleType:
+    """The device of a run, as its folder keeps it.
+
+    Raises:
+        InputError: it keeps none; with what makes the run again, if its manifest says so.
+    """
+    file = folder / KEPT
+    if file.is_file():
+        return _module(folder.absolute().name, file, _designed(read_design(file)), {})
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        how, sets = manifest["device"], "".join(f" --set {n}={v}" for n, v in manifest["overrides"].items())
+        asked = [f"--{n} {how[n]}" for n in ("panels", "until", "accuracy", "calibration") if how[n] is not None]
+        asked += ["--quasistatic"] * (how["motion"] == "quasistatic")
+        made, why = " ".join([f"origami-sim run {how['given']}{sets}", *asked]), how["why"] or "it lost its device"
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        made, why = "the file of the device, or its name", f"there is no {KEPT} in it"
+    raise InputError(f"the folder does not make its run again ({why})", file=folder, allowed=made)
 
 
 def _executed(path: Path) -> ModuleType:
@@ -174,6 +202,8 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
 
     else:
         out.SETTINGS, defaults = _settings(build, path, own)
+        if stated := getattr(build, "stated", None):
+            out.SETTINGS = out.SETTINGS.with_motion(stated.motion, stated.until).with_accuracy(stated.accuracy)
 
         def raw(s: Settings, **options):
             given = {n: _as(s[n].value, d, n, path) for n, d in defaults.items()}
@@ -206,7 +236,7 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
         return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state), s
 
     out.raw, out.build = raw, extended(whole)
-    out.run = own.get("run", run)
+    out.run, out.own_run = own.get("run", run), "run" in own
     out.replicate = own.get("replicate", replicate)
     for optional in ("draw", "walk", "SERIES"):
         if optional in own:
@@ -291,6 +321,7 @@ def _designed(design: Design) -> Callable:
         return (source, design.drive) if isinstance(source, Sheet) else (*source, design.drive)
 
     build.__doc__ = design.about or None
+    build.stated = design  # type: ignore[attr-defined]
     return build
 
 

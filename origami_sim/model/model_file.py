@@ -116,8 +116,20 @@ def read_model(data: Mapping[str, Any], path: Path) -> tuple[Model, Parameters]:
                     "has another number of rows", file=path, field=f"parameters.{owner}.{name}", value=new.shape[0],
                     allowed=shape[0],
                 )  # fmt: skip
-            parameters.set(owner, name, new if new.ndim < 2 else new[:, None])
+            if owner == "inertia" and len(model.carriers):
+                parameters.replace(owner, name, _carried(model, new, path)[:, None])
+            else:
+                parameters.set(owner, name, new if new.ndim < 2 else new[:, None])
     return model, parameters
+
+
+def _carried(model: Model, mass: np.ndarray, path: Path) -> np.ndarray:
+    """Masses (N,) [kg] of a model of rigid panels, whose corners have none: points that go with each panel have."""
+    out = np.broadcast_to(mass, len(model.position))
+    if np.any(out < 0) or np.any(out[len(out) - len(model.carriers) :] <= 0) or not np.all(np.isfinite(out)):
+        allowed = "> 0 kg at the points of its bodies, >= 0 at corners"
+        raise InputError("rigid panels need mass", file=path, field="parameters.inertia.mass", allowed=allowed)
+    return out
 
 
 def _table(value: Any, key: str, path: Path) -> Mapping[str, Any]:

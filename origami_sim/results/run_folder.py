@@ -2,6 +2,7 @@
 
     manifest.json   what was run: versions, seed, scene, hashes, overrides, time step and why, wall time, failures
     states.npz      every frame, and the model, parameters and drive from which the run can be repeated or continued
+    device.toml     of runs of the command line, the device with their settings, where a design file holds it
     tables/*.parquet  one file per table; the unit of a column is its field metadata "unit"
     replay.rrd      for the viewer
 
@@ -122,7 +123,7 @@ def save_run(
         path: the folder; its parents are made. scene: name of what was simulated.
         tables: name -> column -> values, all columns of a table equally long.
         units: column -> unit, for all tables; absent or "" for plain numbers and words.
-        settings: JSON values to be kept in the manifest; "seed" and "overrides" (a mapping) get keys of their own.
+        settings: JSON values for the manifest; "seed", "overrides" (a mapping) and "device" get keys of their own.
         replay: whether to write the replay too, or options for it (world, magnets, arms, tip, recording, title).
 
     Raises:
@@ -250,6 +251,7 @@ def _manifest(trajectory: Trajectory, scene: str, settings: dict[str, Any]) -> d
         "versions": {"python": platform.python_version(), **{p: _version(p) for p in _PACKAGES}},
         "seed": seed,
         "overrides": dict(overrides),
+        **({"device": settings.pop("device")} if "device" in settings else {}),
         "settings": settings,
         "model_hash": _with_plain_names(t.model).hash,
         "parameters_hash": t.parameters.hash,
@@ -345,12 +347,8 @@ def _equal_columns(name: str, columns: Mapping[str, Sequence | np.ndarray]) -> d
         if values.dtype == object:
             values = np.array([str(v) for v in given])
         if values.ndim != 1:
-            raise InputError(
-                f"a column of table '{name}' has one axis",
-                field=column,
-                value=values.shape,
-                allowed="one value per row",
-            )
+            rows = "one value per row"
+            raise InputError(f"a column of table '{name}' has one axis", field=column, value=values.shape, allowed=rows)
         out[column] = values
     lengths = {c: len(v) for c, v in out.items()}
     if len(set(lengths.values())) > 1:

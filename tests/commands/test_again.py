@@ -1,0 +1,72 @@
+"""A run folder makes its run again, whatever became of the file of the device, or says what does."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from origami_sim.commands import cli
+from origami_sim.results.run_folder import load_run
+
+FLAP = """
+from origami_sim import Drive, Sheet, ramp, strip
+DURATION = 0.2
+def build(gap="2 mm", field="20 mT"):
+    sheet = Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm", material="pdms", triangulation="center")
+    sheet.patch(1, thickness="3 mm", poling=(1, 0, 0))
+    sheet.crease(stiffness="2 mN m/rad", loss_time="3 ms").gravity().fix(panels=[0])
+    return sheet, Drive(field=(0, 0, ramp(field, 0.1)))
+"""
+
+
+@pytest.fixture
+def call(capfd, tmp_path, monkeypatch):
+    """Runs a command line in a folder with the file of a flap: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flap.py").write_text(FLAP)
+
+    def run(*arguments) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as e:
+            cli.main([str(a) for a in arguments])
+        return e.value.code, *capfd.readouterr()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "how", [(), ("--panels", "rigid"), ("--accuracy", "1e-2"), ("--quasistatic", "--until", "5")], ids=str
+)
+def test_a_run_is_made_again_from_its_folder_without_the_file_of_its_device(call, tmp_path, how):
+    assert call("run", "flap.py", "--set", "field=30mT", "--set", "duration=0.15", *how, "--out", "runs/first")[0] == 0
+    shutil.copytree("runs/first", "runs/second")
+    (tmp_path / "flap.py").unlink()
+    assert call("run", "runs/second")[0] == 0
+    first, second = load_run("runs/first"), load_run("runs/second")
+    assert np.array_equal(first.trajectory.times, second.trajectory.times)
+    assert np.array_equal(first.trajectory.x, second.trajectory.x)
+    assert first.manifest["parameters_hash"] == second.manifest["parameters_hash"]
+    assert first.manifest["device"]["given"] == "flap.py" and len(first.manifest["device"]["sha256"]) == 64
+    assert call("show", "runs/first")[0] == 0  # as any device
+
+
+@pytest.mark.parametrize("own", ["run", "scene"])
+def test_what_no_folder_holds_says_which_command_makes_it_again(call, tmp_path, own):
+    if own == "run":
+        with open("flap.py", "a") as f:
+            f.write("def run(s, progress=None):\n"
+                    "    from origami_sim import simulate\n    from origami_sim.device.scene import Outcome\n"
+                    "    return Outcome(simulate(*build()[0].build(), duration=0.1), {})\n")  # fmt: skip
+    given, sets = ("flap.py", "field=30mT") if own == "run" else ("crease_coupon", "rest_angle=0.3")
+    assert call("run", given, "--set", sets, "--out", "here")[0] == 0
+    assert json.loads((tmp_path / "here" / "manifest.json").read_text())["device"]["why"]
+    code, out, err = call("run", "here")
+    assert (code, out) == (2, "")
+    assert f"origami-sim run {given} --set {sets}" in err and "does not make its run again" in err
+
+
+def test_an_earlier_device_does_not_stay_in_a_folder(call):
+    assert call("run", "flap.py", "--out", "here")[0] == 0
+    assert call("run", "crease_coupon", "--out", "here")[0] == 0
+    assert call("run", "here")[0] == 2
