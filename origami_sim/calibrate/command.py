@@ -29,6 +29,10 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 PROGRAM = "origami-sim calibrate"
 
 
+OF_A_CREASE = ("crease", "bridge", "ring-down")
+"""What writes the law of a crease."""
+
+
 @dataclass(frozen=True)
 class Done:
     """A finished calibration: its content, and the fit for the plot (None where nothing was fitted to a curve)."""
@@ -50,7 +54,8 @@ def register(parser: argparse.ArgumentParser) -> None:
     commands = parser.add_subparsers(dest="calibration", required=True, metavar="HOW", parser_class=type(parser))
 
     def command(name: str, summary: str) -> argparse.ArgumentParser:
-        p = commands.add_parser(name, help=summary, description=summary + ".")
+        use = " A device takes the file by Sheet.crease_law(FILE)." if name in OF_A_CREASE else ""
+        p = commands.add_parser(name, help=summary, description=f"{summary}.{use}")
         p.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print one JSON object")
         if name != "again":
             p.add_argument("--out", metavar="TOML", help="calibration file to write")
@@ -294,6 +299,9 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"values": values, "warnings": done.calibration.warnings}))
     else:
         print(experiment.summary(done.calibration))
+        if args.out and args.calibration in OF_A_CREASE:
+            print(f"{args.out} is the law of a crease: sheet.crease_law({args.out!r}) in a device; --calibration "
+                  "of a scene takes the settings that it has")  # fmt: skip
     return 0
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from origami_sim.design.design_file import read_design, write_design
 from origami_sim.device.device import KEPT, source_of
-from origami_sim.device.scene import NAMES, Outcome, Settings
+from origami_sim.device.scene import CALIBRATED, NAMES, Outcome, Settings, own_settings, read_calibration, taken
 from origami_sim.errors import InputError
 from origami_sim.model import State
 from origami_sim.solve.motion.quasistatic import QuasiStatic
@@ -33,6 +33,15 @@ def origin(args: Namespace, module: ModuleType, settings: Settings, why: str) ->
         **{n: getattr(settings, n) for n in ("panels", "motion", "until", "accuracy")},
         "why": why,
     }
+
+
+def partly(module: ModuleType, calibration: str) -> str:
+    """What was taken from a file of `origami-sim calibrate` that holds other things as well; "" of other files."""
+    own, given = own_settings(module), read_calibration(calibration)
+    if CALIBRATED not in given or CALIBRATED in own:
+        return ""
+    names, rest = taken(own, given)
+    return f"note: {', '.join(names)} are those of {calibration}" + f", not its {', '.join(rest)}." * bool(rest)
 
 
 def design_of(module: ModuleType, settings: Settings, outcome: Outcome) -> tuple[str, str]:

@@ -290,6 +290,8 @@ def _run(args) -> int:
         states = "Sheet.touch() in the device, touch in its design file, --set touch=on for scenes that have it"
         raise InputError("only a pattern leaves this open", field="--touch", value=args.touch, allowed=states)
     settings = scene_settings(module, args.calibration).override(args.set, "--set")
+    if args.calibration and not args.json and (said := again.partly(module, args.calibration)):
+        print(said)
     settings = settings.with_panels(args.panels or settings.panels)
     settings = settings.with_motion(
         "quasistatic" if args.quasistatic else settings.motion, args.until or settings.until

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from origami_sim.design.calibrated import Calibrated
 from origami_sim.design.dielectric import Electrodes
 from origami_sim.design.ground import Contact, Ground, Grounds
 from origami_sim.design.masses import LEVEL, Stated, positive
@@ -22,7 +23,7 @@ from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagneti
 from origami_sim.quantities import converted
 
 
-class Sheet(Grounds, Electrodes, Thick):
+class Sheet(Grounds, Electrodes, Thick, Calibrated):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:

@@ -18,7 +18,7 @@ from origami_sim.errors import InputError, nearest
 from origami_sim.files import read_toml
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import rigid
-from origami_sim.quantities import parsed
+from origami_sim.quantities import ANY, parsed
 from origami_sim.solve.motion.accuracy import check_accuracy
 from origami_sim.solve.motion.dynamics import Trajectory, simulate
 from origami_sim.solve.motion.frames import check_frames, check_memory
@@ -208,6 +208,8 @@ def read_calibration(source: str | Path) -> Settings:
 def scene_settings(module: ModuleType, calibration: str | Path | None = None) -> Settings:
     """The settings of a scene: its own calibration, or a file that gives all of the same settings in the same units.
 
+    What `origami-sim calibrate` wrote takes the place of those settings that it has; see `taken`.
+
     A scene may have a series of like parts (`SERIES`, the settings of one); a calibration may then state further ones
     (`mass_3` and all others of part 3).
 
@@ -218,6 +220,9 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
     if calibration is None:
         return own
     given = read_calibration(calibration)
+    if CALIBRATED in given and CALIBRATED not in own:
+        names, _ = taken(own, given)
+        return Settings([replace(given[n], range=own[n].range) if n in names else own[n] for n in own], given.file)
     series = _series(module, given)
     own = Settings([*own.values(), *(replace(own[f"{n}_1"], name=f"{n}_{k}") for n, k in series)], own.file)
     for name in own:
@@ -241,6 +246,28 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
         if name not in own:
             raise InputError("this scene has no such setting", file=given.file, field=name, allowed=", ".join(own))
     return given
+
+
+def taken(own: Settings, given: Settings) -> tuple[list[str], list[str]]:
+    """Which settings of a scene a file of `origami-sim calibrate` gives, and what else it holds.
+
+    Raises:
+        InputError: none, or one in another unit.
+    """
+    names = [n for n in own if n in given]
+    if not names:
+        raise InputError(
+            "nothing that was calibrated is a setting of this scene",
+            file=given.file,
+            field=", ".join(n for n in [*given][:4]),
+            allowed=f"{', '.join(own)}; Sheet.crease_law(FILE) in a device of yours",
+        )
+    for n in names:
+        if given[n].unit != own[n].unit and own[n].unit != ANY:
+            allowed = own[n].unit
+            raise InputError("wrong unit", file=given.file, field=f"{n}.unit", value=given[n].unit, allowed=allowed)
+    tables = {re.sub(r"_\d\d$", "", n): None for n in given if n not in own and n != CALIBRATED}
+    return names, list(tables)
 
 
 def own_settings(module: ModuleType) -> Settings:
@@ -341,6 +368,9 @@ class Outcome:
     summary: list[str] = field(default_factory=list)
     numbers: dict[str, float] = field(default_factory=dict)
 
+
+CALIBRATED = "command"
+"""Setting by which files of `origami-sim calibrate` are known: the command that wrote them."""
 
 Progress = Callable[[float], None]
 
