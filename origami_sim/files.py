@@ -8,6 +8,9 @@ from typing import Any
 
 from origami_sim.errors import InputError
 
+PATTERNS = (".svg", ".fold", ".dxf", ".cp", ".opx", ".obj", ".stl")
+"""Suffixes of crease patterns."""
+
 LARGEST = 4 * 1024**3
 """Bytes of a file that is read whole: eight hours of fifty markers at 100 Hz as text; double may exceed memory."""
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from origami_sim import __version__
 from origami_sim.commands.progress import Bar
 from origami_sim.errors import InputError
+from origami_sim.files import PATTERNS
 from origami_sim.results.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
@@ -26,7 +27,6 @@ if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
 STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
-PATTERNS = (".svg", ".fold", ".dxf", ".cp", ".opx", ".obj", ".stl")
 
 
 class _Parser(argparse.ArgumentParser):

@@ -41,6 +41,7 @@ from origami_sim.device.scene import (
 )
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError, nearest
+from origami_sim.files import PATTERNS
 from origami_sim.model import Model, Parameters
 from origami_sim.quantities import ANY, Quantity, converted, parsed
 from origami_sim.recording import Recording, applied_drive
@@ -107,6 +108,15 @@ def device_module(given: str) -> ModuleType:
                 f"the module cannot be imported ({type(e).__name__}: {e})", field="device", value=place
             ) from e
         return _of(found, Path(found.__file__ or place), place.rpartition(".")[2], function)
+    if path.suffix.lower() in PATTERNS:
+        fault = "a crease pattern is no device: it states no thickness, supports or drive"
+        raise InputError(
+            fault if path.is_file() else "there is no such file",
+            field="device",
+            value=given,
+            allowed=f"origami-sim run {given}, which folds it, or my_flap.py with build(), of "
+            f"Sheet(read_pattern('{given}'), thickness='1 mm')",
+        )
     beside = f"; '{given}.py' is here, and named with its suffix" if Path(f"{given}.py").is_file() else ""
     raise InputError(
         f"there is no such scene{beside or nearest(given, NAMES)}",

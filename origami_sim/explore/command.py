@@ -91,6 +91,9 @@ def _grid(settings: Settings, vary: Sequence[str]) -> dict[str, list]:
     out: dict[str, list] = {}
     for text in vary:
         name, equals, given = (part.strip() for part in text.partition("="))
+        if not equals and ":" in text and text.split(":")[0].strip() not in settings:
+            fault = "a range needs the setting that it is of"
+            raise InputError(fault, field="--vary", value=text, allowed=f"NAME={text}, of {', '.join(settings)}")
         if not equals or name not in settings:
             near = "" if name in settings else nearest(name, settings)
             fault = f"cannot vary this setting{near}"
@@ -120,6 +123,14 @@ def _values(setting: Setting, given: str) -> list:
             raise InputError("too many values", field=f"--vary {setting.name}", value=given, allowed=f"up to {MOST}")
         low, high = (float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in parts[:2])
         return np.linspace(low, high, int(parts[2])).tolist()
+    if len(parts) > 1:
+        low, high = parts[0].strip() or "LOW", parts[1].strip() or "HIGH"
+        raise InputError(
+            "a range is from, to and how many values",
+            field=f"--vary {setting.name}",
+            value=given,
+            allowed=f"{low}:{high}:5 for five values, or a list such as {low},{high}",
+        )
     return [float(parsed(p, setting.unit, field=f"--vary {setting.name}")) for p in given.split(",")]
 
 

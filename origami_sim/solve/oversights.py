@@ -23,6 +23,12 @@ A sheet on `Sheet.ground` sinks by 1e-4, on single points by some 1e-3. Half not
 centimetre pass on a device of five.
 """
 
+BREAKDOWN = 35e6, 70e6
+"""Fields at which an acrylic elastomer (3M VHB 4905) breaks down [V/m]: as it comes, and drawn to six times its length.
+
+Smirnov, Springhetti, Morozov and Lukin 2018, Technical Physics: 35 to 70 kV/mm, slowly raised voltage.
+"""
+
 _CHANNELS = {
     "field": "field_",
     "gradient": "source_",
@@ -86,6 +92,39 @@ def _electroded(model: Model, parameters: Parameters) -> np.ndarray:
         else:
             out[:] = True
     return out
+
+
+def beyond_breakdown(model: Model, parameters: Parameters, drive: Drive, end: float) -> list[str]:
+    """Where a voltage asks of layers more than an acrylic elastomer holds, until a time `end` [s].
+
+    The field is that in layers of their stated thickness; those that thin out have more.
+    """
+    peaks = {
+        int(n.removeprefix("voltage_")): float(np.abs(s(s.sampled(end)[:, None])).max())
+        for n, s in drive.signals.items()
+        if n.startswith("voltage_")
+    }
+    worst: tuple[float, float, float, str] | None = None
+    for effect in (e for e in map(get, model.laws) if "voltage" in e.drives):
+        own = parameters.of(effect.name)
+        if not {"layers", "width", "layer_thickness"} <= set(own) or not peaks:
+            continue
+        thin = np.where(own["layers"] * own["width"] > 0, own["layer_thickness"], np.inf).min(axis=1)
+        volts = np.full(len(thin), max(peaks.values()))
+        if effect.family in ("crease", "bend"):
+            part = slice(None, len(model.creases)) if effect.family == "crease" else slice(len(model.creases), None)
+            volts = np.array([peaks.get(int(g), 0.0) for g in model.electrodes[part]])
+        k = int((volts / thin).argmax()) if len(thin) else 0
+        if len(thin) and (worst is None or volts[k] / thin[k] > worst[0]):
+            worst = volts[k] / thin[k], volts[k], thin[k], model.name(effect.family, k)
+    if worst is None or worst[0] <= BREAKDOWN[0]:
+        return []
+    low, high = (1e-6 * b for b in BREAKDOWN)
+    return [
+        f"The field in the layers of {worst[3]} comes to {1e-6 * worst[0]:.3g} MV/m ({1e-3 * worst[1]:.3g} kV over "
+        f"{1e3 * worst[2]:.3g} mm): acrylic elastomer breaks down at {low:g} MV/m, drawn to six times its length at "
+        f"{high:g} MV/m (VHB 4905, Smirnov et al. 2018)."
+    ]
 
 
 def refuse_start_outside_tables(

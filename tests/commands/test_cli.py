@@ -206,6 +206,15 @@ def test_progress_is_shown_only_to_somebody_who_watches(capsys, monkeypatch):
     assert re.search(r"100 % in [\d.]+ s\n$", shown)
 
 
+@pytest.mark.parametrize("command", [("show",), ("sweep", "--vary", "gap=1mm"), ("compare", "x.csv", "--model")])
+def test_a_pattern_is_no_device_and_what_makes_one_of_it_is_said(call, tmp_path, command):
+    (tmp_path / "crane.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    code, out, err = call(command[0], *(command[1:] if command[0] == "compare" else ()), "crane.svg",
+                          *(command[1:] if command[0] == "sweep" else ()))  # fmt: skip
+    assert (code, out) == (2, "")
+    assert "a crease pattern is no device" in err and "origami-sim run crane.svg" in err and "read_pattern" in err
+
+
 def test_a_long_run_says_how_long_it_will_take(capsys, monkeypatch):
     clock = iter([0.0, 10.0, 40.0, 80.0, 400.0])
     monkeypatch.setattr("origami_sim.commands.progress.time.perf_counter", lambda: next(clock))
@@ -387,6 +396,9 @@ def refused(call, tmp_path, arguments, words):
         (["compare", "", "--scene", "pendulum_chain"], r"cannot be read: it is a folder"),
         (["compare", "none.csv", "--scene", "pendulum_chain", "--threshold", "inf"], r"must be positive.*--threshold"),
         (["show", "box", "--out", "box.xyz"], r"is no picture.*--out.*box\.xyz.*\.png"),
+        (["sweep", "box", "--vary", "gap=1mm:2mm"], r"from, to and how many values.*--vary gap.*1mm:2mm:5.*1mm,2mm"),
+        (["sweep", "box", "--vary", "1mm:2mm"], r"the setting that it is of.*NAME=1mm:2mm"),
+        (["show", "crane.fold"], r"no such file.*'device', value 'crane.fold'"),
         (["sweep", "box", "--vary", "gap=1mm:2mm:99999999"], r"too many values.*--vary gap.*up to 100000"),
         (["sweep", "box", "--vary", "gap=1mm,2mm", "--pareto", "mass_g,weight"], r"no such measure.*--pareto.*weight"),
         (["run", "nothing.svg", "--settings"], r"nothing\.svg: no such file"),

@@ -349,6 +349,7 @@ def test_kresling_snap_through():
     assert load_at(1 - crossing) == pytest.approx(0.0, abs=1e-5)
     # stable up to the limit load, unstable under a held load beyond it
     assert np.all(path.stable[:peak]) and not np.any(path.stable[peak + 1 :])
+    assert f"Path: {len(path.factor)} points" in repr(path) and len(repr(path)) < 300
 
 
 def test_path_can_be_stopped_and_continued_from_its_states():

@@ -21,6 +21,7 @@ from origami_sim.solve.motion.frames import check_frames, check_memory
 from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
 from origami_sim.solve.oversights import (
     below_the_ground,
+    beyond_breakdown,
     beyond_crease_tables,
     idle_drives,
     outside_tables,
@@ -399,6 +400,7 @@ def _simulated(
         notes=[
             *said,
             *idle_drives(model, parameters, drive),
+            *beyond_breakdown(model, parameters, applied, drive_end),
             *below_the_ground(model, parameters, last.x),
             *beyond_crease_tables(model, parameters, np.stack([e.angles for _, e in record])),
             *(batch.notes() if isinstance(batch, Implicit) else []),

@@ -26,6 +26,7 @@ from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.oversights import (
     below_the_ground,
+    beyond_breakdown,
     beyond_crease_tables,
     idle_drives,
     refuse_start_outside_tables,
@@ -439,6 +440,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
     )
     out.notes = [f"Quasi-static: {len(times)} frames, {march.steps} equilibria.", *(f"{j}." for j in march.jumps)]
     out.notes += [*idle_drives(model, parameters, drive), *below_the_ground(model, parameters, out.x[-1])]
+    out.notes += beyond_breakdown(model, parameters, drive, float(times[-1]))
     out.notes += beyond_crease_tables(model, parameters, out.angles)
     out.notes += _left_out(out, march, states)
     return out

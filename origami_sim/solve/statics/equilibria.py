@@ -38,9 +38,9 @@ FAINTEST = 1e-6
 """Share of a Newton step below which none is taken."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Path:
-    """Equilibria along a load path, in the order in which they were found.
+    """Equilibria along a load path, in the order in which they were found; printed, it is a line.
 
     Attributes:
         factor: [P] path parameter. arc: [P] arc length, dimensionless.
@@ -68,6 +68,12 @@ class Path:
     start: State = field(repr=False)
     wall: float = 0.0
     touching: str = ""
+
+    def __repr__(self) -> str:
+        size = len(self.factor)
+        to = f", factor {self.factor[0]:.4g} to {self.factor[-1]:.4g}" if size else ""
+        said = f"{size} points{to}, {int(np.sum(self.stable))} of them stable, {len(self.limit_points)} limit points"
+        return f"Path: {said}; {self.message} {self.touching}".strip()
 
     def state(self, i: int) -> State:
         """The i-th point as a state at rest of one world."""
