@@ -238,7 +238,8 @@ class Grounds(Masses):
             damping_ratio: of a landing.
             lift: shift the sheet along the ground's normal until its lowest point just touches. Without it the sheet
                 starts where it is stated, and `build` refuses a start inside the ground.
-            tilt, azimuth: rise of the ground [rad], and the horizontal direction from x in which it rises [rad].
+            tilt, azimuth: rise of the ground [rad], and the horizontal direction from x in which it rises [rad]. The
+                sheet is not turned with it: one that is to lie on a slope has a tilted `gravity` and a level ground.
 
         Raises:
             InputError: no such node or number of points, both, a coefficient, damping or depth that is negative, a tilt

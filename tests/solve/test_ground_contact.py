@@ -10,6 +10,7 @@ from solve.runs import G
 from origami_sim import Sheet, strip
 from origami_sim.drive import Drive, ramp
 from origami_sim.model import State
+from origami_sim.model.clearance import gaps
 from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.statics.equilibria import equilibrium
 
@@ -204,3 +205,17 @@ def test_rigid_panels_that_turn_far_on_their_way_are_judged_by_a_symmetric_tange
     found = equilibrium(model, parameters, state=State.at_rest(model, position=placed))
     assert found.converged and found.stable and found.neutral == 3
     assert np.ptp(found.x[:, 2]) < 2e-3  # thickness and sink
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.6])
+def test_a_sled_lies_on_a_slope_by_its_weight_and_falls_onto_a_tilted_ground(slope):
+    """Level ground and tilted weight: at rest below the angle of friction, g (sin - mu cos) above it."""
+    weight = (-G * math.sin(slope), 0.0, -G * math.cos(slope))
+    sheet = Sheet(strip([0.01] * 4, 0.02), thickness=1e-3, material="pdms").crease(stiffness=5e-3, loss_time=3e-3)
+    lying = simulate(*sheet.gravity(weight).ground(friction=0.5).build(), duration=0.2)
+    downhill = max(0.0, math.sin(slope) - 0.5 * math.cos(slope))
+    assert -lying.v[-1, :, 0, 0].mean() == pytest.approx(0.2 * G * downhill, rel=2e-3, abs=1e-6)
+    model, parameters = sled(friction=0.5, tilt=slope)
+    gap = gaps(model, parameters, model.position[:, None])
+    assert gap.min() == pytest.approx(0.0, abs=1e-12)  # not inside, and not lying on it
+    assert gap.max() == pytest.approx(0.04 * math.sin(slope), rel=1e-3)
