@@ -507,3 +507,13 @@ def test_every_run_counts_the_pairs_that_pass_through_each_other(tmp_path, capsy
     said = json.loads(ran("--json", "--set", "touch=default"))
     assert said["crossing_pairs"] == 0
     assert "panel 0 and panel 3 meet at t = 0.06" in said["notes"][0]
+
+
+@pytest.mark.parametrize(("length", "least"), [(20, 0.99), (10, 0.99), (5, 0.96), (3, 0.5)])
+def test_panels_pressed_shut_by_a_soft_crease_lie_a_thickness_apart(length, least):
+    """Middles of two panels of 1 mm: no thickness is lost but to the crease's reach and to what it presses."""
+    model, parameters = made(strip([length * MM] * 2, 20 * MM), stiffness=5e-5, rest_angle=3.14, held=[0])
+    found = equilibrium(*rigid(model, parameters))
+    middle = np.abs(model.position[:, 0] - 1.5 * length * MM) < 1e-9
+    apart = found.x[: len(middle)][middle, 2].mean() / MM
+    assert found.converged and least < apart < 1.0
