@@ -29,6 +29,10 @@ BREAKDOWN = 35e6, 70e6
 Smirnov, Springhetti, Morozov and Lukin 2018, Technical Physics: 35 to 70 kV/mm, slowly raised voltage.
 """
 
+FLAT = 1e-9
+"""Thickness over the device's size below which panels lie in one plane: rounding leaves 1e-16, and what is folded by
+1e-6 rad is no longer flat. Half and double change nothing."""
+
 _CHANNELS = {
     "field": "field_",
     "gradient": "source_",
@@ -253,6 +257,18 @@ def beyond_crease_tables(model: Model, parameters: Parameters, angles: np.ndarra
     return [
         f"{model.name('crease', int(c))} folds to {at:.4g} deg, and the table of its moment goes from {low:.4g} to "
         f"{high:.4g} deg{others}: beyond, the moment goes straight on, which may be wrong."
+    ]
+
+
+def starts_flat(model: Model, x: np.ndarray) -> list[str]:
+    """What is to be said of rigid panels that close loops, if they start in one plane at positions x [N, W, 3] [m]."""
+    corners = x[np.unique(model.triangles)]
+    flattest = np.linalg.svd(np.moveaxis(corners - corners.mean(axis=0), 1, 0), compute_uv=False)[:, -1].min()
+    if flattest > FLAT * _size(model):
+        return []
+    return [
+        "The panels start flat, which is a singular state of every closed loop: rounding decides which way each folds, "
+        "and steps are many times shorter. Start folded (a pattern's fold_angle), or take panels='elastic'."
     ]
 
 

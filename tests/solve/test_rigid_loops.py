@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from origami_sim import Sheet, miura, simulate
+from origami_sim import Sheet, miura, simulate, strip
 
 
 @pytest.mark.parametrize(("cells", "duration"), [(2, 0.3), (6, 0.02)])
@@ -18,3 +18,12 @@ def test_many_loops_keep_their_energy_and_fold_as_one(cells, duration):
     assert not run.failures and np.ptp(half[:, 0]) > 0.05
     assert ratio == pytest.approx(ratio[0], rel=1e-9)
     assert np.ptp(run.energy_balance()) < 1e-5 * run.energies["kinetic"].max()
+
+
+@pytest.mark.parametrize(("pattern", "said"), [(miura(1, 1, 0.03, 0.03, 1.0), True),
+                                               (miura(1, 1, 0.03, 0.03, 1.0, fold_angle=0.1), False),
+                                               (strip([0.03, 0.03], 0.02), False)])  # fmt: skip
+def test_loops_that_start_flat_are_noted(pattern, said):
+    sheet = Sheet(pattern, thickness=5e-4, panels="rigid").crease(stiffness=1e-3)
+    run = simulate(*sheet.build(), duration=0.02, rate=100.0)
+    assert any("start flat" in n for n in run.notes) == said

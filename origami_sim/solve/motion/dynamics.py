@@ -27,6 +27,7 @@ from origami_sim.solve.oversights import (
     outside_tables,
     refuse_start_inside_the_ground,
     refuse_start_outside_tables,
+    starts_flat,
 )
 from origami_sim.solve.rigid.batch import TOLERANCE as RIGID
 from origami_sim.solve.rigid.batch import batch_of
@@ -328,6 +329,7 @@ def _simulated(
     drive.require(drive_end)
     applied = distorted(model, parameters, drive, drive_end)
     refuse_start_outside_tables(model, parameters, applied, state.x, first * step)
+    tree = Topology(model) if model.panels == "rigid" and np.any(model.free) else None
     if implicit:
         batch = Implicit(
             model,
@@ -342,14 +344,14 @@ def _simulated(
     else:
         error = 0.0 if dt is not None else tolerance or RIGID
         how = {"device": device, "threads": threads}
-        if model.panels == "rigid" and np.any(model.free):
-            tree = Topology(model)
+        if tree is not None:
             damped = dt is None and overdamped(model, parameters, tree, step)
             how |= {"tolerance": error, "tree": tree, "implicit": damped}
         batch = batch_of(model, parameters, applied, state, **how)
     lengths = np.linalg.norm(np.diff(model.position[model.bars], axis=1), axis=-1)
     speed_limit = 0.5 * lengths.min(initial=np.inf) / step
 
+    flat = starts_flat(model, state.x) if tree is not None and len(tree.row_node) else []
     watch, said = watch_of(model, parameters, state, reference=rests, device=device)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     record: list[tuple[State, Evaluation]] = []
@@ -399,6 +401,7 @@ def _simulated(
         wall=wall,
         notes=[
             *said,
+            *flat,
             *idle_drives(model, parameters, drive),
             *beyond_breakdown(model, parameters, applied, drive_end),
             *below_the_ground(model, parameters, last.x),
