@@ -275,7 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(args) -> int:
     from origami_sim.commands import again
-    from origami_sim.device.device import device_module
+    from origami_sim.device.device import KEPT, device_module
     from origami_sim.device.scene import scene_settings
     from origami_sim.results.rescue import not_over_a_sound_run
     from origami_sim.results.run_folder import check_writable
@@ -309,7 +309,7 @@ def _run(args) -> int:
         return OK
     if pattern:
         return module.run(args, settings, Bar(name))
-    folder = Path(args.out or f"runs/{name}")
+    folder = Path(args.out or (args.scene if module.__file__ == str(given / KEPT) else f"runs/{name}"))
     check_writable(folder)
     outcome = module.run(settings, progress=Bar(name))
     folder = not_over_a_sound_run(folder, outcome.trajectory)

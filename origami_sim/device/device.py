@@ -136,23 +136,25 @@ def is_device(given: str) -> bool:
 
 
 def _run_again(folder: Path) -> ModuleType:
-    """The device of a run, as its folder keeps it.
+    """The device of a run, as its folder keeps it, by the name of what was run.
 
     Raises:
         InputError: it keeps none; with what makes the run again, if its manifest says so.
     """
-    file = folder / KEPT
-    if file.is_file():
-        return _module(folder.absolute().name, file, _designed(read_design(file)), {})
+    made, why, name = "the file of the device, or its name", f"there is no {KEPT} in it", folder.absolute().name
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        name = str(manifest["scene"])
         how, sets = manifest["device"], "".join(f" --set {n}={v}" for n, v in manifest["overrides"].items())
         asked = [f"--{n} {how[n]}" for n in ("panels", "until", "accuracy", "calibration") if how[n] is not None]
         asked += ["--quasistatic"] * (how["motion"] == "quasistatic")
         made, why = " ".join([f"origami-sim run {how['given']}{sets}", *asked]), how["why"] or "it lost its device"
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
-        made, why = "the file of the device, or its name", f"there is no {KEPT} in it"
-    raise InputError(f"the folder does not make its run again ({why})", file=folder, allowed=made)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):  # no run, one of another kind, or damaged
+        pass
+    file = folder / KEPT
+    if not file.is_file():
+        raise InputError(f"the folder does not make its run again ({why})", file=folder, allowed=made)
+    return _module(name, file, _designed(read_design(file)), {})
 
 
 def _executed(path: Path) -> ModuleType:

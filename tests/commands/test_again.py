@@ -41,8 +41,10 @@ def call(capfd, tmp_path, monkeypatch):
 def test_a_run_is_made_again_from_its_folder_without_the_file_of_its_device(call, tmp_path, how):
     assert call("run", "flap.py", "--set", "field=30mT", "--set", "duration=0.15", *how, "--out", "runs/first")[0] == 0
     shutil.copytree("runs/first", "runs/second")
+    made = (tmp_path / "runs/second/states.npz").stat().st_mtime_ns
     (tmp_path / "flap.py").unlink()
     assert call("run", "runs/second")[0] == 0
+    assert (tmp_path / "runs/second/states.npz").stat().st_mtime_ns > made and not (tmp_path / "runs/flap").exists()
     first, second = load_run("runs/first"), load_run("runs/second")
     assert np.array_equal(first.trajectory.times, second.trajectory.times)
     assert np.array_equal(first.trajectory.x, second.trajectory.x)

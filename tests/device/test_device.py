@@ -205,6 +205,16 @@ def test_a_sidecar_names_a_device_and_executes_nothing(flap, tmp_path):
     assert Sidecar.read(tmp_path / "swing.toml").scene["name"] == "evil"
 
 
+def test_compare_with_the_folder_of_a_run_as_with_its_file(flap, call, tmp_path):
+    record(tmp_path)
+    assert call("run", "my_flap.py", "--set", "duration=0.1", "--out", "here")[0] == 0
+    code, stated, _ = call("compare", "swing.csv", "--model", "my_flap.py", "--duration", "0.1", "--json")
+    assert code == 0
+    (tmp_path / "my_flap.py").write_text("raise SystemExit(99)")
+    code, kept, err = call("compare", "swing.csv", "--model", "here", "--duration", "0.1", "--json")
+    assert (code, err) == (0, "") and json.loads(kept) == json.loads(stated)
+
+
 def test_compare_with_a_file(flap, call, tmp_path):
     record(tmp_path)
     code, out, err = call("compare", "swing.csv", "--model", "my_flap.py", "--duration", "0.1")
