@@ -88,7 +88,7 @@ def device_module(given: str) -> ModuleType:
         return scene_module(given)
     place, _, function = given.rpartition(":") if re.search(r":\w+$", given) else (given, "", "")
     path = Path(place)
-    if path.is_dir() and not function:
+    if place and path.is_dir() and not function:
         return _run_again(path)
     if path.suffix == ".toml" and not function:
         return _module(path.stem, path, _designed(read_design(path)), {})
@@ -130,7 +130,7 @@ def is_device(given: str) -> bool:
     """Whether a name is of a device file, a module's function or a design, not of a scene or a calibration of one."""
     if given.endswith(".toml"):
         return is_design(Path(given))
-    if given not in NAMES and Path(given).is_dir():
+    if given and given not in NAMES and Path(given).is_dir():
         return True
     return bool(re.search(r"\.py$|:\w+$", given))
 

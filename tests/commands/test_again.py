@@ -72,3 +72,9 @@ def test_an_earlier_device_does_not_stay_in_a_folder(call):
     assert call("run", "flap.py", "--out", "here")[0] == 0
     assert call("run", "crease_coupon", "--out", "here")[0] == 0
     assert call("run", "here")[0] == 2
+
+
+@pytest.mark.parametrize(("given", "said"), [("", "no such scene"), (".", "no device.toml"), ("x" * 300, "")])
+def test_what_is_no_run_folder_is_refused_in_a_sentence(call, given, said):
+    code, out, err = call("run", given)
+    assert (code, out) == (2, "") and said in err and err.count("\n") == 1
