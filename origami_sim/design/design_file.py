@@ -108,6 +108,11 @@ def read_design(path: str | Path) -> Design:
         lasts = float(converted(run.get("duration", 0.0), "s", "run.duration"))
         rate = float(converted(run.get("rate", 60.0), "Hz", "run.rate"))
         _check_run(lasts, rate)
+        if "until" in run and run.get("motion") != "quasistatic":
+            allowed = 'motion = "quasistatic" beside it'
+            raise InputError(
+                "only a quasi-static motion is held on", field="run.until", value=run["until"], allowed=allowed
+            )
         return Design(
             source,
             read_drive(as_table(data.get("drive", {}), "drive", path), path),

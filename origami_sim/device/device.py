@@ -215,7 +215,8 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
     else:
         out.SETTINGS, defaults = _settings(build, path, own)
         if stated := getattr(build, "stated", None):
-            out.SETTINGS = out.SETTINGS.with_motion(stated.motion, stated.until).with_accuracy(stated.accuracy)
+            how = {"motion": stated.motion, "until": stated.until, "accuracy": stated.accuracy}
+            out.SETTINGS = Settings([*out.SETTINGS.values()], path, **how)
 
         def raw(s: Settings, **options):
             given = {n: _as(s[n].value, d, n, path) for n, d in defaults.items()}

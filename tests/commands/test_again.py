@@ -78,3 +78,17 @@ def test_an_earlier_device_does_not_stay_in_a_folder(call):
 def test_what_is_no_run_folder_is_refused_in_a_sentence(call, given, said):
     code, out, err = call("run", given)
     assert (code, out) == (2, "") and said in err and err.count("\n") == 1
+
+
+def test_a_design_file_says_how_it_moves(call, tmp_path):
+    assert call("show", "flap.py", "--save", "flap.toml")[0] == 0
+    text = (tmp_path / "flap.toml").read_text()
+    (tmp_path / "flap.toml").write_text(text.replace("[run]", '[run]\nmotion = "quasistatic"\nuntil = "5 s"'))
+    assert call("show", "flap.toml", "--save", "again.toml")[0] == 0
+    assert call("run", "again.toml", "--out", "here")[0] == 0
+    assert load_run("here").trajectory.times[-1] == 5.0
+    for line, said in (('motion = "jump"', "no such motion"), ("until = 5.0", "only a quasi-static motion"),
+                       ("accuracy = -1.0", "accuracy"), ("pace = 1.0", "pace")):  # fmt: skip
+        (tmp_path / "flap.toml").write_text(text.replace("[run]", f"[run]\n{line}"))
+        code, _, err = call("run", "flap.toml")
+        assert code == 2 and said in err and "flap.toml" in err
