@@ -20,15 +20,12 @@ from origami_sim.fit.profile import along_numbers, missed, several
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
 from origami_sim.infer.budget import FAR
-from origami_sim.infer.scan import GRID, Cleared, gained, over_numbers, over_shapes, over_their_range
+from origami_sim.infer.scan import COARSE, Cleared, gained, over_numbers, over_shapes, over_their_range
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.words import pooled
 
 CALMING = 3
 """Effects, the best over their ranges, of which the best fit tells more of a rough model. It bounds the time."""
-
-COARSE = GRID[2:9]
-"""Strengths that are tried, in the unit in which they are noticeable: a tenth to a hundred of it."""
 
 
 def settled(forward: Predictor, f: Fit) -> tuple[Fit, bool]:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
+from origami_sim.effects import get
 from origami_sim.fit.least_squares import UTMOST, Fit, changed
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.profile import along_numbers, missed
@@ -33,6 +34,8 @@ may be too strong already) up to what blocks.
 With steps ten times apart the friction of that crawler is not found.
 """
 
+COARSE = GRID[2:9]
+"""Strengths that are tried where there are many worlds: a tenth to a hundred of the unit."""
 
 SHAPES = 7
 """Values of a number beside a strength that are tried, evenly over what is plausible.
@@ -172,27 +175,43 @@ def over_shapes(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarra
 
 def over_numbers(forward: Predictor, f: Fit, weights: Weights) -> tuple[np.ndarray, float] | None:
     """The same with another value of one of the model's numbers, over its prior."""
-    return _best_along(forward, f, weights, along_numbers(forward, f))
+    return _best_along(forward, f, weights, (([k], thetas) for k, thetas in along_numbers(forward, f)))
 
 
-def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[int, np.ndarray]]:
-    """Each number beside a strength, and the numbers (n, P) of a fit with its values over what is plausible."""
+def _along_shapes(forward: Predictor, f: Fit) -> Iterator[tuple[list[int], np.ndarray]]:
+    """Each number beside a strength, and the numbers (n, P) of a fit with its values over what is plausible.
+
+    A threshold comes with strengths of its own: a stiff stop late is as a soft one early, and of what lies between a
+    fit misses more.
+    """
     every = [(s, n) for s in f.hypothesis.suspects for n in s.free]
-    for k, (s, n) in enumerate(every, start=len(forward.subject.nominals)):
-        if n not in s.strengths:
-            thetas = np.repeat(f.theta[None], len(values := over_shape(n, f.theta[k])), axis=0)
-            thetas[:, k] = values
-            yield k, thetas
+    place = len(forward.subject.nominals)
+    for k, (s, n) in enumerate(every, start=place):
+        if n in s.strengths:
+            continue
+        threshold = bool(get(s.effect).parameter(n.name).threshold)
+        values = n.start * np.linspace(0.5, 2.0, SHAPES) if threshold else over_shape(n, f.theta[k])
+        thetas = np.repeat(f.theta[None], len(values), axis=0)
+        thetas[:, k] = values
+        if not threshold:
+            yield [k], thetas
+            continue
+        for j, (other, strength) in enumerate(every, start=place):
+            if other is s and strength in s.strengths:
+                sizes = strength.start + np.copysign(strength.scale * COARSE, f.theta[j])
+                both = np.repeat(thetas, len(sizes), axis=0)
+                both[:, j] = np.clip(np.tile(sizes, len(thetas)), strength.lower, strength.upper)
+                yield [j, k], both
 
 
 def _best_along(
-    forward: Predictor, f: Fit, weights: Weights, each: Iterable[tuple[int, np.ndarray]]
+    forward: Predictor, f: Fit, weights: Weights, each: Iterable[tuple[list[int], np.ndarray]]
 ) -> tuple[np.ndarray, float] | None:
     """The best of values of single numbers of a fit, with all others that follow linearly, and what it gains."""
     numbers = f.coordinates
     found: tuple[np.ndarray, float] | None = None
-    for k, thetas in each:
-        about = Cleared(f, weights, held=[k])
+    for held, thetas in each:
+        about = Cleared(f, weights, held=held)
         best = _best_of(forward, f, about, f.hypothesis, list(thetas))
         if best and best[1] > (found[1] if found else 0.0):
             theta, gain, left = best
