@@ -30,7 +30,7 @@ def proposed(out: Posterior, n: int) -> Key | None:
     key = _likely(out)
     if n % 2 or key is None:
         key = _analogous(out) or _alike(out) or _alone(out) or key
-    return key or _equivalent(out) or _within(out) or _alike(out, ROUGH)
+    return key or _equivalent(out) or _within(out) or _alike(out, ROUGH) or _better_half(out)
 
 
 def named(out: Posterior) -> list[Key]:
@@ -176,6 +176,18 @@ def _within(out: Posterior) -> Key | None:
     known = max((out.total[k] for k in out.nodes if k < out.leader and not out.imitates(k)), default=-np.inf)
     best = max(inside, key=lambda k: out.total[k], default=None)
     return best if best is not None and out.total[best] > known else None
+
+
+def _better_half(out: Posterior) -> Key | None:
+    """The better of the best set's two effects, if estimates were wrong by as much as the other adds to it.
+
+    Next to a strong bend, as that of a stop, derivatives do not tell which of them is needed.
+    """
+    best = max(named(out), key=lambda k: out.total[k])
+    key = max((best - {n} for n in best), key=lambda k: out.total.get(k, -np.inf), default=best)
+    off = max((abs(fitted - thought) for pairs in out.realised.values() for thought, fitted in pairs), default=0.0)
+    needed = len(best) != 2 or key not in out.estimates or out.total[key] + off < out.total[best] + np.log(UNFITTED)
+    return None if needed else key
 
 
 def in_place_of(out: Posterior, best: Key) -> dict[Key, float]:

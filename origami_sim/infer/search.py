@@ -59,7 +59,7 @@ def search(
         calm: what makes it linear if it has many basins, see `basins`.
     """
     out = Posterior(signatures, weights, store=store)
-    _add(out, forward, frozenset(), base, log_priors(signatures))
+    _add(out, forward, frozenset(), _finished(out, forward, base), log_priors(signatures))
     if calm is not None:
         _begun(out, forward, calm)
     elif given is not None and strained(base):
@@ -258,8 +258,8 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     """
     if f.failed:
         return f
-    known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
-    own, _ = with_own_noise(forward, f, out.hyper, known)
+    leading = out.nodes[out.leader].fit.weights if out.nodes else None
+    own, _ = with_own_noise(forward, f, out.hyper, [w for w in (leading, noise) if w is not None])
     return own if (on := _to_the_end(forward, own)).failed else on
 
 
