@@ -71,6 +71,9 @@ EFFECT = Effect(
     formula="B(x) = B + G x,  G = g |B| (3 b b^T - 1) / 2,  b = B / |B|; U = -m . G x, so f = G m and m x G x",
     source="first order of a field on its axis of symmetry, div B = 0 and curl B = 0; commanded field at the origin",
     matters="1 % per cm at 0.2 T pulls a box patch with 14 mN, against 19 mN of weight",
-    confused_with="gravity, drift by friction, remanence that differs between panels",
+    confused_with=(
+        "gravity, drift by friction, remanence that differs between panels; field_slope, of a coil at rest: here what "
+        "makes the field turns with it, as a magnet that is carried around the sample"
+    ),
     separated_by="move the sample in the gap; map the field",
 )

@@ -23,8 +23,8 @@ def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.n
     cover, at = root @ root.T, f.coordinates.of(f.theta)
     place, gone, suspects = len(f.free) - len(f.hypothesis.free), [], []
     for s in f.hypothesis.suspects:
-        vector = len(s.free) == len(s.strengths)  # the branches of a spectrum have time constants besides
-        unseen = _unseen(cover, at, [place + k for k in range(len(s.free)) if vector], credible)
+        vector = len(s.free) < 2 * len(s.strengths)  # the branches of a spectrum have a time constant each
+        unseen = _unseen(cover, at, [place + k for k, n in enumerate(s.free) if vector and n in s.strengths], credible)
         kept = [n for k, n in enumerate(s.free) if place + k not in unseen]
         suspects.append(replace(s, free=(replace(kept[0], spread=np.inf), *kept[1:])) if unseen else s)
         gone += unseen

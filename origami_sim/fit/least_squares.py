@@ -261,7 +261,7 @@ def along(forward: Predictor, numbers: Coordinates, theta: np.ndarray, line: Lin
         free = (at[inner] - reach > numbers.low[inner]) & (at[inner] + reach < numbers.high[inner])
         if free.all():
             raw = np.sqrt(sum(np.sum((t[:, inner] @ own.T) ** 2, axis=0) for t in line.tangent))
-            own *= np.minimum(1.0, 0.5 * least / raw)[:, None]
+            own *= np.minimum(1.0, 0.5 * least / np.maximum(raw, 1e-300))[:, None]
             weak = np.zeros((len(own), len(theta)))
             weak[:, inner] = own
             break
