@@ -8,7 +8,11 @@ from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.effects import CATALOGUE
+from origami_sim.fit.least_squares import fit
+from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.infer.scan import over_shapes
 
 SWING = {"duration": 4.0, "panels": 2, "rate": 100}
 STOP = 0.45
@@ -39,3 +43,19 @@ def test_a_contact_that_a_swing_meets_is_named_with_its_angle(stopped):
     assert found.verdict == "MECHANISM" and found.chosen == ["crease_contact at crease 0"], found.sentence
     numbers = {n.label: n for n in found.candidates[0].numbers}
     assert numbers["crease_contact.contact_angle"].value == pytest.approx(-STOP, abs=0.02)
+
+
+def test_a_stiff_stop_is_found_from_a_soft_one_that_acts_earlier(stopped):
+    """A threshold is tried with strengths of its own: to a late stop belongs a stiff one."""
+    forward, _ = arranged(subject(2), prepared([stopped], 200.0), Options())
+    _, base, weights = nominal_fits(forward)
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive, forward.parameters))
+    contact = next(s for s in every if s.effect == "crease_contact" and -STOP < s.free[1].start < 0.0)
+    soft = np.concatenate([base.theta, [2e-4, 0.6 * -STOP]])
+    f = fit(forward, Hypothesis((contact,)), weights, theta=soft, local=base.local, most=0)
+    found = over_shapes(forward, f, weights)
+    assert found is not None
+    stiffness, angle = found[0][-2:]
+    assert angle == pytest.approx(-STOP, abs=0.06) and 1e-3 < stiffness < 1e-2  # from 2e-4, beside other thresholds
+    there = fit(forward, Hypothesis((contact,)), weights, theta=found[0], local=base.local)
+    assert there.theta[-1] == pytest.approx(-STOP, abs=0.02) and there.cost < f.cost - found[1]
