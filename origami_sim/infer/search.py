@@ -59,7 +59,7 @@ def search(
         calm: what makes it linear if it has many basins, see `basins`.
     """
     out = Posterior(signatures, weights, store=store)
-    _add(out, forward, frozenset(), _finished(out, forward, base), log_priors(signatures))
+    _add(out, forward, frozenset(), base, log_priors(signatures))
     if calm is not None:
         _begun(out, forward, calm)
     elif given is not None and strained(base):
@@ -309,14 +309,16 @@ def polished(out: Posterior, forward: Predictor) -> bool:
     """Fits leaders on by their own noise, and takes all their derivatives where they end; whether anything changed.
 
     Leaders are the best set, which is believed by what its fit reaches and not by what derivatives promise, and those
-    that may be named that hold part of the posterior, or would if all came true that their derivatives promise.
+    that may be named that hold part of the posterior, or would if all came true that their derivatives promise. Where
+    the best has no effect that is told from nothing, the model without any can do the same.
     """
     prior, some = log_priors(out.signatures), False
     while True:
         some |= _in_the_leaders_noise(out, forward, prior)
         least = max(out.total[k] for k in named(out)) + np.log(UNFITTED)
         reach = {k: out.total[k] + 0.5 * out.nodes[k].owed for k in [*named(out), out.leader]}
-        leaders = [k for k, most in reach.items() if most >= least and k not in out.polished]
+        idle = not out.told(out.leader)
+        leaders = [k for k, most in reach.items() if (most >= least or (idle and not k)) and k not in out.polished]
         if not leaders:
             return some
         key = max(leaders, key=lambda k: reach[k])
