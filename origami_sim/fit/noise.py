@@ -58,9 +58,10 @@ in one recording of 3000 out of three; with 4 frames impacts would be bursts.
 STANDS = 16
 """Frames in which a reading does not change from which on they count once.
 
-Of swings over 0.6 to 30 steps with noise of 0 to 0.8 of one, numbers of least squares are off by 1.0 to 1.5 of what is
-stated, by 4 where a swing is below a step (6 with all frames). Half: by 2 there, and all are known less well by up to
-a quarter, as noise itself makes a reading stand for 8 frames; double: by 5. Of two recordings of a real pendulum, drag
+Of swings over 0.6 to 30 steps with noise of 0.02 to 0.8 of one, numbers of least squares are off by 0.9 to 1.5 of what
+is stated, by 2 and 4 where swings below a step have little noise (3.5 and 6 with all frames). Half: by 2 at most, and
+noise alone makes readings stand for 8 frames, which loses a quarter; double: by 2 to 4 where there is little noise.
+Of two recordings of a real pendulum, drag
 and a loss of the hinge that do the same are 0.49 to 0.51, with half 0.49 to 0.51, with double 0.40 to 0.60.
 """
 

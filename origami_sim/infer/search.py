@@ -258,8 +258,8 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     """
     if f.failed:
         return f
-    leading = out.nodes[out.leader].fit.weights if out.nodes else None
-    own, _ = with_own_noise(forward, f, out.hyper, [w for w in (leading, noise) if w is not None])
+    known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
+    own, _ = with_own_noise(forward, f, out.hyper, known)
     return own if (on := _to_the_end(forward, own)).failed else on
 
 
