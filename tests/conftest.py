@@ -5,6 +5,8 @@ import os
 import pytest
 import warp as wp
 
+from origami_sim.commands import cli
+
 LONG = (
     "test_diagnoses.py",
     "test_rigid_catalogue.py",
@@ -46,3 +48,17 @@ def cuda():
     if not wp.is_cuda_available():
         pytest.skip("no CUDA device here: rollouts on the GPU are not compared with the CPU's")
     return "cuda:0"
+
+
+@pytest.fixture
+def call(capfd, tmp_path, monkeypatch):
+    """Runs a command line in an empty folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as e:
+            cli.main([str(a) for a in arguments])
+        return e.value.code, *capfd.readouterr()
+
+    return run

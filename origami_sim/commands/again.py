@@ -30,7 +30,8 @@ def origin(args: Namespace, module: ModuleType, settings: Settings, why: str) ->
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest() if file is not None and file.is_file() else None,
         "calibration": None if args.calibration is None else str(Path(args.calibration).absolute()),
         "effects": [a.effect for a in settings.effects],
-        **{n: getattr(settings, n) for n in ("panels", "motion", "until", "accuracy")},
+        "panels": settings.panels,
+        **settings.how,
         "why": why,
     }
 
@@ -61,14 +62,13 @@ def design_of(module: ModuleType, settings: Settings, outcome: Outcome) -> tuple
     if begun and not isinstance(motion, QuasiStatic):
         return "", "it does not begin at rest where the device begins"
     stated = {n: float(settings[n].value) for n in ("duration", "rate") if n in settings}
-    how = {n: getattr(settings, n) for n in ("motion", "until", "accuracy")}
     about = f"the device of a run of {module.__name__}, with its settings"
     why = "a design file does not hold all of its model"
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / KEPT
         for source in (source_of(module, settings), (model, parameters)):
             try:
-                write_design(file, source, motion.drive, **stated, **how, about=about)
+                write_design(file, source, motion.drive, **stated, **settings.how, about=about)
                 read = read_design(file).source
             except InputError as e:
                 why = e.what

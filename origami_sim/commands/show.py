@@ -43,16 +43,10 @@ def run(args: Namespace) -> dict[str, Any]:
     if args.save:
         if Path(args.save).suffix != ".toml":
             raise InputError("a design is a TOML file", field="--save", value=args.save, allowed="my_flap.toml")
-        duration, rate = (
-            float(settings[n].value) if n in settings else v for n, v in (("duration", 0.0), ("rate", 60.0))
-        )
-        how = {"motion": settings.motion, "until": settings.until, "accuracy": settings.accuracy}
+        stated: dict[str, Any] = {n: float(settings[n].value) for n in ("duration", "rate") if n in settings}
+        stated |= settings.how
         about = " ".join((module.__doc__ or "").split("\n\n")[0].split())
-        found["design"] = str(
-            write_design(
-                args.save, source_of(module, settings), drive, duration=duration, rate=rate, about=about, **how
-            )
-        )
+        found["design"] = str(write_design(args.save, source_of(module, settings), drive, **stated, about=about))
     drawn = draw(model, parameters, picture or Path(f"runs/show/{name}.png"), drive=drive, title=name)
     return {**found, "picture": str(drawn)}
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -113,6 +113,11 @@ class Settings(Mapping[str, Setting]):
         for name in values:
             raise InputError("there is no such setting", file=self.file, field=name, allowed=", ".join(self._settings))
         return self._with(out)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """How it moves, as a design file keeps it."""
+        return {"motion": self.motion, "until": self.until, "accuracy": self.accuracy}
 
     def with_panels(self, panels: str | None) -> "Settings":
         """A copy for a device with "rigid" or "elastic" panels (None: as the scene builds them)."""

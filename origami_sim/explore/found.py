@@ -17,6 +17,7 @@ from origami_sim.model.contact import engaged
 from origami_sim.quantities import ANY, Quantity, converted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.motion.dynamics import Trajectory, simulate
+from origami_sim.solve.motion.frames import check_frames
 from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
 from origami_sim.solve.timestep import stable_step
 
@@ -49,12 +50,7 @@ class Way:
     threads: int | None = None
 
     def __post_init__(self):
-        if not 0 < self.rate < np.inf:
-            raise InputError("a motion needs frames", field="rate", value=self.rate, allowed="> 0 frames per second")
-        if self.duration is not None and not 0 < self.duration < np.inf:
-            raise InputError(
-                "a motion lasts no such time", field="duration", value=self.duration, allowed="> 0 s, or None"
-            )
+        check_frames(1.0 if self.duration is None else self.duration, self.rate)
 
 
 @dataclass

@@ -285,12 +285,17 @@ def quantisation(values: np.ndarray) -> float:
     A tenth of the changes between frames must be zero; the step is the smallest change that is repeated.
     """
     steps = np.abs(np.diff(values[np.isfinite(values)]))
-    rounding = 8.0 * np.finfo(float).eps * np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    moved = np.sort(steps[steps > rounding])
-    if moved.size < 2 or np.count_nonzero(steps <= rounding) < 0.1 * steps.size:
+    least = rounding(values)
+    moved = np.sort(steps[steps > least])
+    if moved.size < 2 or np.count_nonzero(steps <= least) < 0.1 * steps.size:
         return 0.0
     repeated = np.flatnonzero(np.diff(moved) <= 0.01 * moved[:-1])
     return float(moved[repeated[0]]) if repeated.size else 0.0
+
+
+def rounding(values: np.ndarray) -> float:
+    """By how much equal readings among values (n,) may differ, as means of them do; in their unit."""
+    return 8.0 * float(np.finfo(float).eps) * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _quantum_noise(values: np.ndarray) -> float:

@@ -35,7 +35,7 @@ def held(file, **how):
 def test_a_measured_curve_is_the_law_of_creases(curve, tmp_path):
     sheet = held(curve("law.toml"))
     found = equilibrium(*sheet.build())
-    assert found.converged and found.angles[:2] == pytest.approx([0.4, 0.4], abs=1e-3)
+    assert found.converged and found.angles[:2] == pytest.approx([0.4, 0.4], abs=1e-9)
     written = write_design(tmp_path / "design.toml", sheet)
     (tmp_path / "law.toml").unlink()  # a design remembers the numbers
     again = equilibrium(*read_design(written).sheet.build())
@@ -45,7 +45,7 @@ def test_a_measured_curve_is_the_law_of_creases(curve, tmp_path):
 def test_creases_of_another_law_stay_beside_it(curve):
     model, parameters = held(curve("law.toml"), creases=[1]).crease([0], stiffness=1e-3, rest_angle=0.1).build()
     found = equilibrium(model, parameters)
-    assert found.angles[:2] == pytest.approx([0.1, 0.4], abs=1e-3)
+    assert found.angles[:2] == pytest.approx([0.1, 0.4], abs=1e-9)
 
 
 def test_a_line_has_its_stiffness_and_a_loss(curve):
@@ -59,7 +59,7 @@ def test_a_line_has_its_stiffness_and_a_loss(curve):
 def test_a_scene_takes_what_it_has_a_setting_for(curve):
     module = scene_module("crease_coupon")
     settings = scene_settings(module, curve("law.toml"))
-    assert settings.stiffness == pytest.approx(2e-3, rel=1e-3) and settings.rest_angle == pytest.approx(0.4, abs=1e-3)
+    assert settings.stiffness == pytest.approx(2e-3, rel=1e-6) and settings.rest_angle == pytest.approx(0.4, abs=1e-9)
     assert settings.thickness == scene_settings(module).thickness
     with pytest.raises(InputError, match=r"nothing that was calibrated.*crease_law"):
         scene_settings(scene_module("falling_ball"), curve("law.toml"))

@@ -6,7 +6,6 @@ import shutil
 import numpy as np
 import pytest
 
-from origami_sim.commands import cli
 from origami_sim.results.run_folder import load_run
 
 FLAP = """
@@ -21,18 +20,10 @@ def build(gap="2 mm", field="20 mT"):
 
 
 @pytest.fixture
-def call(capfd, tmp_path, monkeypatch):
-    """Runs a command line in a folder with the file of a flap: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
+def call(call, tmp_path):
+    """Runs a command line in a folder with the file of a flap."""
     (tmp_path / "flap.py").write_text(FLAP)
-
-    def run(*arguments) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as e:
-            cli.main([str(a) for a in arguments])
-        return e.value.code, *capfd.readouterr()
-
-    return run
+    return call
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from origami_sim import __version__
-from origami_sim.commands import cli
 from origami_sim.commands.progress import Bar
 from origami_sim.device import scene
 from origami_sim.device.scene import read_calibration, scene_module
@@ -30,20 +29,6 @@ COMMANDS = (
 )
 SIDECAR = Path(scene_module("pendulum_chain").__file__).with_name("pendulum_chain_double.toml")
 QUICK = ("--set", "fold_time=0.05", "--set", "hold_time=0")
-
-
-@pytest.fixture
-def call(capfd, tmp_path, monkeypatch):
-    """Runs a command line in an empty folder: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as e:
-            cli.main([str(a) for a in arguments])
-        return e.value.code, *capfd.readouterr()
-
-    return run
 
 
 def contents(folder: Path) -> dict[str, str]:

@@ -9,7 +9,6 @@ import textwrap
 import numpy as np
 import pytest
 
-from origami_sim.commands import cli
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import read_design, write_design
 from origami_sim.device.device import device_module, lasting
@@ -49,17 +48,6 @@ def flap(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_flap.py").write_text(FLAP)
     return tmp_path / "my_flap.py"
-
-
-@pytest.fixture
-def call(capfd):
-    def run(*arguments) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as e:
-            cli.main([str(a) for a in arguments])
-        return e.value.code, *capfd.readouterr()
-
-    return run
 
 
 # quantities ----------------------------------------------------------------------------------------------------------

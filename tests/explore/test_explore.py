@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from origami_sim.commands import cli
 from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
@@ -330,17 +329,10 @@ def build(gap="2 mm", field="50 mT", held=True):
 
 
 @pytest.fixture
-def call(capfd, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def call(call, tmp_path):
+    """Runs a command line in a folder with the file of a flap."""
     (tmp_path / "my_flap.py").write_text(DEVICE)
-
-    def run(*arguments) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as e:
-            cli.main([str(a) for a in arguments])
-        return e.value.code, *capfd.readouterr()
-
-    return run
+    return call
 
 
 def test_sweep_from_the_command_line(call, tmp_path):

@@ -7,25 +7,10 @@ import numpy as np
 import pytest
 from drawings import drawn, frame
 
-from origami_sim.commands import cli
 from origami_sim.pattern import grid, miura, strip, triangulate, waterbomb, write_fold, write_mesh
 from origami_sim.results.run_folder import load_run
 
 DEGREES = np.pi / 180
-
-
-@pytest.fixture
-def call(capfd, tmp_path, monkeypatch):
-    """Runs a command line in an empty folder: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as e:
-            cli.main([str(a) for a in arguments])
-        return e.value.code, *capfd.readouterr()
-
-    return run
 
 
 @pytest.fixture

@@ -509,7 +509,7 @@ def test_every_run_counts_the_pairs_that_pass_through_each_other(tmp_path, capsy
     assert "panel 0 and panel 3 meet at t = 0.06" in said["notes"][0]
 
 
-@pytest.mark.parametrize(("length", "least"), [(20, 0.99), (10, 0.99), (5, 0.96), (3, 0.5)])
+@pytest.mark.parametrize(("length", "least"), [(20, 0.999), (10, 0.996), (5, 0.967), (3, 0.57)])
 def test_panels_pressed_shut_by_a_soft_crease_lie_a_thickness_apart(length, least):
     """Middles of two panels of 1 mm: no thickness is lost but to the crease's reach and to what it presses."""
     model, parameters = made(strip([length * MM] * 2, 20 * MM), stiffness=5e-5, rest_angle=3.14, held=[0])
