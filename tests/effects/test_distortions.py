@@ -207,6 +207,19 @@ def test_hysteresis_is_a_play_of_constant_width_at_every_rate():
         assert at(out, "field_x", zero[zero <= 1])[0, 0] == pytest.approx(width, rel=1e-9)
 
 
+def test_a_saturating_field_keeps_its_direction_and_its_limit():
+    """Bs tanh(B / Bs) to third order; at a hundred times the limit, the limit; a gradient of the same coil alike."""
+    limit, way = 0.03, np.array([2.0, -1.0, 2.0]) / 3.0
+    for size, expected in ((0.003, limit * math.tanh(0.1)), (3.0, limit)):
+        drive = Drive(field=tuple(size * way), gradient=((0, 0, 0), (0, 0, 0.5), (0, 0, 0)))
+        s = 2.0 / (3.0 * limit**2) if size < limit else 1.0 / limit**2
+        out = through("field_saturation", drive, field_saturation=s)
+        field = np.array([at(out, c)[7, 0] for c in CHANNELS[:3]])
+        assert field == pytest.approx(expected * way, rel=1e-4)
+        gradient = next(c for c in CHANNELS[3:12] if not drive[c].is_zero)
+        assert at(out, gradient)[7, 0] == pytest.approx(0.5 * np.linalg.norm(field) / size, rel=1e-12)
+
+
 def test_a_current_limit_charges_along_a_straight_line():
     """0.1 mA into 0.76 nF: 30.4 ms to 4 kV; the corner is rounded to a sample, 0.5 ms."""
     step = Drive(voltage=series([0.0, 1e-6, 1.0], [0.0, 4000.0, 4000.0]))
