@@ -7,7 +7,7 @@ import numpy as np
 from origami_sim.diagnose.inertia import calmer, inertia
 from origami_sim.diagnose.options import Options
 from origami_sim.errors import InputError
-from origami_sim.fit.least_squares import linearise
+from origami_sim.fit.derivatives import linearise
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise

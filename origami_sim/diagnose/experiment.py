@@ -19,7 +19,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from origami_sim.diagnose.menu import Trial, menu
-from origami_sim.fit.least_squares import Fit, changed, first_steps, links, start_steps
+from origami_sim.fit.derivatives import changed, first_steps, links, start_steps
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights

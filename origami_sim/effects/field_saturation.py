@@ -33,7 +33,7 @@ EFFECT = Effect(
     ),
     fitted=("field_saturation",),
     formula="B = B_command / sqrt(1 + s |B_command|^2), its gradient alike; at most 1 / sqrt(s)",
-    source="smooth saturation of a core or of an amplifier's voltage; as Bs tanh(B / Bs) with s = 2 / (3 Bs^2) at first",
+    source="smooth saturation of a core or an amplifier; as Bs tanh(B / Bs) to third order with s = 2 / (3 Bs^2)",
     matters="a core that lets through 0.1 T at most: 2 % less than commanded at 20 mT, 11 % at 50 mT",
     confused_with="gain of the field (the same part at any strength); stiffness that grows with the field",
     separated_by="a Hall probe in the place of the device, at half and at full current",

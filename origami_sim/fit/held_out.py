@@ -7,10 +7,11 @@ from functools import partial
 import numpy as np
 
 from origami_sim.errors import InputError
+from origami_sim.fit.derivatives import links
 from origami_sim.fit.evidence import ROUNDS, least_within, sharpness
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.implied import OwnColumns
-from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, links, penalty, settled
+from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, penalty, settled
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights, restored

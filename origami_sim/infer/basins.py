@@ -16,10 +16,10 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit
 from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.profile import along_numbers, missed, several
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
 from origami_sim.infer.budget import FAR
+from origami_sim.infer.profile import along_numbers, missed, several
 from origami_sim.infer.scan import COARSE, Cleared, gained, over_numbers, over_shapes, over_their_range
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.words import pooled

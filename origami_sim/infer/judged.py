@@ -8,13 +8,13 @@ from itertools import product
 import numpy as np
 
 from origami_sim.fit.chain import Chain
-from origami_sim.fit.discrepancy import cosines
 from origami_sim.fit.evidence import Problem, Summed, beside_numbers, summed, without_flaws
 from origami_sim.fit.implied import OwnColumns
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import log_volume
 from origami_sim.infer.columns import Columns
+from origami_sim.infer.discrepancy import cosines
 from origami_sim.infer.placement import members_of
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.threads import shared

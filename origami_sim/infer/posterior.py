@@ -7,12 +7,12 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import chi2
 
-from origami_sim.fit.discrepancy import laws
 from origami_sim.fit.evidence import Group, Problem, Summed
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Suspect
+from origami_sim.infer.discrepancy import laws
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.screen import Signature
 

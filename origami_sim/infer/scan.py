@@ -13,11 +13,12 @@ from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from origami_sim.effects import get
-from origami_sim.fit.least_squares import UTMOST, Fit, changed
+from origami_sim.fit.derivatives import changed
+from origami_sim.fit.least_squares import UTMOST, Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.profile import along_numbers, missed
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
+from origami_sim.infer.profile import along_numbers, missed
 from origami_sim.infer.screen import Signature
 
 DOUBTED = 0.01

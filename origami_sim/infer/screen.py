@@ -8,8 +8,9 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.fit.chain import Chain
+from origami_sim.fit.derivatives import changed, small
 from origami_sim.fit.evidence import Group
-from origami_sim.fit.least_squares import SLOWEST, Fit, changed, small
+from origami_sim.fit.least_squares import SLOWEST, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Suspect, along_each_axis, scaled, usual

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from origami_sim.fit.components import without_unseen_components
+from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
 from origami_sim.fit.implied import OwnColumns, log_evidence, with_own_noise
-from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed, small
+from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed
 from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -23,6 +23,7 @@ from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere
 from origami_sim.infer.budget import FAR, over_noise
 from origami_sim.infer.columns import Columns
+from origami_sim.infer.components import without_unseen_components
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place

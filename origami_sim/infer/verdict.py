@@ -7,11 +7,11 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.fit.bursts import bursts
-from origami_sim.fit.discrepancy import laws, of_recorder
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import NOMINAL
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
+from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import CREDIBLE, Key, Node, Posterior
 from origami_sim.infer.remainder import mismatch

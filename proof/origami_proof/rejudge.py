@@ -17,8 +17,8 @@ import numpy as np
 from origami_proof.case import STORED
 from origami_proof.score import BOARD, calibration_error, judge, wilson
 from origami_sim.errors import InputError
-from origami_sim.fit.discrepancy import laws
 from origami_sim.fit.hyper import HYPER, Hyper
+from origami_sim.infer.discrepancy import laws
 from origami_sim.infer.stored import Stored
 from origami_sim.infer.verdict import by_effects, real_rest
 

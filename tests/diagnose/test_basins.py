@@ -8,10 +8,10 @@ import pytest
 from origami_sim import Drive, diagnose, ramp, simulate
 from origami_sim.device.scene import read_calibration
 from origami_sim.fit.nominal import nominal_fits
-from origami_sim.fit.profile import several
 from origami_sim.hypotheses.hypothesis import Free, Subject
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
+from origami_sim.infer.profile import several
 from origami_sim.observation.observe import observe
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Channel, DriveChannel, Recording

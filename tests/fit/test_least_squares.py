@@ -9,7 +9,8 @@ import pytest
 from origami_sim.diagnose import Options, Subject, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import prepared
-from origami_sim.fit.least_squares import fit, linearise, promised, renewed, settled
+from origami_sim.fit.derivatives import linearise
+from origami_sim.fit.least_squares import fit, promised, renewed, settled
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Block, Prediction
 from origami_sim.fit.weights import Weights
@@ -188,5 +189,6 @@ def test_the_scale_of_all_moments_is_known_no_better_than_before(turning, gap):
     f = renewed(forward, f)
     known = 1.0 / np.sqrt(0.05**-2 + 0.3**-2 + 0.03**-2)
     spread = f.deviations()[[0, 2]]
-    assert np.all(spread > 0.98 * known) and np.all(spread < 1.02 * known)
+    assert f.cost < 620.0, "946 and 7564 if segments do not begin where those before lead"
+    assert np.all(spread > 0.95 * known) and np.all(spread < 1.05 * known)
     assert f.theta[3] / f.theta[2] == pytest.approx(2e-5, rel=0.02)

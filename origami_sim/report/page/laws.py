@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from origami_sim.effects import CATALOGUE
-from origami_sim.fit.discrepancy import of_recorder
 from origami_sim.hypotheses.hypothesis import SEPARATOR
+from origami_sim.infer.discrepancy import of_recorder
 from origami_sim.locate.places import REVERSAL, Curve, Partial
 from origami_sim.report.diagnosis import Diagnosis, Trace
 from origami_sim.report.page.markup import Html, element
