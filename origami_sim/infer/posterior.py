@@ -83,8 +83,9 @@ class Posterior:
             which single effects are fitted, where those are not linear about the refitted model. reconsidered: whether
             all were tried over their ranges. swapped: by how much single effects were better than they promised in
             the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
-            as estimated and as fitted, by that fit. rough: whether fits end in many basins, see `basins`. futile: sets
-            that were fitted since one took the lead.
+            as estimated and as fitted, by that fit. reached: likewise, from estimates to promises, and to what fits
+            came. rough: whether fits end in many basins, see `basins`. futile: sets that were fitted since one took the
+            lead.
     """
 
     signatures: list[Signature]
@@ -108,6 +109,7 @@ class Posterior:
     reconsidered: bool = False
     swapped: list[float] = field(default_factory=list)
     realised: dict[Key, list[tuple[float, float]]] = field(default_factory=dict)
+    reached: dict[Key, list[tuple[float, float]]] = field(default_factory=dict)
     rough: bool = False
     futile: int = 0
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)

@@ -47,18 +47,18 @@ def _likely(out: Posterior) -> Key | None:
     fitted = named(out)
     others = out.estimates if len(fitted) == len(out.nodes) else [k for k in out.estimates if not out.imitates(k)]
     least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
-    off = {k: [fitted - estimated for estimated, fitted in pairs] for k, pairs in out.realised.items()}
-    promised, estimated = (
-        {k: min(0.0, most_gained(off)) for k, off in each.items() if len(off) > 1} for each in (out.gains, off)
-    )
-    unfitted = {
-        k: max(out.promise[k] + promised.get(parent, 0.0), out.total[k] + estimated.get(parent, 0.0))
-        for k in others
-        for parent in [out.estimates[k].parent]
-    }
+    unfitted = {k: _most(out, k) for k in others}
     # another start of the shape of a set that was fitted has to promise more than that did
     better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
     return max((k for k in better if not _idle(out, k)), key=lambda k: unfitted[k], default=None)
+
+
+def _most(out: Posterior, key: Key) -> float:
+    """Log posterior that a set which was not fitted may have at most, but for UNFITTED."""
+    thought, promise = out.total[key], out.promised(key)
+    if not np.isfinite(thought):
+        return promise
+    return thought + most_reached(out.reached.get(out.estimates[key].parent, []), promise - thought)
 
 
 def _idle(out: Posterior, key: Key) -> bool:
@@ -74,6 +74,23 @@ def _idle(out: Posterior, key: Key) -> bool:
             return True
         column += len(group.columns)
     return False
+
+
+def most_reached(pairs: Sequence[tuple[float, float]], room: float) -> float:
+    """How far above its estimate a set may come at most (but for UNFITTED), up to its promise: by those before it.
+
+    Both are linear. A fit comes to some part of the way from the one to the other, which errs in proportion to it.
+
+    Args:
+        pairs: of sets that were fitted, the room from estimate to promise, and how far above the estimate they came.
+    """
+    if len(pairs) < 2 or room <= 0.0:
+        return room
+    rooms, came = np.array(pairs).T
+    square = max(float(rooms @ rooms), 1e-300)
+    part = float(rooms @ came) / square
+    doubt = np.sqrt(np.sum((came - part * rooms) ** 2) / (len(pairs) - 1) * (1.0 + room**2 / square))
+    return min(room, part * room + float(student.ppf(1.0 - UNFITTED, len(pairs) - 1)) * doubt)
 
 
 def most_gained(gains: Sequence[float]) -> float:

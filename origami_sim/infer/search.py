@@ -223,8 +223,10 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
     out.gains.setdefault(estimate.parent, []).append(out.total[key] - promise)
     if estimate.parent and key in out.ranked:  # what the model without any had promised of it
         out.gains.setdefault(frozenset(), []).append(out.total[key] - out.ranked[key])
-    realised = estimate.gain, estimate.gain + out.total[key] - estimated
-    out.realised.setdefault(estimate.parent, []).append(realised)
+    came = out.total[key] - estimated
+    out.realised.setdefault(estimate.parent, []).append((estimate.gain, estimate.gain + came))
+    if np.isfinite(came):
+        out.reached.setdefault(estimate.parent, []).append((promise - estimated, came))
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)

@@ -5,9 +5,10 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from origami_sim.infer.posterior import Key, Posterior
-from origami_sim.infer.proposals import proposed
+from origami_sim.infer.proposals import most_reached, proposed
 
 DRAG, LOSS, RUB, SCALE, ZERO = range(5)
 BEST = frozenset({RUB, LOSS, SCALE})
@@ -26,11 +27,24 @@ def posterior(fitted: dict[Key, float], estimated: dict[Key, float]) -> Posterio
     out = Posterior([], cast(Any, None), **cast(Any, known))
     more = dict(leader=max(fitted, key=lambda k: fitted[k]), imitates=lambda key: False, effects=lambda key: key)
     more["labels"] = lambda key: tuple(sorted(map(str, key)))
+    more["promised"] = lambda key: max(out.total[key], out.promise[key])
     more["signatures"] = [
         SimpleNamespace(suspect=SimpleNamespace(strengths=(f,)), size=np.ones(1)) for f in frees.values()
     ]
     more["suspect"] = lambda n: SimpleNamespace(effect=str(n))
-    own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped", "begun")
+    own = (
+        "nodes",
+        "estimates",
+        "promise",
+        "total",
+        "gains",
+        "realised",
+        "reached",
+        "hoped",
+        "ranked",
+        "swapped",
+        "begun",
+    )
     return cast(Posterior, SimpleNamespace(**{n: getattr(out, n) for n in own}, **more))
 
 
@@ -102,6 +116,17 @@ def test_what_promises_a_part_of_the_posterior_is_fitted():
     other = frozenset({DRAG})
     assert proposed(posterior({BEST: 0.0}, {other: -1.0}), 0) == other
     assert proposed(posterior({BEST: 0.0}, {other: -4.0}), 0) is None
+
+
+def test_how_far_a_set_may_come_is_told_by_those_before_it():
+    """Two fits that came 31 of 120 and 12 of 101 say little of a third; three that came a tenth of their way do."""
+    assert most_reached([], 63.0) == most_reached([(120.0, 31.0)], 63.0) == 63.0, "up to what it promises"
+    assert most_reached([(120.0, 31.0), (101.0, 12.0)], 63.0) == 63.0
+    tenth = [(100.0, 12.0), (80.0, 8.0), (120.0, 10.0)]
+    assert 10.0 < most_reached(tenth, 100.0) < 20.0
+    left = np.array([12.0, 8.0, 10.0]) - 3040.0 / 30800.0 * np.array([100.0, 80.0, 120.0])
+    doubt = np.sqrt(left @ left / 2.0 * (1.0 + 100.0**2 / 30800.0))
+    assert most_reached(tenth, 100.0) == pytest.approx(304000.0 / 30800.0 + t.ppf(0.95, 2) * doubt, rel=1e-12)
 
 
 @pytest.mark.parametrize(("value", "worth"), [(0.0, False), (0.5, True)])
