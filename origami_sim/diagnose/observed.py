@@ -14,7 +14,7 @@ from origami_sim.observation.observe import _index, body_point
 from origami_sim.predict.starts import channel_tangent, seen_first
 from origami_sim.predict.track import PATH
 from origami_sim.recording import Channel, Recording, by_component
-from origami_sim.recording.drives import UNITS
+from origami_sim.recording.drives import UNITS, switches
 from origami_sim.recording.units import quantity
 
 BENT = 0.3
@@ -31,13 +31,6 @@ SLOW = 1e5
 
 OFF = 20.0
 """How many times a distance on a panel may be off before its unit is refused; a length scale of 50 % is a suspect."""
-
-SWITCH = 0.05
-"""Share of a drive's range by which it changes between two rows where it is said to be switched.
-
-It decides on a note alone. Of thirteen drives (sines to 30 Hz, ramps, steps and stairs, with noise and without) half
-of it adds stairs of 4 %, double leaves out those of 8 %.
-"""
 
 TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""
@@ -200,29 +193,9 @@ def switched(recording: Recording) -> list[str]:
     notes = []
     for name, (before, after) in switches(recording).items():
         notes.append(
-            f"The drive '{name}' of '{recording.name}' is switched between two rows, first after {before[0]:.6g} s, "
-            f"and taken as a ramp of {quantity(float(np.max(after - before)), 's')} from one to the other: what is "
-            "found as a lag or a delay of that size may be this."
+            f"The drive '{name}' of '{recording.name}' is switched between two rows, first after {before[0]:.6g} s: "
+            f"when is known to {quantity(float(np.max(after - before)), 's')} only, and what is found as a lag or a "
+            "delay of that size may be this."
             + ("" if recording.drive[name].times is not None else " A log at a higher rate (file = ...) tells when.")
         )
     return notes
-
-
-def switches(recording: Recording) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times (k,) of the rows before and after each switch, of drives that were switched [s].
-
-    Switched is what changes between two rows by more than `SWITCH` of its range, by ten times as much as it usually
-    does, and by twice as much as before and after together.
-    """
-    out = {}
-    for name, drive in recording.drive.items():
-        if recording.by_step or drive.constant or name == PATH:
-            continue
-        values = np.reshape(drive.values, (len(drive.values), -1))
-        change = np.pad(np.abs(np.diff(values, axis=0)), ((1, 1), (0, 0)))
-        least = np.maximum(SWITCH * np.ptp(values, axis=0), 10.0 * np.median(change[1:-1], axis=0))
-        rows = np.flatnonzero((change[1:-1] > np.maximum(least, 2.0 * (change[:-2] + change[2:]))).any(axis=1))
-        if len(rows):
-            times = recording.times if drive.times is None else drive.times
-            out[name] = times[rows], times[rows + 1]
-    return out

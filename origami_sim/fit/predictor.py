@@ -28,7 +28,7 @@ class Block:
         pose, rates: the start about which `local` numbers shift: coordinates, and their rates.
         known: (L,) standard deviations of the start about it; empty where it is not fitted.
         reach: (L,) gaps to the next segment are measured by these; None where that is not tied to this one.
-        lasting: time until the next segment begins, if it is tied to this one [s].
+        lasting: time until the next segment begins, if the motion goes on from this one to it [s].
         begin: (D,) what was measured at the first frame, which tells the turn of angles.
         shows: [D, m] derivatives of the channels by the coordinates at the start; None where that is not fitted.
         repeats: [n, D] which values are missing as they repeat one that is there, see `without_repeats`; None: none.

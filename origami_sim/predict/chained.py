@@ -69,16 +69,16 @@ class Seen:
 
 
 def chained_segments(forward: "RigidRollouts", r: int, local: np.ndarray | None) -> Chained | None:
-    """The segments of a recording, of which each begins where the one before ends; None if they do not."""
+    """The segments of a recording, of which each begins when the one before ends; None if they do not."""
     numbers = [n for n, b in enumerate(forward.blocks) if b.recording == r]
     blocks = [forward.blocks[n] for n in numbers]
-    if forward.articulation.floating or forward.start != "fit" or any(b.reach is None for b in blocks[:-1]):
+    if forward.articulation.floating or forward.start != "fit" or not all(b.lasting for b in blocks[:-1]):
         return None
     m, shifts = forward.articulation.size, np.zeros((len(blocks), forward.local)) if local is None else local[numbers]
     angles = np.stack([b.pose.angles[:, 0] + by[:m] for b, by in zip(blocks, shifts, strict=True)])
     rates = np.stack([b.rates + by[m:] for b, by in zip(blocks, shifts, strict=True)])
     step = film_step(forward.recordings[r].times)
-    lasting = [b.lasting if b.reach is not None else float(b.times[-1]) for b in blocks]
+    lasting = [b.lasting or float(b.times[-1]) for b in blocks]
     begins = np.concatenate([[0], np.cumsum([round(t / step) for t in lasting])]).tolist()
     regular = all(even(step, t, n) == step for t, n in zip(lasting, np.diff(begins).tolist(), strict=True))
     dt = step if regular else sum(lasting) / begins[-1]
@@ -148,7 +148,7 @@ def films_of(
     stable = np.flatnonzero(np.isfinite(seen.later).all(axis=(0, 1))).tolist()
     kinds: dict[tuple[int, bool], list[int]] = {}
     for n, (block, frames) in enumerate(zip(chained.blocks, np.diff(begins).tolist(), strict=True)):
-        kinds.setdefault((frames, block.reach is not None), []).append(n)
+        kinds.setdefault((frames, block.lasting > 0.0), []).append(n)
     films: Films = {}
     for (frames, tied), mine in kinds.items():
         memory = kept[mine].transpose(1, 2, 0).reshape(kept.shape[1], -1)

@@ -29,6 +29,7 @@ from origami_sim.predict.shots import Shots, Simulated, by_geometry, joined_pose
 from origami_sim.predict.starts import spans
 from origami_sim.predict.worlds import World, lasting
 from origami_sim.recording import Recording
+from origami_sim.recording.drives import switched_between
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.batch import RigidBatch
 from origami_sim.solve.rigid.damping import overdamped
@@ -86,6 +87,10 @@ class RigidRollouts(Rollouts):
             before ends. probe: of the same model and recordings; what it has read of them is not read again. The rest
             as for `Rollouts`.
 
+    Attributes:
+        anew: times [s] by recording at which a segment begins from a start of its own, as a drive was switched before
+            it and its log does not tell when to within a frame.
+
     Raises:
         InputError: what rigid panels refuse; closed loops, a root that is held in part.
     """
@@ -112,6 +117,7 @@ class RigidRollouts(Rollouts):
         self.blur = TOUCHING if len(self.model.contacts) else TOLERANCE
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         self._films: Films = {}
+        self.anew: dict[int, list[float]] = {}
         self._beside: dict[int, Films] = {}  # of what was followed last beside the first world, by recording
         check_tree(self._tree, self.articulation)
         for index, recording in enumerate(self.recordings):
@@ -128,12 +134,18 @@ class RigidRollouts(Rollouts):
     def _segments(self, index: int, recording: Recording, segment: float | None, tied: bool) -> list[Block]:
         step, count = float(np.median(np.diff(recording.times))), len(recording.times)
         frames = count if segment is None or self.start != "fit" else max(FEWEST, round(segment / step))
-        pieces = max(1, round(count / frames))
-        firsts = np.arange(0, count, -(-count // pieces))  # of equal length, but for the last
-        firsts = np.append(firsts[count - firsts >= min(FEWEST, count)], count)
+        unsure = switched_between(recording) if tied and self.start == "fit" else []
+        anew, firsts = [0], []
+        for _, first in unsure:
+            if min(first - anew[-1], count - first) >= FEWEST:
+                anew.append(first)
+        for begin, end in pairwise([*anew, count]):
+            pieces = max(1, round((end - begin) / frames))
+            own = np.arange(begin, end, -(-(end - begin) // pieces))  # of equal length, but for the last
+            firsts += own[end - own >= min(FEWEST, end - begin)].tolist()
         if self.start == "fit":
-            self.readings.read(index, firsts[:-1].tolist())
-        out = [self.segment(index, int(a), int(b - a)) for a, b in pairwise(firsts)]
+            self.readings.read(index, firsts)
+        out = [self.segment(index, a, b - a) for a, b in pairwise([*firsts, count])]
         if not tied or self.start != "fit":
             return out
         usual = self.readings.usual_rates(index)
@@ -141,8 +153,10 @@ class RigidRollouts(Rollouts):
             lasting = float(recording.times[after.first] - recording.times[block.first])
             # a force that is missing by chance changes rates, and coordinates by their integral
             reach = np.concatenate([usual * lasting / np.sqrt(3.0), usual])
-            out[n] = replace(block, reach=reach, lasting=lasting)
-        return out
+            out[n] = replace(block, reach=None if after.first in anew else reach, lasting=lasting)
+        self.anew[index] = recording.times[anew[1:]].tolist()
+        doubt = [k for last, first in unsure if first in anew for k in range(last + 1, first)]
+        return [_without(block, np.isin(block.first + np.arange(len(block.times)), doubt)) for block in out]
 
     def world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> World:
         """See `Worlds.world`.
@@ -301,6 +315,17 @@ class RigidRollouts(Rollouts):
             out[: arm.size, at] = arm.shift_between(base.select(b), pose)
             out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
         return out
+
+
+def _without(block: Block, frames: np.ndarray) -> Block:
+    """A segment of which some frames (n,) are not compared."""
+    if not np.any(frames):
+        return block
+    values, repeats = np.array(block.values), None if block.repeats is None else np.array(block.repeats)
+    values[frames] = np.nan
+    if repeats is not None:
+        repeats[frames] = False
+    return replace(block, values=values, repeats=repeats)
 
 
 def check_tree(tree: Topology, arm: Articulation) -> None:

@@ -116,10 +116,8 @@ def by_length(blocks: list[Block], indices: list[int]) -> list[list[int]]:
     groups, left = [], list(indices)
     while left:
         a = blocks[left[0]]
-        kind = (len(a.times), a.reach is None)
         slack = TREMBLING * float(np.median(np.diff(a.times))) if len(a.times) > 1 else 1e-7
-        near = [i for i in left if (len((b := blocks[i]).times), b.reach is None) == kind]
-        near = [i for i in near if abs(blocks[i].lasting - a.lasting) < slack]
+        near = [i for i in left if len(blocks[i].times) == len(a.times) and abs(blocks[i].lasting - a.lasting) < slack]
         times = np.stack([blocks[i].times for i in near])
         alike = np.all(np.abs(times - a.times) <= slack, axis=1)
         groups.append([i for i, same in zip(near, alike.tolist(), strict=True) if same])

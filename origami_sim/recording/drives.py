@@ -14,6 +14,13 @@ from origami_sim.recording.recording import DriveChannel, Recording
 UNITS = {family: unit for family, unit in CHANNEL_UNITS.items() if family != "origin"}
 """SI unit of the drives that a recording may have; `field_x`, `gradient_zx`, `voltage_1` name single components."""
 
+SWITCH = 0.05
+"""Share of a drive's range by which it changes between two rows where it is said to be switched.
+
+Of thirteen drives (sines to 30 Hz, ramps, steps and stairs, with noise and without) half of it adds stairs of 4 %,
+double leaves out those of 8 %.
+"""
+
 
 def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
     """What was applied, for a simulation that starts with the first frame.
@@ -42,6 +49,38 @@ def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
     if step is None or not recording.sources:
         return applied
     return applied.held(float(recording.times[step] - recording.times[0]))
+
+
+def switches(recording: Recording) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Times (k,) of the rows before and after each switch, of drives that were switched [s].
+
+    Switched is what changes between two rows by more than `SWITCH` of its range, by ten times as much as it usually
+    does, and by twice as much as before and after together.
+    """
+    out = {}
+    for name, drive in recording.drive.items():
+        if recording.by_step or drive.constant or name.split("_")[0] not in UNITS:
+            continue
+        values = np.reshape(drive.values, (len(drive.values), -1))
+        change = np.pad(np.abs(np.diff(values, axis=0)), ((1, 1), (0, 0)))
+        least = np.maximum(SWITCH * np.ptp(values, axis=0), 10.0 * np.median(change[1:-1], axis=0))
+        rows = np.flatnonzero((change[1:-1] > np.maximum(least, 2.0 * (change[:-2] + change[2:]))).any(axis=1))
+        if len(rows):
+            times = recording.times if drive.times is None else drive.times
+            out[name] = times[rows], times[rows + 1]
+    return out
+
+
+def switched_between(recording: Recording) -> list[tuple[int, int]]:
+    """The frames before and after each instant at which a drive was switched that is not known to within a frame."""
+    times, found = recording.times, set[tuple[int, int]]()
+    frame = float(np.median(np.diff(times)))
+    for before, after in switches(recording).values():
+        rows = np.stack([before, after], axis=1)[np.round((after - before) / frame) >= 1.0]
+        slack = 1e-6 * frame
+        last, first = np.searchsorted(times, rows[:, 0] + slack) - 1, np.searchsorted(times, rows[:, 1] - slack)
+        found |= {(a, b) for a, b in zip(last.tolist(), first.tolist(), strict=True) if a >= 0 and b < len(times)}
+    return sorted(found)
 
 
 def by_component(name: str, drive: DriveChannel, *, file: object = None) -> dict[str, np.ndarray]:

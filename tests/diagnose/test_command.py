@@ -327,7 +327,7 @@ def test_a_drive_that_is_switched_between_two_rows_is_noted():
     steps = np.zeros((20, 3))
     steps[8:, 2] = 0.01
     (note,) = switched(recorded_drive("field", steps))
-    assert "after 0.7 s, and taken as a ramp of 100 ms" in note
+    assert "after 0.7 s: when is known to 100 ms only" in note
     noise = 1e-4 * np.random.default_rng(0).normal(size=(20, 3))
     assert switched(recorded_drive("field", steps + noise)) == [note]
     for calm in (np.sin(k), np.clip(0.2 * k - 1, 0, 1), 0.01 + noise[:, 0]):
