@@ -76,7 +76,7 @@ def with_prefix(value: float, unit: str) -> tuple[float, str]:
         factor, prefixed = with_prefix(1e3 * value, "g")
         return 1e3 * factor, prefixed
     first = unit.split("/")[0].split(" ")[0]
-    if first in ("1", "K", "kg") or "^" in first or not np.isfinite(value) or value == 0.0:
+    if first in ("1", "K", "kg", "SI") or "^" in first or not np.isfinite(value) or value == 0.0:
         return 1.0, unit  # nothing that takes a prefix, or a power of it
     prefixes = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
     exponent = int(np.clip(3 * np.floor(np.log10(abs(value)) / 3), -9, 9))

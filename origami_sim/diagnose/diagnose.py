@@ -28,6 +28,7 @@ from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.fit.predictor import Predictor
+from origami_sim.fit.recorder import recorder_noise
 from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
 from origami_sim.hypotheses.subject import Source, subject_of
 from origami_sim.hypotheses.suspects import suspects
@@ -166,7 +167,7 @@ def _diagnosed(
     errors = {key: rms for key, (rms, _) in zip(posterior.nodes, told, strict=True)}
     noted += [note for _, notes in told for note in notes]
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
-    noise = forward.blocks[0].noise
+    noise = recorder_noise(forward, best)
     scores = attempt(noted, "The screening cannot be shown", lambda: scored(posterior), [])
     shown = [s for s, _ in scores[:12] if np.any(s.norm > 0)]
     missed = float(sum(s.share for s in judged.budget) and base.cost)
