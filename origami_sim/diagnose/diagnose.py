@@ -107,8 +107,7 @@ def _diagnosed(
     if keep is not None:
         keep.follow(forward)
     compared = share_compared(forward)
-    frames = sum(len(r.times) for r in recordings)
-    noted = [f"{compared:.0%} of {frames:,} frames are compared.", *standing(forward), *noted]
+    noted = [f"{compared:.0%} of {valued(forward):,} frames are compared.", *standing(forward), *noted]
     listens = "Whether a drive listens to the device could not be told"
     loop = attempt(noted, listens, lambda: closed_loop(recordings), None)
     noted += [n for r in recordings for n in [*r.metadata.get("notes", []), *assumed(r, forward.drive)]]
@@ -287,8 +286,12 @@ def possible_of(source: Source) -> Possible:
 def share_compared(forward: Predictor) -> float:
     """Part of the frames with a value that are compared, or repeat one that is."""
     seen = sum(np.any(b.counted(), axis=1).sum() for b in forward.blocks)
-    whole = sum(np.any(np.isfinite(stacked(r)[0]), axis=1).sum() for r in forward.recordings)
-    return float(min(seen / max(whole, 1), 1.0))
+    return float(min(seen / max(valued(forward), 1), 1.0))
+
+
+def valued(forward: Predictor) -> int:
+    """How many frames of all recordings have a value."""
+    return sum(int(np.any(np.isfinite(stacked(r)[0]), axis=1).sum()) for r in forward.recordings)
 
 
 def standing(forward: Predictor) -> list[str]:

@@ -9,8 +9,10 @@ from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.errors import InputError
+from origami_sim.fit.nominal import nominal_fits
 from origami_sim.hypotheses.suspects import suspects
-from origami_sim.recording import Channel, NoiseReport, Recording
+from origami_sim.predict.shots import by_length
+from origami_sim.recording import Channel, DriveChannel, NoiseReport, Recording
 from tests.diagnose.strips import hanging, record, subject
 
 SMALL = {"duration": 4.0, "panels": 3, "rate": 100}
@@ -88,6 +90,30 @@ def test_wild_frames_are_left_out_and_told():
     ]  # fmt: skip
     curve = replace(made, metadata={"time_base": "step"})
     assert prepared([curve], 200.0)[0].channels["m"].values is values
+
+
+def test_frames_that_were_lost_are_frames_without_a_value():
+    """A few of them; a long pause stays one. A drive with a row per frame keeps its rows, and fits are the same."""
+    swing, lost = record(**SMALL), [57, 200, 201, 202, 301]
+    kept = np.delete(np.arange(len(swing.times)), [*lost, *range(310, 325)])
+    field = DriveChannel("field_z", np.arange(len(swing.times)) * 1e-9, "T", False)
+    made = replace(swing, drive={"field_z": field}).only(kept)
+    (found,) = prepared([made], 200.0)
+    whole = np.delete(np.arange(len(swing.times)), range(310, 325))
+    assert found.times == pytest.approx(swing.times[whole], abs=1e-12)
+    read = found.channels["fold1"].values
+    assert np.flatnonzero(np.isnan(read)).tolist() == lost
+    assert np.array_equal(read[~np.isnan(read)], made.channels["fold1"].values)
+    assert found.drive["field_z"].at(found.times) == pytest.approx(field.values[whole], abs=1e-18)
+    assert not np.any(np.diff(prepared([swing], 200.0)[0].times) - np.diff(swing.times)), "none was lost"
+    short = swing.only(np.delete(np.arange(len(swing.times)), lost))
+    found, groups = [], []
+    for recording in (short, *prepared([short], 200.0)):
+        forward, _ = arranged(subject(3), [recording], Options())
+        found.append(nominal_fits(forward)[1])
+        groups.append(len(by_length(forward.blocks, list(range(len(forward.blocks))))))
+    assert groups[1] == 2 < groups[0]
+    assert np.all(np.abs(found[1].theta - found[0].theta) < 0.1 * found[0].deviations())
 
 
 def test_a_segment_that_is_asked_for_has_a_start_of_its_own():
