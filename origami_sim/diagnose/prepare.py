@@ -97,8 +97,8 @@ def tamed(recording: Recording) -> Recording:
 def filled(recording: Recording) -> Recording:
     """The recording with frames that were lost here and there, as frames without a value.
 
-    Segments then have equal times, and are simulated together: with four frames lost in 900, in 0.4 of the time. Where a
-    segment's frames or more are lost in a row, time has a gap.
+    Segments then have equal times, and are simulated together: with four frames lost in 900, in 0.4 of the time. Where
+    as many frames as a segment has are lost in a row, time has a gap.
     """
     steps = np.diff(recording.times) / np.median(np.diff(recording.times))
     lost = np.round(steps).astype(int) - 1
