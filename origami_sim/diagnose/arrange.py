@@ -189,17 +189,11 @@ def rigid_rollouts(
     else:
         length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
         found = RigidRollouts(subject, recordings, segment=length, threads=o.threads, probe=probe)
-    notes = [
-        f"After {len(when)} switch{'es' * (len(when) > 1)} of a drive of '{recordings[r].name}', the first before "
-        f"{when[0]:.6g} s, the motion begins anew, from a start that is fitted: when is not known to within a frame."
-        for r, when in found.anew.items()
-        if when
-    ]
     if bent <= BENDING:
-        return found, notes if forced else [BENT.format(bent), *notes]
+        return found, found.notes if forced else [BENT.format(bent), *found.notes]
     # a recorder that averages over frames has more noise than neighbouring frames show
     noise = float(np.sqrt(np.mean((recorder_noise(found, nominal_fits(found)[1]) / found.blocks[0].noise) ** 2)))
-    return (found, [BENT.format(bent / noise), *notes]) if bent <= BENDING * noise else None
+    return (found, [BENT.format(bent / noise), *found.notes]) if bent <= BENDING * noise else None
 
 
 def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:

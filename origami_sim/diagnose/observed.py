@@ -189,9 +189,11 @@ def assumed(recording: Recording, drive: Drive) -> list[str]:
 
 
 def switched(recording: Recording) -> list[str]:
-    """A note on drives that were switched between two of their rows, so that it is not known when."""
-    notes = []
+    """A note on drives that were switched between two rows which do not tell when, to a tenth of a frame."""
+    notes, frame = [], float(np.median(np.diff(recording.times)))
     for name, (before, after) in switches(recording).items():
+        if np.max(after - before) < 0.1 * frame:
+            continue
         notes.append(
             f"The drive '{name}' of '{recording.name}' is switched between two rows, first after {before[0]:.6g} s: "
             f"when is known to {quantity(float(np.max(after - before)), 's')} only, and what is found as a lag or a "

@@ -213,9 +213,8 @@ def fit(
         """Goes on from better starts of segments, if there are any."""
         nonlocal best, local, line, level, before
         assert theta is not None and local is not None and line is not None
-        least = max(OWED, rough * best)
-        other, more = restarted(forward, hypothesis, theta, local, blocks, weights, line.residual, least)
-        if more < least:
+        other, more = restarted(forward, hypothesis, theta, local, blocks, weights, line.residual)
+        if more < max(OWED, rough * best):
             return False
         best, gaps, _, local = at(theta, other)
         line, level, before = derived(theta, local, None, gaps), ALL, np.inf

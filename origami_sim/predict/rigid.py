@@ -88,8 +88,8 @@ class RigidRollouts(Rollouts):
             as for `Rollouts`.
 
     Attributes:
-        anew: times [s] by recording at which a segment begins from a start of its own, as a drive was switched before
-            it and its log does not tell when to within a frame.
+        notes: on segments that begin from a start of their own, as a drive was switched before them and its log does
+            not tell when to within a frame.
 
     Raises:
         InputError: what rigid panels refuse; closed loops, a root that is held in part.
@@ -117,7 +117,7 @@ class RigidRollouts(Rollouts):
         self.blur = TOUCHING if len(self.model.contacts) else TOLERANCE
         self._moved: dict[tuple, tuple[Drive, Motion | None]] = {}  # a drive that is kept keeps its id
         self._films: Films = {}
-        self.anew: dict[int, list[float]] = {}
+        self.notes: list[str] = []
         self._beside: dict[int, Films] = {}  # of what was followed last beside the first world, by recording
         check_tree(self._tree, self.articulation)
         for index, recording in enumerate(self.recordings):
@@ -154,7 +154,11 @@ class RigidRollouts(Rollouts):
             # a force that is missing by chance changes rates, and coordinates by their integral
             reach = np.concatenate([usual * lasting / np.sqrt(3.0), usual])
             out[n] = replace(block, reach=None if after.first in anew else reach, lasting=lasting)
-        self.anew[index] = recording.times[anew[1:]].tolist()
+        if (count := len(anew) - 1) > 0:
+            self.notes.append(
+                f"'{recording.name}': the log does not tell within a frame when the drive was switched. After each of "
+                f"{count} switch{'es' * (count > 1)} the motion is compared from a start that is fitted."
+            )
         doubt = [k for last, first in unsure if first in anew for k in range(last + 1, first)]
         return [_without(block, np.isin(block.first + np.arange(len(block.times)), doubt)) for block in out]
 

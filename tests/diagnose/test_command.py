@@ -21,7 +21,7 @@ from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Prediction
 from origami_sim.hypotheses.subject import spreads
 from origami_sim.predict import cache
-from origami_sim.recording import read_recording
+from origami_sim.recording import Channel, DriveChannel, Recording, read_recording
 from origami_sim.report.page import read_report
 from origami_sim.report.patch import Addition, additions, switched_on, write_patch
 from origami_sim.results.run_folder import load_run
@@ -286,7 +286,6 @@ def test_a_drive_on_its_own_clock_reaches_the_model():
     """Samples between the frames are kept, also where the recording is thinned and starts later than the drive."""
     from origami_sim.diagnose.prepare import thinned
     from origami_sim.predict.drives import drive_of
-    from origami_sim.recording import Channel, DriveChannel, Recording
 
     times = 2.0 + np.arange(40) / 20.0
     clock = np.linspace(1.5, 4.5, 301)
@@ -328,6 +327,10 @@ def test_a_drive_that_is_switched_between_two_rows_is_noted():
     steps[8:, 2] = 0.01
     (note,) = switched(recorded_drive("field", steps))
     assert "after 0.7 s: when is known to 100 ms only" in note
+    fine = DriveChannel("field", steps[[0, 7, 8, 19]], "T", False, times=np.array([0.0, 0.799, 0.8, 1.9]))
+    logged = recorded_drive("field", steps)
+    logged.drive["field"] = fine
+    assert switched(logged) == [], "to a hundredth of a frame"
     noise = 1e-4 * np.random.default_rng(0).normal(size=(20, 3))
     assert switched(recorded_drive("field", steps + noise)) == [note]
     for calm in (np.sin(k), np.clip(0.2 * k - 1, 0, 1), 0.01 + noise[:, 0]):

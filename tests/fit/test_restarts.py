@@ -9,7 +9,7 @@ import pytest
 import origami_sim.fit.least_squares as least_squares
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.predictor import Block, Prediction
-from origami_sim.fit.restarts import _best
+from origami_sim.fit.restarts import best_of_each
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 
@@ -88,7 +88,7 @@ def test_segments_begin_where_those_before_lead_past_a_bounce(monkeypatch):
 def test_the_best_combination_of_starts_is_that_of_all():
     """Against all 3^5 combinations of three candidates of five segments, one pair of which is not tied."""
     rng = np.random.default_rng(1)
-    blocks, tied, reach = range(5), [True, True, False, True, False], [np.array([0.3, 2.0])] * 5
+    tied, reach = [True, True, False, True, False], np.tile([0.3, 2.0], (5, 1))
     starts, ends = rng.normal(size=(2, 3, 5, 2))
     costs = rng.chisquare(3, size=(3, 5))
     costs[1, 2], ends[2, 0] = np.inf, np.nan  # of which no motion can be simulated
@@ -100,6 +100,6 @@ def test_the_best_combination_of_starts_is_that_of_all():
         return float(np.nan_to_num(out, nan=np.inf))
 
     best = min(product(range(3), repeat=5), key=squares)
-    found, least = _best(blocks, tied, reach, list(starts), list(costs), list(ends))
+    found, least = best_of_each(tied, reach, starts, costs, ends)
     assert least == pytest.approx(squares(best), rel=1e-12)
-    assert np.array_equal(found, starts[list(best), range(5)])
+    assert found.tolist() == list(best)

@@ -50,7 +50,7 @@ def test_segments_begin_anew_after_switches_that_are_logged_with_the_frames(monk
     forward, notes = arrange(recorded())
     begins = {b.first for b in forward.blocks}
     after = np.ceil(SWITCHED * RATE).astype(int)
-    assert begins >= set(after.tolist()) and any("After 6 switches" in n for n in notes)
+    assert begins >= set(after.tolist()) and any("each of 6 switches" in n for n in notes)
     assert {b.first + len(b.times) for b in forward.blocks if b.reach is None} == {*after.tolist(), 301}
     count = sum(b.seen().sum() for b in forward.blocks)
     _, base, weights = nominal_fits(forward)
