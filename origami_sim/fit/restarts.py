@@ -56,7 +56,7 @@ def restarted(
         arrived = np.full_like(present, np.nan)
         arrived[1:] = ends[-1][:-1]
         apart = np.sum(((arrived - present)[1:] / reach[:-1]) ** 2, axis=1)
-        some = 1 + np.flatnonzero(apart > 1.0)  # nan is not
+        some = (1 + np.flatnonzero(apart > 1.0)).tolist()  # nan is not
         if not len(some):
             break
         cost, end = np.full(len(blocks), np.inf), np.full_like(present, np.nan)
