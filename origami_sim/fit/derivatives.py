@@ -186,12 +186,23 @@ def changed(
 
 
 def residuals(
-    forward: Predictor, hypothesis: Hypothesis, theta: np.ndarray, local: np.ndarray, blocks, weights: Weights
+    forward: Predictor,
+    hypothesis: Hypothesis,
+    theta: np.ndarray,
+    local: np.ndarray,
+    blocks: Sequence[int],
+    weights: Weights,
+    among: Sequence[int] | None = None,
 ) -> list[np.ndarray]:
-    """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed."""
+    """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed.
+
+    Args:
+        among: blocks to which these are tied (default: to each other).
+    """
     shot = forward.shoot(hypothesis, theta[None], local[None], blocks)
-    out, every = [], [forward.blocks[b] for b in blocks]
-    rows = [block.rows(*link) for block, link in zip(every, links(forward, blocks), strict=True)]
+    out, every, among = [], [forward.blocks[b] for b in blocks], among or blocks
+    tied = dict(zip(among, links(forward, among), strict=True))
+    rows = [block.rows(*tied[b]) for b, block in zip(blocks, every, strict=True)]
     gaps = [np.where(b.seen(), b.values - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
     white = whitened(weights, gaps, rows)
     for b, block, own, gap, data, ends in zip(blocks, every, rows, gaps, white, shot.ends, strict=True):

@@ -1,7 +1,7 @@
 """What a hypothesis predicts for recordings: the protocol that rollouts of bars, of rigid panels, and curves share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from typing import Protocol
@@ -77,6 +77,11 @@ class Block:
     def seen(self) -> np.ndarray:
         """[n, D] which values were measured."""
         return np.isfinite(self.values)
+
+    def without(self, frames: np.ndarray) -> "Block":
+        """The same, of which some frames (n,) are not compared."""
+        repeats = None if self.repeats is None else np.where(frames[:, None], False, self.repeats)
+        return replace(self, values=np.where(frames[:, None], np.nan, self.values), repeats=repeats)
 
     def counted(self) -> np.ndarray:
         """[n, D] which values were measured, with those that repeat one."""

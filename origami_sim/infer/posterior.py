@@ -74,8 +74,8 @@ class Posterior:
             posterior, not normalised; total: over all cells. estimates: of sets that were not fitted. failed: why a fit
             was not possible.
         ranked: single effects, those first that promise most to the model without any. hoped: what sets that were
-            fitted had promised, by their labels. gains: by how much they were better, by the fit that the promise is
-            about.
+            fitted had promised, by their labels. gains: by how much single effects, and what adds to the model
+            without any, were better than that had promised.
         promise: log posterior that sets which were not fitted may have. weights: of the signatures.
         store: whether nodes keep their problems, to be judged anew (`stored`). smooth: of all nodes, see `cosines`.
         ahead: sets that were fitted and of which a larger one promises more: what, and how. renewed: sets that
@@ -83,9 +83,8 @@ class Posterior:
             which single effects are fitted, where those are not linear about the refitted model. reconsidered: whether
             all were tried over their ranges. swapped: by how much single effects were better than they promised in
             the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
-            as estimated and as fitted, by that fit. reached: likewise, from estimates to promises, and to what fits
-            came. rough: whether fits end in many basins, see `basins`. futile: sets that were fitted since one took the
-            lead.
+            by that fit: as estimated, as promised, and as fitted. rough: whether fits end in many basins, see `basins`.
+            futile: sets that were fitted since one took the lead.
     """
 
     signatures: list[Signature]
@@ -97,7 +96,7 @@ class Posterior:
     estimates: dict[Key, Estimate] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
     ranked: dict[Key, float] = field(default_factory=dict)
-    gains: dict[Key, list[float]] = field(default_factory=dict)
+    gains: list[float] = field(default_factory=list)
     hoped: dict[tuple[str, ...], float] = field(default_factory=dict)
     promise: dict[Key, float] = field(default_factory=dict)
     store: bool = False
@@ -108,8 +107,7 @@ class Posterior:
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
     swapped: list[float] = field(default_factory=list)
-    realised: dict[Key, list[tuple[float, float]]] = field(default_factory=dict)
-    reached: dict[Key, list[tuple[float, float]]] = field(default_factory=dict)
+    realised: dict[Key, list[tuple[float, float, float]]] = field(default_factory=dict)
     rough: bool = False
     futile: int = 0
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
@@ -120,7 +118,7 @@ class Posterior:
         A set that was not fitted is as probable as its estimate, of whose gain that part counts which others realised
         that were estimated by the same fit: what is linear errs in proportion to how far it goes.
         """
-        part = {k: realised_part(pairs) for k, pairs in self.realised.items()}
+        part = {k: realised_part([(e, f) for e, _, f in each]) for k, each in self.realised.items()}
         log = {k: self.total[k] for k in (self.total if among is None else among)}
         for k, e in self.estimates.items():
             if k in log:

@@ -58,7 +58,8 @@ def _most(out: Posterior, key: Key) -> float:
     thought, promise = out.total[key], out.promised(key)
     if not np.isfinite(thought):
         return promise
-    return thought + most_reached(out.reached.get(out.estimates[key].parent, []), promise - thought)
+    before = out.realised.get(out.estimates[key].parent, [])
+    return thought + most_reached([(p - e, f - e) for e, p, f in before], promise - thought)
 
 
 def _idle(out: Posterior, key: Key) -> bool:
@@ -110,7 +111,7 @@ def _alone(out: Posterior) -> Key | None:
     best set, there is no need to know more.
     """
     best = max(out.total, key=lambda k: out.total[k])
-    near, bonus = out.total[best] + np.log(UNFITTED), most_gained(out.gains.get(frozenset(), []))
+    near, bonus = out.total[best] + np.log(UNFITTED), most_gained(out.gains)
     known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
     singles = [k for k, p in out.ranked.items() if k in out.estimates and p + bonus >= near][:LEADING]
     singles = [k for k in singles if not known & out.effects(k)]
@@ -202,7 +203,7 @@ def _better_half(out: Posterior) -> Key | None:
     """
     best = max(named(out), key=lambda k: out.total[k])
     key = max((best - {n} for n in best), key=lambda k: out.total.get(k, -np.inf), default=best)
-    off = max((abs(fitted - thought) for pairs in out.realised.values() for thought, fitted in pairs), default=0.0)
+    off = max((abs(f - e) for each in out.realised.values() for e, _, f in each), default=0.0)
     needed = len(best) != 2 or key not in out.estimates or out.total[key] + off < out.total[best] + np.log(UNFITTED)
     return None if needed else key
 

@@ -220,13 +220,11 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
         out.drop(key)
         return
     _add(out, forward, key, fitted, log_priors(out.signatures))
-    out.gains.setdefault(estimate.parent, []).append(out.total[key] - promise)
-    if estimate.parent and key in out.ranked:  # what the model without any had promised of it
-        out.gains.setdefault(frozenset(), []).append(out.total[key] - out.ranked[key])
-    came = out.total[key] - estimated
-    out.realised.setdefault(estimate.parent, []).append((estimate.gain, estimate.gain + came))
-    if np.isfinite(came):
-        out.reached.setdefault(estimate.parent, []).append((promise - estimated, came))
+    if not estimate.parent or key in out.ranked:  # what the model without any had promised of it
+        out.gains.append(out.total[key] - (out.ranked[key] if estimate.parent else promise))
+    if np.isfinite(estimated):
+        over = np.array([estimated, promise, out.total[key]]) - (estimated - estimate.gain)
+        out.realised.setdefault(estimate.parent, []).append(tuple(over.tolist()))
     if swapped is not None:
         out.swapped.append(out.total[key] - swapped)
     _without_idle_branches(out, forward, key)

@@ -79,10 +79,7 @@ class BarRollouts(Rollouts):
 
     def segment(self, index: int, first: int, frames: int) -> Block:
         block = super().segment(index, first, frames)
-        early = np.arange(len(block.times)) < self._calm_frames(self.recordings[index], frames)
-        values, repeats = np.array(block.values), np.array(block.repeats)
-        values[early], repeats[early] = np.nan, False
-        return replace(block, values=values, repeats=repeats)
+        return block.without(np.arange(len(block.times)) < self._calm_frames(self.recordings[index], frames))
 
     def _cuts(self, worlds: int, count: int) -> list[slice]:
         """Of a recording that is one segment, or a few, parts of the worlds, so that all cores have some."""

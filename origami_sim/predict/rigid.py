@@ -160,7 +160,7 @@ class RigidRollouts(Rollouts):
                 f"{count} switch{'es' * (count > 1)} the motion is compared from a start that is fitted."
             )
         doubt = [k for last, first in unsure if first in anew for k in range(last + 1, first)]
-        return [_without(block, np.isin(block.first + np.arange(len(block.times)), doubt)) for block in out]
+        return [b.without(np.isin(b.first + np.arange(len(b.times)), doubt)) for b in out] if doubt else out
 
     def world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> World:
         """See `Worlds.world`.
@@ -319,17 +319,6 @@ class RigidRollouts(Rollouts):
             out[: arm.size, at] = arm.shift_between(base.select(b), pose)
             out[arm.size :, at] = own.rates_of(pose, state.x[:, at], state.v[:, at]) - rates[:, b]
         return out
-
-
-def _without(block: Block, frames: np.ndarray) -> Block:
-    """A segment of which some frames (n,) are not compared."""
-    if not np.any(frames):
-        return block
-    values, repeats = np.array(block.values), None if block.repeats is None else np.array(block.repeats)
-    values[frames] = np.nan
-    if repeats is not None:
-        repeats[frames] = False
-    return replace(block, values=values, repeats=repeats)
 
 
 def check_tree(tree: Topology, arm: Articulation) -> None:

@@ -32,19 +32,7 @@ def posterior(fitted: dict[Key, float], estimated: dict[Key, float]) -> Posterio
         SimpleNamespace(suspect=SimpleNamespace(strengths=(f,)), size=np.ones(1)) for f in frees.values()
     ]
     more["suspect"] = lambda n: SimpleNamespace(effect=str(n))
-    own = (
-        "nodes",
-        "estimates",
-        "promise",
-        "total",
-        "gains",
-        "realised",
-        "reached",
-        "hoped",
-        "ranked",
-        "swapped",
-        "begun",
-    )
+    own = ("nodes", "estimates", "promise", "total", "gains", "realised", "hoped", "ranked", "swapped", "begun")
     return cast(Posterior, SimpleNamespace(**{n: getattr(out, n) for n in own}, **more))
 
 

@@ -151,7 +151,7 @@ def test_many_laws_are_not_named_but_the_few_that_explain_most(left, word):
     """Three laws are 1500 more probable (in the logarithm) than two of them; those are named if they explain most."""
     three = ("air_drag", "crease_friction", "crease_softness")
     p = posterior({three: 0.0, three[:2]: -1500.0, three[1:]: -1520.0, three[:1]: -1600.0, (): -2000.0})
-    p.realised = {frozenset(): [(5.0, 2.0)]}
+    p.realised = {frozenset(): [(5.0, 7.0, 2.0)]}
     shares = [Share("", "effect", 1.0 - left), Share("", "rest", left)]
     decided = decide(p, lambda key: Budget(shares, 1.0 + 10.0 * left, beyond=1.0 - left))
     assert decided.word == word and decided.lead == set(three[:2])
@@ -167,8 +167,8 @@ def test_weak_estimates_stay_as_probable_though_a_strong_one_was_too_high():
         p.estimates[key] = Estimate(frozenset(), (), np.zeros(0), (1, 0.0), gain)
     drag, clock = p.estimates
     before = p.probabilities()
-    p.realised = {frozenset(): [(20.0, 5.0), (4.0, -9.0)]}
-    assert realised_part(p.realised[frozenset()]) == pytest.approx(100.0 / 416.0)
+    p.realised = {frozenset(): [(20.0, 30.0, 5.0), (4.0, 6.0, -9.0)]}
+    assert realised_part([(20.0, 5.0), (4.0, -9.0)]) == pytest.approx(100.0 / 416.0)
     after = p.probabilities()
     assert after[clock] / after[frozenset()] == pytest.approx(before[clock] / before[frozenset()])
     lost = np.log(before[drag] / before[frozenset()]) - np.log(after[drag] / after[frozenset()])

@@ -54,11 +54,11 @@ def test_segments_begin_anew_after_switches_that_are_logged_with_the_frames(monk
     assert {b.first + len(b.times) for b in forward.blocks if b.reach is None} == {*after.tolist(), 301}
     count = sum(b.seen().sum() for b in forward.blocks)
     _, base, weights = nominal_fits(forward)
-    assert count == 301 and weights.deviation[0] == pytest.approx(NOISE, rel=0.1)
+    assert count == 301 and weights.deviation[0] == pytest.approx(NOISE, rel=0.05)
     monkeypatch.setattr("origami_sim.predict.rigid.switched_between", lambda recording: [])
     _, other, blurred = nominal_fits(arrange(recorded())[0])
-    assert blurred.deviation[0] > 10.0 * weights.deviation[0]
-    assert base.theta == pytest.approx([1.0, 1.0], abs=0.01) and other.theta[1] < 0.95
+    assert blurred.deviation[0] > 20.0 * weights.deviation[0]
+    assert base.theta == pytest.approx([1.0, 1.0], abs=2e-3) and other.theta[1] < 0.91
 
 
 def test_frames_between_rows_of_a_slow_log_are_not_compared():
