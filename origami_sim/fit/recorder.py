@@ -53,6 +53,7 @@ def recorder_weights(forward: Predictor, f: Fit) -> list[Weights]:
         level = np.sqrt(np.nanmean(np.concatenate(rough) ** 2, axis=0)) if rough else noise
         return [of(own.deviation), of(np.maximum(np.nan_to_num(level), noise))]
     whole = np.concatenate(joined(forward, f))  # one recorder: what recordings leave follows on each other
+    whole = whole[np.isfinite(whole).any(axis=1)]  # a lost frame would part a spectrum, as a long gap does
     times = float(np.median(np.diff(forward.blocks[0].times))) * np.arange(len(whole))
     found = shared([partial(infer, times, column, stated=float(n)) for column, n in zip(whole.T, noise, strict=True)])
     level = np.maximum([n.deviation for n in found], noise)

@@ -39,8 +39,8 @@ def restarted(
     Args:
         residual: at the present starts.
     """
-    tied, size = np.array([after for _, after in links(forward, blocks)]), local.shape[1]
-    if not np.any(tied):
+    tied, size = [after for _, after in links(forward, blocks)], local.shape[1]
+    if not any(tied):
         return local, 0.0
     every = np.array(blocks)
     reach = np.array([weights.gap * r if (r := forward.blocks[b].reach) is not None else np.ones(size) for b in blocks])

@@ -30,3 +30,14 @@ def test_all_recordings_tell_the_level_of_a_smoothing_tracker():
         assert all(w.colour[0][1] > 0.3 for w in found)
         error[n] = np.abs(np.mean([w.deviation[0] for w in found]) - 1.0)
     assert error[4] < 0.05 and error[4] < 0.3 * error[1]
+
+
+def test_a_lost_frame_parts_no_spectrum():
+    """Frames without a value are passed over: what is told is what the others tell without them."""
+    forward, f = left_over(3, 4)
+    lost = [np.delete(r, 70, axis=0) for r in f.residuals]
+    shorter = SimpleNamespace(weights=f.weights, blocks=f.blocks, residuals=lost)
+    for r in f.residuals:
+        r[70] = np.nan
+    one, other = (recorder_weights(forward, fit)[1] for fit in (f, shorter))
+    assert np.array_equal(one.deviation, other.deviation) and np.array_equal(one.colour[0], other.colour[0])
