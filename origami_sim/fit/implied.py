@@ -31,20 +31,25 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Wei
     follow from white noise and gaps of every size, those that suit other hypotheses (`known`) and the fit's own are
     tried. All are compared by derivatives; in the most probable ones the fit goes on by them, as far as its steps come
     true: what they promise beyond that counts for nothing. A fit that ended in coloured noise of its own goes on in it.
+    Where promises do not come true, as with small gaps beside impacts, larger gaps are tried as well.
     """
     assert f.weights is not None
     found = implied(forward, f, hyper, (f.weights, *known) if f.weights.colour else known)
+    larger = [gap for gap in hyper.gaps if gap > max(noise.gap for _, noise in found)] if _tied(f) else []
     best, most, tried = (f, 0.0), -np.inf, list[tuple[float, float]]()
-    for log, noise in sorted(found, key=lambda each: -each[0]):
-        if log <= most:
-            break
-        if any(noise.gap == gap and other - log < OWED for other, gap in tried):
-            continue  # the same noise, reached from elsewhere
-        tried.append((log, noise.gap))
-        one, owed = settled(forward, f.reweighted(noise))
-        if (log := log_evidence(one) - 0.5 * owed) > most:
-            best, most = (one, owed), log
-    return best
+    while True:
+        for log, noise in sorted(found, key=lambda each: -each[0]):
+            if log <= most:
+                break
+            if any(noise.gap == gap and other - log < OWED for other, gap in tried):
+                continue  # the same noise, reached from elsewhere
+            tried.append((log, noise.gap))
+            one, owed = settled(forward, f.reweighted(noise))
+            if (log := log_evidence(one) - 0.5 * owed) > most:
+                best, most = (one, owed), log
+        if best[1] < OWED or not larger:
+            return best
+        found = _all_climbed(forward, f, [(white(forward, f.weights.deviation, larger.pop(0)), (False, True))])
 
 
 def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] = ()) -> list[tuple[float, Weights]]:
@@ -56,7 +61,7 @@ def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] =
     others = [(noise, (True,)) for noise in known]
     if f.exact and f.weights.colour:
         return _all_climbed(forward, f, others)
-    sizes = hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
+    sizes = hyper.gaps if _tied(f) else (f.weights.gap,)
     place = int(np.argmax(shared([partial(log_evidence, f, gap) for gap in sizes])))
     fits: dict[int, tuple[float, Weights]] = {}
     out: list[tuple[float, Weights]] = []
@@ -71,6 +76,12 @@ def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] =
         if best == place:
             return [*fits.values(), *out]
         place = best
+
+
+def _tied(f: Fit) -> bool:
+    """Whether a fit has segments that are tied to the next."""
+    assert f.linear is not None
+    return any(t is not None for t in f.linear.tie)
 
 
 def _all_climbed(
