@@ -165,7 +165,7 @@ def _judge(
         apart = len(out.effects(key) ^ here), len(key ^ node.key)
         if len(key) == 1 or (len(key) == own and len(key - node.key) == 1):
             node.instead[key] = totals[n]
-        if key in out.nodes and key and key < node.key and (key, node.key) not in out.renewed and n in values:
+        if key in out.nodes and key < node.key and (key, node.key) not in out.renewed and n in values:
             known, _ = out.ahead.get(key, (out.total[key] + OWED, None))
             if totals[n] > known:  # its own fit ended early
                 out.ahead[key] = totals[n], Estimate(node.key, sets[n], values[n], (*apart, 0.0), float(gains[n]))
