@@ -164,15 +164,18 @@ def _analogous(out: Posterior) -> Key | None:
 
 
 def _equivalent(out: Posterior) -> Key | None:
-    """A set to fit with another effect for one of the best's, if the refitted model cannot tell them in its noise.
+    """A set to fit with another effect for one of the best's, if it does the same to the refitted model.
 
     A late drive and a late clock do the same to what rests at first. About the refitted model this shows; where a clock
-    is 12 ms late already, a drive that is just beginning to be does something else.
+    is 12 ms late already, a drive that is just beginning to be does something else. Alike is what the noise of the best
+    does not tell apart: in what the refitted model leaves, far more would be.
     """
     none, best = out.nodes[frozenset()], out.nodes[max(named(out), key=lambda k: out.total[k])]
     fitted, lost, bound = {out.effects(k) for k in out.nodes}, {}, -2.0 * np.log(UNFITTED)
     place, cell = dict(zip(none.others, none.groups, strict=True)), none.grid[0]
     values = dict(zip(map(id, best.fit.free), best.fit.theta, strict=True))
+    noise, coarse = best.fit.weights, none.fit.weights
+    finer = 1.0 if noise is None or coarse is None else float(np.min(coarse.deviation / noise.deviation)) ** 2
     for n in best.key & place.keys():
         one, columns = out.signatures[n], list(place[n].columns)
         change = np.array([values.get(id(f), f.start) - f.start for f in one.suspect.strengths]) / one.size
@@ -180,9 +183,10 @@ def _equivalent(out: Posterior) -> Key | None:
             key, its = (best.key - {n}) | {other}, list(group.columns)
             if cell is None or other in best.key or key not in out.estimates or out.effects(key) in fitted:
                 continue
-            does, alike = (cell.gram[rows][:, columns] @ change for rows in (columns, its))
+            does, alike = (finer * cell.gram[rows][:, columns] @ change for rows in (columns, its))
             if change @ does > bound:  # else it does not see it at all
-                lost[key] = change @ does - alike @ np.linalg.lstsq(cell.gram[its][:, its], alike, rcond=1e-12)[0]
+                same = np.linalg.lstsq(finer * cell.gram[its][:, its], alike, rcond=1e-12)[0]
+                lost[key] = change @ does - alike @ same
     return min((k for k in lost if lost[k] < bound), key=lambda k: lost[k], default=None)
 
 
