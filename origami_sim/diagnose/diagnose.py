@@ -11,7 +11,7 @@ from scipy.linalg import orth
 from threadpoolctl import threadpool_limits
 
 from origami_sim.device.scene import scene_module
-from origami_sim.diagnose.arrange import arranged
+from origami_sim.diagnose.arrange import arranged, shortened
 from origami_sim.diagnose.axes import mistaken
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.closed_loop import closed_loop
@@ -121,6 +121,11 @@ def _diagnosed(
     wrong = attempt(noted, unclear, lambda: mistaken(subject, recordings, o, forward), None)
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
+    if (finer := shortened(forward, base, o)) is not None:
+        forward = finer
+        if keep is not None:
+            keep.follow(forward)
+        given, base, weights = nominal_fits(forward)
     base, rough = settled(forward, base)
     weights = level(forward, base) if rough else weights
     lap("nominal")

@@ -112,6 +112,7 @@ class Predictor(Protocol):
         nudge: steps of derivatives, as a part of changes that are noticeable. blur: error of the solver's own [rad, m].
         curve: whether these are load steps or slow loads, each of which has an equilibrium.
         prescribed: whether the motion is.
+        abrupt: whether segments are short, as what is missing acts within a few frames.
     """
 
     subject: Subject
@@ -131,6 +132,7 @@ class Predictor(Protocol):
     blur: float
     curve: bool
     prescribed: bool
+    abrupt: bool
     threads: int | None
 
     def shoot(

@@ -15,7 +15,7 @@ from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
 from origami_sim.fit.implied import OwnColumns, log_evidence, with_own_noise
 from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed
-from origami_sim.fit.nominal import level
+from origami_sim.fit.nominal import level, loosened
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
@@ -32,6 +32,7 @@ from origami_sim.infer.proposals import ROUGH, UNFITTED, in_place_of, named, pro
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
+from origami_sim.infer.words import pooled
 
 FITS = 16
 """Sets that are fitted at most since one took the lead for which the one before is not worth a fit (`UNFITTED`).
@@ -259,9 +260,22 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     """
     if f.failed:
         return f
+    if forward.abrupt and pooled(f.rms() / forward.blocks[0].noise) > FAR:
+        f = loosened(forward, f)
     known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
     own, _ = with_own_noise(forward, f, out.hyper, known)
     return own if (on := _to_the_end(forward, own)).failed else on
+
+
+def _tightened(out: Posterior, forward: Predictor, f: Fit) -> Fit:
+    """A fit in tighter ties, if they would be more probable and it comes to there: by a fit, not by derivatives."""
+    assert f.weights is not None
+    tighter = [gap for gap in out.hyper.gaps if forward.abrupt and gap < f.weights.gap]
+    promise, gap = max(((log_evidence(f, gap), gap) for gap in tighter), default=(-np.inf, 0.0))
+    if promise < log_evidence(f) + OWED:
+        return f
+    on = _to_the_end(forward, carried_on(forward, f.reweighted(replace(f.weights, gap=gap))))
+    return f if on.failed or log_evidence(on) < log_evidence(f) + OWED else on
 
 
 def _to_the_end(forward: Predictor, f: Fit) -> Fit:
@@ -324,7 +338,7 @@ def polished(out: Posterior, forward: Predictor) -> bool:
             return some
         key = max(leaders, key=lambda k: reach[k])
         before, now = out.total[key], out.nodes[key].fit
-        f = _to_the_end(forward, now)
+        f = _to_the_end(forward, _tightened(out, forward, now))
         if f is not now:
             some = True
             if not f.failed:

@@ -162,6 +162,15 @@ class RigidRollouts(Rollouts):
         doubt = [k for last, first in unsure if first in anew for k in range(last + 1, first)]
         return [b.without(np.isin(b.first + np.arange(len(b.times)), doubt)) for b in out] if doubt else out
 
+    def abruptly(self) -> "RigidRollouts":
+        """The same with segments as short as tells a start, and gaps as the same chance forces make them."""
+        out = RigidRollouts(self.subject, self.recordings, segment=0.0, threads=self.threads, probe=self)
+        out.abrupt, longest = True, max(b.lasting for b in self.blocks)
+        for n, b in enumerate(out.blocks):
+            if b.reach is not None:
+                out.blocks[n] = replace(b, reach=b.reach * np.sqrt(b.lasting / longest))
+        return out
+
     def world(self, hypothesis: Hypothesis, values: np.ndarray, effects: Sequence[str]) -> World:
         """See `Worlds.world`.
 

@@ -34,7 +34,7 @@ class Worlds(ABC):
         subject: how to build the model. recordings: of one object. threads: see `Batch`.
     """
 
-    nudge, blur, prescribed = 0.01, 0.0, False
+    nudge, blur, prescribed, abrupt = 0.01, 0.0, False, False
 
     def __init__(self, subject: Subject, recordings: Sequence[Recording], threads: int | None = None):
         self.subject, self.recordings, self.threads = subject, list(recordings), threads

@@ -5,14 +5,14 @@ import pytest
 from strips import record, subject
 
 from origami_sim.diagnose import Options, diagnose
-from origami_sim.diagnose.arrange import arranged
+from origami_sim.diagnose.arrange import arranged, shortened
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.effects import CATALOGUE
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.nominal import nominal_fits
+from origami_sim.fit.nominal import level, loosened, nominal_fits
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
-from origami_sim.infer.scan import over_shapes
+from origami_sim.infer.scan import over_shapes, scanned
 
 SWING = {"duration": 4.0, "panels": 2, "rate": 100}
 STOP = 0.45
@@ -59,3 +59,53 @@ def test_a_stiff_stop_is_found_from_a_soft_one_that_acts_earlier(stopped):
     assert angle == pytest.approx(-STOP, abs=0.03) and 1e-3 < stiffness < 1e-2  # from 2e-4, beside other thresholds
     there = fit(forward, Hypothesis((contact,)), weights, theta=found[0], local=base.local)
     assert there.theta[-1] == pytest.approx(-STOP, abs=0.02) and there.cost < f.cost - found[1]
+
+
+HARD = 0.05
+
+
+@pytest.fixture(scope="module")
+def bounced():
+    """A panel that bounces off a stop 250 times as stiff as its crease, within one or two frames."""
+    effects = {"crease_contact": {"contact_stiffness": (HARD, None), "contact_angle": (-STOP, None)}}
+    return record(effects, **SWING | {"duration": 3.0})
+
+
+def test_segments_are_short_where_something_acts_within_a_few_frames(bounced):
+    for recording, short in ((bounced, True), (record(**SWING), False)):
+        forward, _ = arranged(subject(2), prepared([recording], 200.0), Options())
+        finer = shortened(forward, nominal_fits(forward)[1], Options())
+        assert (finer is not None) == short
+        if finer is not None:
+            assert (
+                finer.abrupt and {len(b.times) for b in finer.blocks[:-1]} == {8} and len(forward.blocks[0].times) > 30
+            )
+            longest = max(b.lasting for b in forward.blocks)
+            for b in finer.blocks[:-1]:  # by chance forces a rate changes as the root of time
+                usual = forward.readings.usual_rates(0)  # type: ignore[attr-defined]
+                assert b.reach[len(usual) :] == pytest.approx(usual * np.sqrt(b.lasting / longest), rel=1e-12)
+
+
+def test_a_hard_stop_is_found_with_loose_ties_from_where_a_fit_is_stuck(bounced):
+    forward, _ = arranged(subject(2), prepared([bounced], 200.0), Options())
+    forward = shortened(forward, nominal_fits(forward)[1], Options())
+    assert forward is not None
+    _, base, _ = nominal_fits(forward)
+    every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive, forward.parameters))
+    contact = [s for s in every if s.effect == "crease_contact" and s.free[1].start < 0.0][1]
+    by = level(forward, base)
+    begin = scanned(forward, Hypothesis((contact,)), by, base.local, None)
+    stuck = fit(forward, Hypothesis((contact,)), by, theta=begin, local=base.local)
+    assert stuck.theta[-2] < 0.3 * HARD and abs(stuck.theta[-1] + STOP) > 0.03
+    found = loosened(forward, stuck)
+    assert found.theta[-2] == pytest.approx(HARD, rel=0.1) and found.theta[-1] == pytest.approx(-STOP, abs=2e-3)
+
+
+def test_a_hard_stop_is_named_with_intervals_that_cover(bounced):
+    few = ["crease_contact", "crease_stop", "crease_stiffening", "crease_asymmetry", "air_drag"]
+    found = diagnose(subject(2), bounced, Options(threads=1), catalogue=few)
+    assert found.verdict == "MECHANISM" and found.chosen == ["crease_contact at crease 0"], found.sentence
+    numbers = {n.label: n for n in found.candidates[0].numbers}
+    for name, true in (("contact_stiffness", HARD), ("contact_angle", -STOP)):
+        number = numbers[f"crease_contact.{name}"]
+        assert number.low < true < number.high and number.value == pytest.approx(true, rel=0.2)

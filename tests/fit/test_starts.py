@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from origami_sim.diagnose import Subject
-from origami_sim.diagnose.arrange import starting, steady
+from origami_sim.diagnose.arrange import steady
+from origami_sim.predict.at_rest import starting
 from origami_sim.diagnose.menu import menu
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
