@@ -7,7 +7,6 @@ import pytest
 
 from origami_sim.diagnose import Subject
 from origami_sim.diagnose.arrange import steady
-from origami_sim.predict.at_rest import starting
 from origami_sim.diagnose.menu import menu
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
@@ -15,6 +14,7 @@ from origami_sim.drive.starts import shifted
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Parameters
+from origami_sim.predict.at_rest import starting
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.drives import reaching, refined
 from origami_sim.predict.measured import lateness
