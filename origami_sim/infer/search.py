@@ -267,17 +267,6 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     return own if (on := _to_the_end(forward, own)).failed else on
 
 
-def _tightened(out: Posterior, forward: Predictor, f: Fit) -> Fit:
-    """A fit in tighter ties, if they would be more probable and it comes to there: by a fit, not by derivatives."""
-    assert f.weights is not None
-    tighter = [gap for gap in out.hyper.gaps if forward.abrupt and gap < f.weights.gap]
-    promise, gap = max(((log_evidence(f, gap), gap) for gap in tighter), default=(-np.inf, 0.0))
-    if promise < log_evidence(f) + OWED:
-        return f
-    on = _to_the_end(forward, carried_on(forward, f.reweighted(replace(f.weights, gap=gap))))
-    return f if on.failed or log_evidence(on) < log_evidence(f) + OWED else on
-
-
 def _to_the_end(forward: Predictor, f: Fit) -> Fit:
     """A fit carried on by derivatives that are taken where it is, until these promise nothing."""
     f = f if f.exact else renewed(forward, f)
@@ -338,7 +327,7 @@ def polished(out: Posterior, forward: Predictor) -> bool:
             return some
         key = max(leaders, key=lambda k: reach[k])
         before, now = out.total[key], out.nodes[key].fit
-        f = _to_the_end(forward, _tightened(out, forward, now))
+        f = _to_the_end(forward, now)
         if f is not now:
             some = True
             if not f.failed:

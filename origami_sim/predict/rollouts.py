@@ -275,9 +275,7 @@ class Rollouts(Worlds, ABC):
         if arrived is not None:
             near = arrived[..., columns]
             tied = (interpolated(near, longer[:, mine].ravel(), step) if clocked else near[0]).reshape(-1, k, count)
-        # as stored ones lie in memory: sums depend on it in their last digit
-        ends = None if tied is None else np.ascontiguousarray(tied.T)
-        return np.ascontiguousarray(values.transpose(3, 2, 0, 1)), ends, simulated.first
+        return values.transpose(3, 2, 0, 1), None if tied is None else tied.T, simulated.first
 
     @abstractmethod
     def _filmed(self, shots: Shots) -> Simulated:

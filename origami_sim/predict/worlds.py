@@ -83,7 +83,10 @@ class Worlds(ABC):
         each = [hypothesis] * len(theta) if isinstance(hypothesis, Hypothesis) else list(hypothesis)
 
         def made() -> Prediction:
-            return self._shot(each, theta, local, wanted)
+            out = self._shot(each, theta, local, wanted)
+            # in the order of memory that stored ones have: sums depend on it in their last digit
+            ends = [None if e is None else e.copy(order="C") for e in out.ends]
+            return Prediction([v.copy(order="C") for v in out.values], ends)
 
         return made() if self.cache is None else self.cache.recalled(self, each, theta, local, wanted, made)
 

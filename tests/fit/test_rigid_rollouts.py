@@ -13,6 +13,7 @@ from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.drive import Drive
 from origami_sim.fit.least_squares import fit
+from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, scaled
 from origami_sim.hypotheses.suspects import suspects
@@ -378,3 +379,17 @@ def test_segments_of_a_clock_that_trembles_are_filmed_together_and_read_at_their
         assert np.abs(values - alone.values[0]).max() < 0.05 * NOISE  # 0.025
         if (ends := together.ends[b]) is not None:
             assert np.abs((ends - alone.ends[0]) / usual).max() < 0.8  # 0.62
+
+
+def test_predictions_lie_in_memory_as_stored_ones_do(tmp_path, monkeypatch):
+    """So that a diagnosis that goes on finds the same to the last digit: sums follow the order of memory."""
+    monkeypatch.setattr(cache, "WORTH", -1.0)
+    forward = RigidRollouts(subject(2), [swung(*hanging(2))], segment=0.3)
+    forward.cache = cache.Cache(tmp_path)
+    theta = np.array([f.start for f in forward.subject.nominals])[None]
+    odd = np.ones((1, 9, 50)).transpose(1, 2, 0)  # contiguous, and yet of other strides
+    monkeypatch.setattr(forward, "_shot", lambda *_: Prediction([odd], [odd[:, :, 0]]))
+    new, known = (forward.shoot(Hypothesis(), theta, blocks=[0]) for _ in range(2))
+    assert forward.cache.found == forward.cache.computed == 1
+    for a, b in ((new.values[0], known.values[0]), (new.ends[0], known.ends[0])):
+        assert a is not None and b is not None and a.strides == b.strides == np.empty(a.shape).strides
