@@ -68,6 +68,11 @@ class Seen:
     arrived: np.ndarray
 
 
+def steady(drive: Drive) -> bool:
+    """Whether a drive never changes."""
+    return all(s.constant for s in drive.signals.values())
+
+
 def chained_segments(forward: "RigidRollouts", r: int, local: np.ndarray | None) -> Chained | None:
     """The segments of a recording, of which each begins when the one before ends; None if they do not."""
     numbers = [n for n, b in enumerate(forward.blocks) if b.recording == r]
@@ -125,8 +130,8 @@ def channels_of(
     None where these take steps, and see the drive at instants, of their own.
     """
     recording, blocks, (model, _) = forward.recordings[chained.recording], chained.blocks, worlds[0]
-    steady = all(s.constant for s in forward.drives[chained.recording].signals.values())
-    if chained.dt != chained.step or not steady or any(get(e).family == "drive" for e in model.effects):
+    drive, distorted = forward.drives[chained.recording], any(get(e).family == "drive" for e in model.effects)
+    if chained.dt != chained.step or not steady(drive) or distorted:
         return None
     starts = forward.state(chained.shots(worlds, range(len(blocks))))
     models = [m for m, _ in worlds]

@@ -21,6 +21,7 @@ from origami_sim.predict.chained import (
     films_of,
     followed_worlds,
     motion_of,
+    steady,
 )
 from origami_sim.predict.filming import film
 from origami_sim.predict.memories import Motion, in_parts
@@ -162,8 +163,10 @@ class RigidRollouts(Rollouts):
         doubt = [k for last, first in unsure if first in anew for k in range(last + 1, first)]
         return [b.without(np.isin(b.first + np.arange(len(b.times)), doubt)) for b in out] if doubt else out
 
-    def abruptly(self) -> "RigidRollouts":
-        """The same with segments as short as tells a start, and gaps as the same chance forces make them."""
+    def abruptly(self) -> "RigidRollouts | None":
+        """See `Predictor.abruptly`: with gaps as the same chance forces make them."""
+        if all(b.reach is None for b in self.blocks):
+            return None
         out = RigidRollouts(self.subject, self.recordings, segment=0.0, threads=self.threads, probe=self)
         out.abrupt, longest = True, max(b.lasting for b in self.blocks)
         for n, b in enumerate(out.blocks):
@@ -232,7 +235,9 @@ class RigidRollouts(Rollouts):
         """For each block, all that a film of a world depends on."""
         (model, parameters), local, memory = shots.worlds[k], shots.local, shots.memory
         asked = (shots.recording, shots.step, shots.frames, shots.ends, shots.clocked)
-        world = (id(self.drives[shots.recording]), *asked, model.hash, parameters.hash)
+        drive = self.drives[shots.recording]
+        sampled = b"" if shots.begun is None or steady(drive) else shots.begun.tobytes()  # alike for all that go along
+        world = (id(drive), *asked, sampled, model.hash, parameters.hash)
         for n, b in enumerate(shots.blocks):
             start = b"" if local is None else local[k, n].tobytes()
             yield *world, id(b), start, b"" if memory is None else memory[:, k * len(shots.blocks) + n].tobytes()

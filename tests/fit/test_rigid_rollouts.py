@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from origami_sim import diagnose
 from origami_sim.design.build import Sheet
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
-from origami_sim.drive import Drive
+from origami_sim.drive import Drive, sine
 from origami_sim.fit.least_squares import fit
 from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.weights import Weights
@@ -26,9 +27,10 @@ from origami_sim.predict import cache, chained, memories, rollouts
 from origami_sim.predict import rigid as predicted
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.rigid import RigidRollouts
-from origami_sim.recording import Channel, Recording
+from origami_sim.recording import Channel, DriveChannel, Recording
 from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import hanging, subject
+from tests.predict.test_switches import flap
 
 NOISE, RATE = 1e-3, 100.0
 
@@ -393,3 +395,22 @@ def test_predictions_lie_in_memory_as_stored_ones_do(tmp_path, monkeypatch):
     assert forward.cache.found == forward.cache.computed == 1
     for a, b in ((new.values[0], known.values[0]), (new.ends[0], known.ends[0])):
         assert a is not None and b is not None and a.strides == b.strides == np.empty(a.shape).strides
+
+
+def test_a_driven_segment_is_predicted_alike_whichever_others_were_before():
+    """A drive is sampled alike for all segments that are simulated together: films of some are not those of all."""
+    truth = Drive(field=(0.0, 0.0, sine(8e-3, 3.0)))
+    motion = simulate(*flap(), truth, duration=3.0, rate=90.0)
+    log = np.arange(0.0, 3.1, 0.0137)  # of the field, by a clock of its own
+    field = np.stack([truth["field_z"](log)] * 3, axis=1) * [0.0, 0.0, 1.0]
+    fold = Channel("fold", "crease_angle", motion.creases[:, 0, 0], "rad", NOISE, {"crease": 0})
+    recording = Recording("r", motion.times, {"fold": fold}, {"field": DriveChannel("field", field, "T", False, log)})
+    of = Subject.from_model(*flap(), None, [diagnose.factor("crease.stiffness", 0.05)])
+    theta = np.array([[1.01]])
+    alone, later = (RigidRollouts(of, [recording], segment=0.1) for _ in range(2))
+    local = 1e-4 * np.ones((1, len(alone.blocks), alone.local))
+    whole = alone.shoot(Hypothesis(), theta, local)
+    for b in range(len(later.blocks)):
+        later.shoot(Hypothesis(), theta, local, blocks=[b])
+    again = later.shoot(Hypothesis(), theta, local)
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(whole.values, again.values, strict=True))
