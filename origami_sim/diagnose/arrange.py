@@ -44,23 +44,16 @@ STEADY = 10.0
 FEWEST = 8
 """Segments that a single recording is cut into at least, where bars predict it."""
 
-BENDING = 0.3
-"""Change by the bending of panels, over the recorder's noise, up to which they are taken as rigid."""
-
 BENT = (
     "Panels are taken as rigid: with those of the model, bending would change what is measured by {:.2g} times its "
     "noise."
 )
 
-INERT = 0.3
-"""Change by inertia, over the noise, up to which a motion is taken as quasi-static."""
+UNNOTICED = 0.3
+"""Change, over the noise, up to which bending, inertia and what is not linear in missing forces are left out.
 
-QUADRATIC = 0.3
-"""Square of what the refitted model misses, over the motion's size and the noise, up to which it is linear in forces.
-
-Of twelve objects with strong effects it is 0.9 to 28 of six (stops, yield, a lag), 0.3 to 0.6 of three (friction,
-softening), and below 0.03 of three real pendulums and of all in which nothing is missing. Half and double change no
-word of four swings.
+Of ten objects with strong effects the last is 0.9 to 28 of seven (stops, yield, a lag, a van der Pol moment), 0.3 to
+0.6 of three (friction, softening, a power law), and below 0.02 of two real pendulums and of four without any.
 """
 
 LOOKED_AT = 16
@@ -126,7 +119,7 @@ def slowly(subject: Subject, recordings: list[Recording], o: Options) -> tuple[P
         if any(r.start is not None and r.start.state != "equilibrium" for r in recordings):
             return None
         shows = inertia(subject, recordings)
-        if shows > INERT:
+        if shows > UNNOTICED:
             return None
         notes = [
             "The motion is taken as quasi-static: its accelerations would change what is measured by "
@@ -162,7 +155,7 @@ def _slow_panels(subject: Subject, recordings: list[Recording], o: Options) -> t
         if o.panels == "rigid":
             raise
         return Slow(subject, recordings, threads=o.threads), []
-    if bent > BENDING:
+    if bent > UNNOTICED:
         return Slow(subject, recordings, threads=o.threads), []
     return rigid, [BENT.format(bent)]
 
@@ -196,27 +189,24 @@ def rigid_rollouts(
     else:
         length = o.segment or min(FRAMES * frame, predictable(probe, GROWTH))
         found = RigidRollouts(subject, recordings, segment=length, threads=o.threads, probe=probe)
-    if bent <= BENDING:
+    if bent <= UNNOTICED:
         return found, found.notes if forced else [BENT.format(bent), *found.notes]
     # a recorder that averages over frames has more noise than neighbouring frames show
     noise = float(np.sqrt(np.mean((recorder_noise(found, nominal_fits(found)[1]) / found.blocks[0].noise) ** 2)))
-    return (found, [BENT.format(bent / noise), *found.notes]) if bent <= BENDING * noise else None
+    return (found, [BENT.format(bent / noise), *found.notes]) if bent <= UNNOTICED * noise else None
 
 
 def shortened(forward: Predictor, base: Fit, o: Options) -> Predictor | None:
     """The same predictor with segments as short as tells a start, where the refitted model is far off; else None.
 
-    What it misses is not linear in what is missing then, as at a stop, off which a flap bounces within a few frames.
-    Noise is correlated within a segment only, and more segments take longer, so others are not shortened.
+    What it misses is not linear in what is missing then, as at a stop, off which a flap bounces within a few frames:
+    its square over the motion's size shows. Noise is correlated within a segment only, and more segments take longer,
+    so others are not shortened.
     """
-    if o.segment is not None or not any(b.reach is not None for b in forward.blocks):
-        return None
     motion = np.nanstd(np.concatenate([b.values for b in forward.blocks]), axis=0)
     missed, noise = base.rms(), forward.blocks[0].noise
-    if pooled(missed**2 / np.maximum(motion * noise, 1e-300)) < QUADRATIC:
-        return None
-    assert isinstance(forward, RigidRollouts)
-    return forward.abruptly()
+    far = pooled(missed**2 / np.maximum(motion * noise, 1e-300)) > UNNOTICED
+    return forward.abruptly() if far and o.segment is None else None
 
 
 def bending(subject: Subject, recordings: list[Recording], o: Options) -> float:

@@ -123,6 +123,7 @@ def _diagnosed(
     given, base, weights = nominal_fits(forward)
     if (finer := shortened(forward, base, o)) is not None:
         forward = finer
+        noted.append("Segments are as short as tells a start, as the refitted model is too far off for linear steps.")
         if keep is not None:
             keep.follow(forward)
         given, base, weights = nominal_fits(forward)

@@ -8,7 +8,7 @@ from scipy.linalg import qr
 
 from origami_sim.fit.linear import Linearisation
 from origami_sim.fit.predictor import Prediction, Predictor
-from origami_sim.fit.weights import Weights, whitened
+from origami_sim.fit.weights import Rows, Weights, whitened
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis
 
@@ -163,6 +163,12 @@ def links(forward: Predictor, blocks: Sequence[int]) -> list[tuple[bool, bool]]:
     return [(tied(b - 1), tied(b)) for b in blocks]
 
 
+def _rows(forward: Predictor, blocks: Sequence[int], among: Sequence[int]) -> list[Rows]:
+    """Rows of some blocks of those that are tied to each other."""
+    tied = dict(zip(among, links(forward, among), strict=True))
+    return [forward.blocks[b].rows(*tied[b]) for b in blocks]
+
+
 def changed(
     forward: Predictor, shot: Prediction, weights: Weights, blocks: Sequence[int], among: Sequence[int] | None = None
 ) -> list[np.ndarray]:
@@ -171,9 +177,7 @@ def changed(
     Args:
         among: blocks to which these are tied (default: to each other).
     """
-    among, out, every = among or blocks, [], [forward.blocks[b] for b in blocks]
-    tied = dict(zip(among, links(forward, among), strict=True))
-    rows = [block.rows(*tied[b]) for b, block in zip(blocks, every, strict=True)]
+    out, every, rows = [], [forward.blocks[b] for b in blocks], _rows(forward, blocks, among or blocks)
     gaps = [np.where(b.seen(), v[1:] - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
     white = whitened(weights, gaps, rows)
     for block, own, gap, data, ends in zip(every, rows, gaps, white, shot.ends, strict=True):
@@ -194,15 +198,9 @@ def residuals(
     weights: Weights,
     among: Sequence[int] | None = None,
 ) -> list[np.ndarray]:
-    """Whitened residuals of the blocks, of their starts and of the gaps between them; nan where a prediction failed.
-
-    Args:
-        among: blocks to which these are tied (default: to each other).
-    """
+    """Whitened residuals of blocks, their starts and gaps; nan where a prediction failed. See `changed` for `among`."""
     shot = forward.shoot(hypothesis, theta[None], local[None], blocks)
-    out, every, among = [], [forward.blocks[b] for b in blocks], among or blocks
-    tied = dict(zip(among, links(forward, among), strict=True))
-    rows = [block.rows(*tied[b]) for b, block in zip(blocks, every, strict=True)]
+    out, every, rows = [], [forward.blocks[b] for b in blocks], _rows(forward, blocks, among or blocks)
     gaps = [np.where(b.seen(), b.values - v[0], 0.0) for b, v in zip(every, shot.values, strict=True)]
     white = whitened(weights, gaps, rows)
     for b, block, own, gap, data, ends in zip(blocks, every, rows, gaps, white, shot.ends, strict=True):

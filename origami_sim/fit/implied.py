@@ -35,7 +35,7 @@ def with_own_noise(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Wei
     """
     assert f.weights is not None
     found = implied(forward, f, hyper, (f.weights, *known) if f.weights.colour else known)
-    larger = [gap for gap in hyper.gaps if gap > max(noise.gap for _, noise in found)] if _tied(f) else []
+    larger = [gap for gap in _sizes(f, hyper) if gap > max(noise.gap for _, noise in found)]
     best, most, tried = (f, 0.0), -np.inf, list[tuple[float, float]]()
     while True:
         for log, noise in sorted(found, key=lambda each: -each[0]):
@@ -61,7 +61,7 @@ def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] =
     others = [(noise, (True,)) for noise in known]
     if f.exact and f.weights.colour:
         return _all_climbed(forward, f, others)
-    sizes = hyper.gaps if _tied(f) else (f.weights.gap,)
+    sizes = _sizes(f, hyper)
     place = int(np.argmax(shared([partial(log_evidence, f, gap) for gap in sizes])))
     fits: dict[int, tuple[float, Weights]] = {}
     out: list[tuple[float, Weights]] = []
@@ -78,10 +78,10 @@ def implied(forward: Predictor, f: Fit, hyper: Hyper, known: Sequence[Weights] =
         place = best
 
 
-def _tied(f: Fit) -> bool:
-    """Whether a fit has segments that are tied to the next."""
-    assert f.linear is not None
-    return any(t is not None for t in f.linear.tie)
+def _sizes(f: Fit, hyper: Hyper) -> tuple[float, ...]:
+    """Sizes that gaps may have: of segments that are not tied that of its weights."""
+    assert f.linear is not None and f.weights is not None
+    return hyper.gaps if any(t is not None for t in f.linear.tie) else (f.weights.gap,)
 
 
 def _all_climbed(

@@ -33,7 +33,6 @@ SHORT = 0.2
 SLOWEST, UTMOST = 2.5, 10.0
 """How many times smaller than where a fit begins the solver's step may become, and than without any suspect."""
 
-
 STALE, OWN, ALL = range(3)
 """Which derivatives belong to the present point: none, those by the hypothesis' own numbers, all."""
 

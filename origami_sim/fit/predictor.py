@@ -163,6 +163,10 @@ class Predictor(Protocol):
         """The values of `shoot`: per block [K, n, D]."""
         ...
 
+    def abruptly(self) -> "Predictor | None":
+        """The same with segments as short as tells a start (`abrupt`); None where they are not tied."""
+        ...
+
     def step(self, hypothesis: Hypothesis, theta: np.ndarray) -> float:
         """The solver's step for one world [s]; 0 if no model can be built."""
         ...

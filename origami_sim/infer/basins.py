@@ -18,11 +18,10 @@ from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites, scaled
-from origami_sim.infer.budget import FAR
+from origami_sim.infer.budget import astray
 from origami_sim.infer.profile import along_numbers, missed, several
 from origami_sim.infer.scan import COARSE, Cleared, gained, over_numbers, over_shapes, over_their_range
 from origami_sim.infer.screen import Signature, screen
-from origami_sim.infer.words import pooled
 
 CALMING = 3
 """Effects, the best over their ranges, of which the best fit tells more of a rough model. It bounds the time."""
@@ -35,8 +34,7 @@ def settled(forward: Predictor, f: Fit) -> tuple[Fit, bool]:
     what decides anything. Starts of their own tie segments to the recording, so that predictions by these have one. It
     is not asked where a fit leaves little more than noise.
     """
-    # what rings faster than frames tell looks like a recorder's noise: that which was stated decides
-    if forward.local or forward.curve or pooled(f.rms() / forward.blocks[0].noise) < FAR:
+    if forward.local or forward.curve or not astray(forward, f):
         return f, False
     white = level(forward, f)
     f = f.reweighted(white)

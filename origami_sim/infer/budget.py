@@ -119,6 +119,14 @@ def over_noise(forward: Predictor, f: Fit) -> float:
     return pooled(f.rms() / recorder_noise(forward, f))
 
 
+def astray(forward: Predictor, f: Fit) -> bool:
+    """Whether a fit misses far more than the noise that was stated, or read from neighbouring frames.
+
+    What rings faster than frames tell looks like the noise of a recorder.
+    """
+    return bool(pooled(f.rms() / forward.blocks[0].noise) > FAR)
+
+
 def _parts(f: Fit, noise: Weights) -> np.ndarray:
     """Of what a fit explains, the parts (1 + n,) of the model's numbers and of each effect, linearised at the fit."""
     line = f.reweighted(noise).linear

@@ -21,7 +21,7 @@ from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere
-from origami_sim.infer.budget import FAR, over_noise
+from origami_sim.infer.budget import FAR, astray, over_noise
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.components import without_unseen_components
 from origami_sim.infer.foresight import Foresight
@@ -32,7 +32,6 @@ from origami_sim.infer.proposals import ROUGH, UNFITTED, in_place_of, named, pro
 from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
-from origami_sim.infer.words import pooled
 
 FITS = 16
 """Sets that are fitted at most since one took the lead for which the one before is not worth a fit (`UNFITTED`).
@@ -260,7 +259,7 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     """
     if f.failed:
         return f
-    if forward.abrupt and pooled(f.rms() / forward.blocks[0].noise) > FAR:
+    if forward.abrupt and astray(forward, f):
         f = loosened(forward, f)
     known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
     own, _ = with_own_noise(forward, f, out.hyper, known)

@@ -10,7 +10,7 @@ import numpy as np
 from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.fit.predictor import Block, Prediction
+from origami_sim.fit.predictor import Block, Prediction, Predictor
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, apply
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Model, Parameters
@@ -89,6 +89,10 @@ class Worlds(ABC):
             return Prediction([v.copy(order="C") for v in out.values], ends)
 
         return made() if self.cache is None else self.cache.recalled(self, each, theta, local, wanted, made)
+
+    def abruptly(self) -> Predictor | None:
+        """See `Predictor.abruptly`: here none."""
+        return None
 
     def kind(self) -> tuple:
         """What kind of prediction it is, for a digest."""
