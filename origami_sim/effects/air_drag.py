@@ -5,6 +5,9 @@ import warp as wp
 from origami_sim.effects._effect import Effect, Parameter, scalar
 from origami_sim.physics.kinematics import corner_rows
 
+TINY = wp.constant(scalar(1e-300))
+"""Square of a length that no triangle has [m^4]: one without an area feels nothing."""
+
 
 @wp.func
 def force(
@@ -17,17 +20,17 @@ def force(
     air_density: scalar,
     drag_coefficient: scalar,
 ):
-    double_area = wp.cross(x2 - x1, x3 - x1)
-    n = wp.normalize(double_area)
-    c = scalar(-0.25) * air_density * drag_coefficient * wp.length(double_area) / scalar(3.0)
+    d = wp.cross(x2 - x1, x3 - x1)  # twice the area, along the normal
     # at the middles of the sides, whose forces go to both ends: exact for a panel that turns about one of its edges
-    u12 = wp.dot(v1 + v2, n) / scalar(2.0)
-    u23 = wp.dot(v2 + v3, n) / scalar(2.0)
-    u31 = wp.dot(v3 + v1, n) / scalar(2.0)
-    f12 = c * wp.abs(u12) * u12 / scalar(2.0)
-    f23 = c * wp.abs(u23) * u23 / scalar(2.0)
-    f31 = c * wp.abs(u31) * u31 / scalar(2.0)
-    return corner_rows((f12 + f31) * n, (f12 + f23) * n, (f23 + f31) * n)
+    s12 = wp.dot(v1 + v2, d)
+    s23 = wp.dot(v2 + v3, d)
+    s31 = wp.dot(v3 + v1, d)
+    # (1/2) rho Cd (A / 3) |vn| vn / 2 with vn = s / (2 |d|), of which a division by |d|^2 is left
+    c = air_density * drag_coefficient * scalar(-1.0) / (scalar(96.0) * wp.max(wp.dot(d, d), TINY))
+    f12 = c * wp.abs(s12) * s12
+    f23 = c * wp.abs(s23) * s23
+    f31 = c * wp.abs(s31) * s31
+    return corner_rows((f12 + f31) * d, (f12 + f23) * d, (f23 + f31) * d)
 
 
 EFFECT = Effect(

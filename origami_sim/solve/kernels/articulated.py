@@ -18,6 +18,7 @@ from origami_sim.solve.kernels.tree import (
     at,
     copy,
     factorise,
+    mat33,
     mat_at,
     put,
     put_mat,
@@ -39,8 +40,13 @@ def outer_inertia(mass: scalar, r: vec3):
 @wp.func
 def rotation(axis: vec3, angle: scalar):
     """Rotation by an angle about a unit axis (Rodrigues)."""
-    k = wp.skew(axis)
-    return wp.identity(n=3, dtype=scalar) + wp.sin(angle) * k + (scalar(1.0) - wp.cos(angle)) * (k * k)
+    c = wp.cos(angle)
+    turn = wp.sin(angle) * axis
+    return (
+        c * wp.identity(n=3, dtype=scalar)
+        + mat33(scalar(0.0), -turn[2], turn[1], turn[2], scalar(0.0), -turn[0], -turn[1], turn[0], scalar(0.0))
+        + (scalar(1.0) - c) * wp.outer(axis, axis)
+    )
 
 
 @wp.func
@@ -66,10 +72,11 @@ def pose(tree: Tree, w: int):
     o = w * tree.width
     zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
     origin = vec_at(s, o + tree.y)
-    q = o + tree.y + 3
-    turn = wp.quat_to_matrix(wp.normalize(wp.quatd(at(s, q), at(s, q + 1), at(s, q + 2), at(s, q + 3))))
-    put_mat(s, o + tree.turned, turn)
-    put_vec(s, o + tree.placed, origin - turn * vec_at(s, o + tree.middle))
+    if tree.first_body == 0:  # a root that is held stays where it is
+        q = o + tree.y + 3
+        turn = wp.quat_to_matrix(wp.normalize(wp.quatd(at(s, q), at(s, q + 1), at(s, q + 2), at(s, q + 3))))
+        put_mat(s, o + tree.turned, turn)
+        put_vec(s, o + tree.placed, origin - turn * vec_at(s, o + tree.middle))
     omega = zero
     speed = zero
     for k in range(tree.roots):

@@ -197,4 +197,4 @@ def half_solve(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
     first = leading(s, target, m)
     for i in range(first, m):
         x = at(s, target + i) - dot(s, factor + i * m + first, target + first, i - first)
-        put(s, target + i, x / at(s, factor + i * m + i))
+        put(s, target + i, x * at(s, factor + i * m + i))

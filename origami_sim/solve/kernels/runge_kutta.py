@@ -153,8 +153,12 @@ def begin_damped(tree: Tree, step: scalar, w: int):
             lost = lost + c * at(s, o + tree.u0 + j)
             if j <= i:
                 x = step * tree.implicit[1, 1] * c
-                for k in range(j + 1):
+                for k in range(j):
                     x = x + at(s, o + tree.factor0 + i * m + k) * at(s, o + tree.factor0 + j * m + k)
+                last = at(s, o + tree.factor0 + i * m + j)
+                if i == j:
+                    last = scalar(1.0) / last
+                x = x + last / at(s, o + tree.factor0 + j * m + j)
                 put(s, stiff + i * m + j, x)
         put(s, o + tree.damped + i, -lost)
     solve_lower(s, o + tree.factor0, o + tree.damped, m)

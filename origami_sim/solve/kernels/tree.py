@@ -174,16 +174,19 @@ def along_root(tree: Tree, k: int, origin: vec3):
 
 @wp.func
 def factorise(s: wp.array(dtype=scalar), first: int, m: int, least: scalar):
-    """Cholesky factor of a symmetric matrix [m, m] of which the lower triangle is given, in its place."""
+    """Cholesky factor of a symmetric matrix [m, m] of which the lower triangle is given, in its place.
+
+    Its diagonal is kept as one over what it is, so that solving divides by nothing.
+    """
     for i in range(m):
         for j in range(i + 1):
             x = at(s, first + i * m + j)
             for k in range(j):
                 x = x - at(s, first + i * m + k) * at(s, first + j * m + k)
             if i == j:
-                put(s, first + i * m + i, wp.sqrt(wp.max(x, least)))
+                put(s, first + i * m + i, scalar(1.0) / wp.sqrt(wp.max(x, least)))
             else:
-                put(s, first + i * m + j, x / at(s, first + j * m + j))
+                put(s, first + i * m + j, x * at(s, first + j * m + j))
 
 
 @wp.func
@@ -193,7 +196,7 @@ def solve_lower(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         x = at(s, target + i)
         for k in range(i):
             x = x - at(s, factor + i * m + k) * at(s, target + k)
-        put(s, target + i, x / at(s, factor + i * m + i))
+        put(s, target + i, x * at(s, factor + i * m + i))
 
 
 @wp.func
@@ -204,20 +207,20 @@ def solve_upper(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
         x = at(s, target + i)
         for k in range(i + 1, m):
             x = x - at(s, factor + k * m + i) * at(s, target + k)
-        put(s, target + i, x / at(s, factor + i * m + i))
+        put(s, target + i, x * at(s, factor + i * m + i))
 
 
 @wp.func
 def multiply(s: wp.array(dtype=scalar), factor: int, target: int, m: int):
     """Multiplies with the matrix [m, m] of a Cholesky factor, in place."""
     for i in range(m):
-        x = scalar(0.0)
-        for k in range(i, m):
+        x = at(s, target + i) / at(s, factor + i * m + i)
+        for k in range(i + 1, m):
             x = x + at(s, factor + k * m + i) * at(s, target + k)
         put(s, target + i, x)
     for back in range(m):
         i = m - 1 - back
-        x = scalar(0.0)
-        for k in range(i + 1):
+        x = at(s, target + i) / at(s, factor + i * m + i)
+        for k in range(i):
             x = x + at(s, factor + i * m + k) * at(s, target + k)
         put(s, target + i, x)

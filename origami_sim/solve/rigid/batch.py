@@ -121,9 +121,10 @@ class RigidBatch(Batch):
             "u": self._rates(state, origin, axis, pivot),
             "span": np.full((1, w), np.inf),
             "feet": contact_points(model, x),
+            "turned": np.tile(np.eye(3).reshape(1, 9, 1), (tree.bodies, 1, w)).reshape(-1, w),  # a held root stays so
         }
         sizes = {
-            **dict.fromkeys(("turned", "second"), 9 * tree.bodies),
+            "second": 9 * tree.bodies,
             **dict.fromkeys(("placed", "omega", "speed", "alpha", "gain", "force", "moment", "first"), 3 * tree.bodies),
             **dict.fromkeys(("hinge", "joint"), 3 * joints),
             **dict.fromkeys(("power0", "spent"), tree.effects),
