@@ -19,6 +19,12 @@ ORDER = 6
 FEWEST = 50
 """Differences that a correlation needs."""
 
+STILL = 1.5
+"""Variance of differences over half a stride more, over what the stride's correlation says, from which motion shows.
+
+Of motion it is 130 times as much there as at the stride, where less than 0.4 % of the variance is motion then.
+"""
+
 
 @dataclass(frozen=True)
 class NoiseReport:
@@ -57,8 +63,8 @@ def noise_report(times: np.ndarray, values: np.ndarray) -> NoiseReport:
 
     The differences are those of `estimate_noise`. How much larger they are between frames further apart (every second,
     fourth or sixth) gives the correlation of the noise, if it is of first order: the variance of a difference with
-    weights c is sum_j (c * c)_j r^|j|. A stride is used only if one half longer again still grows no faster than a
-    random walk would, because motion grows with the sixth power. A low-pass filter that removes the highest
+    weights c is sum_j (c * c)_j r^|j|. A stride is used only if one half longer again shows what this correlation
+    says, because motion grows with the sixth power. A low-pass filter that removes the highest
     frequencies altogether shows as a correlation near 1, where `total` is a rough guess only: over 8000 frames it
     scatters by 3 % at a correlation of 0.6 and by a third at 0.85.
     Rest is a run of frames in which windows of 40 spread like the noise of the differences and have no trend: there
@@ -104,16 +110,15 @@ def _column(times: np.ndarray, column: np.ndarray) -> tuple[float, float, float]
     variances = {k: _strided_variance(column, k) for k in (1, 2, 3, 4, 6, 9)}
     base = variances[1]
     grown = {k: v / base if base > 0 else np.inf for k, v in variances.items()}
-    sound = [
-        k for k, beyond in ((2, 3), (4, 6), (6, 9)) if np.isfinite(grown[beyond]) and grown[beyond] < 1.15 * beyond
-    ]
-    if not sound:
-        return rms, float("nan"), float("nan")
-    stride = sound[-1]
     grid = np.linspace(-0.9, 0.98, 189)
-    ratios = _variance(grid, stride) / _variance(grid, 1)
-    lag_1 = float(np.interp(grown[stride], ratios, grid))
-    return rms, lag_1, float(np.sqrt(variances[stride] / _variance(np.array([lag_1]), stride)[0]))
+    said = {k: _variance(grid, k) / _variance(grid, 1) for k in variances}
+    out = float("nan"), float("nan")
+    for k, beyond in ((2, 3), (4, 6), (6, 9)):
+        lag_1 = float(np.interp(grown[k], said[k], grid))
+        if not grown[beyond] < STILL * np.interp(lag_1, grid, said[beyond]):
+            break
+        out = lag_1, float(np.sqrt(variances[k] / _variance(np.array([lag_1]), k)[0]))
+    return rms, *out
 
 
 def _strided_variance(column: np.ndarray, stride: int) -> float:
