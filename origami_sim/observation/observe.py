@@ -17,6 +17,9 @@ from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.rigid.reactions import held_nodes, support_of_all
 from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
 
+STAMPS = 1e-3
+"""Part of a frame by which a recording may last longer than a run: stamps are rounded, and runs end at whole frames."""
+
 FAR = 5.0
 """Sizes of a panel from its middle beyond which a point is none of its body."""
 
@@ -39,7 +42,7 @@ def observe(trajectory: Trajectory, recording: Recording, *, world: int = 0) -> 
         )
     times = recording.times - recording.times[0]
     frames = trajectory.times - trajectory.times[0]
-    if times[-1] > frames[-1] * (1 + 1e-9) + 1e-12:
+    if times[-1] > frames[-1] + STAMPS * (frames[-1] / max(len(frames) - 1, 1)):
         raise InputError(
             "the run is shorter than the recording",
             field="duration",

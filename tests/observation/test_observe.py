@@ -87,6 +87,13 @@ def test_channels_that_the_model_lacks(motion, given, words):
         observe(motion, recording([0.0, 0.1], given))
 
 
+def test_stamps_that_are_rounded_may_end_after_the_run(motion):
+    end = float(motion.times[-1])
+    given = channel("crease_angle", [0.0, 0.0], crease=0)
+    late, exact = (observe(motion, recording([0.0, t], given))["c"] for t in (end + 1e-7, end))
+    np.testing.assert_allclose(late, exact, atol=1e-5)
+
+
 def test_a_run_shorter_than_the_recording(motion):
     with pytest.raises(InputError, match=r"run is shorter than the recording.*0\.5.*2 s"):
         observe(motion, recording([0.0, 2.0], channel("crease_angle", [0.0, 0.0], crease=0)))
