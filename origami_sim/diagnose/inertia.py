@@ -10,11 +10,11 @@ from origami_sim.diagnose.prepare import FRAMES, thinned
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Subject
+from origami_sim.hypotheses.weight import weighed
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.channels import stacked
 from origami_sim.predict.drives import drive_of
-from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.equilibria import equilibrium

@@ -64,6 +64,11 @@ class Readings:
         self.read(index, [frame])
         return self._found[index, frame]
 
+    def slowest(self, index: int) -> Reading:
+        """The state at the first frame with the rates that are least told from rest, see `local_line`."""
+        recording = self.recordings[index]
+        return read_start(self.model, self.arm, recording, *stacked(recording), 0, slowest=True)
+
     def read(self, index: int, frames: Sequence[int]) -> None:
         """Reads the state at frames of a recording, where that has not been done, into `readings`."""
         recording = self.recordings[index]
@@ -105,9 +110,11 @@ class Readings:
         return bool(np.linalg.matrix_rank(by[near]) == np.linalg.matrix_rank(by[ever]))
 
 
-def read_start(model: Model, arm: Articulation, recording: Recording, values, noise, first: int) -> Reading:
+def read_start(
+    model: Model, arm: Articulation, recording: Recording, values, noise, first: int, *, slowest: bool = False
+) -> Reading:
     """The state at a frame, from a local polynomial of the channels and the pose of rigid panels that fits it best."""
-    level, slope, error = local_line(recording.times, values, noise, first)
+    level, slope, error = local_line(recording.times, values, noise, first, slowest=slowest)
     pose = placed(model, arm, recording, level)
     weight = np.where(np.isfinite(level), 1.0 / noise, 0.0)
     sought = arm.sought(channel_tangent(model, arm, recording, pose, level)[1] * weight[:, None])
@@ -158,12 +165,17 @@ def spans(arm: Articulation, model: Model) -> np.ndarray:
 
 
 def local_line(
-    times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int
+    times: np.ndarray, values: np.ndarray, noise: np.ndarray, first: int, *, slowest: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window.
 
     The window grows while its cubic fits, and its rate is within what each smaller one left possible: what a cubic
-    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997).
+    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997). That chance allows a
+    bias of some standard deviations.
+
+    Args:
+        slowest: of all these windows, that of which the rate is fewest standard deviations from zero: what is at rest
+            is so in short ones, however it is driven away.
     """
     level, slope, error = np.full((3, values.shape[1]), np.nan)
     for d in range(values.shape[1]):
@@ -185,9 +197,10 @@ def local_line(
             rate = fit[1] / span
             bent = scatter > 1.5 * noise[d]
             low, high = max(low, rate - POSSIBLE * doubt), min(high, rate + POSSIBLE * doubt)
-            if np.isfinite(level[d]) and (bent or low > high):
-                break
-            level[d], slope[d], error[d] = fit[0], rate, doubt
-            if bent:
+            begun = bool(np.isfinite(level[d]))
+            fits = not begun or not (bent or low > high)
+            if not begun or (abs(rate) * error[d] < abs(slope[d]) * doubt if slowest else fits):
+                level[d], slope[d], error[d] = fit[0], rate, doubt
+            if bent or not fits:
                 break
     return level, slope, error

@@ -8,10 +8,11 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block
 from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.weight import weighed
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
+from origami_sim.predict.starts import Reading
 from origami_sim.predict.track import coordinates
-from origami_sim.predict.weight import weighed
 from origami_sim.predict.worlds import World, Worlds
 from origami_sim.solve.statics.equilibria import equilibrium
 
@@ -28,12 +29,11 @@ CONTRADICTED = 6.0
 """Standard deviations by which a reading may differ from what is stated before it is refused."""
 
 
-def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, shown: np.ndarray) -> Block:
+def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow: Reading) -> Block:
     """The first block of a recording, with what is stated about its start.
 
     Args:
-        usual: (m,) usual rates of the coordinates. read, shown: (m,) standard deviations with which the recording
-            itself tells rates and coordinates at its first frame; infinite where it does not.
+        usual: (m,) usual rates of the coordinates. read, slow: the first frame, and with `Readings.slowest` rates.
 
     Raises:
         InputError: a crease that does not exist; a start that the data contradict; no equilibrium.
@@ -50,17 +50,18 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
         still = np.full(m, start.rate_sd)
     elif start.state == "released":
         let_go = _in_a_frame(forward, block.recording, usual)
-    far = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read) + let_go
+    far = np.abs(slow.rates) > CONTRADICTED * np.hypot(still, slow.error) + let_go
     if np.any(far):
-        worst = arm.names()[int(np.argmax(np.abs(block.rates) * far))]
+        worst = arm.names()[int(np.argmax(np.abs(slow.rates) * far))]
         raise InputError(
-            f"the data contradict a start at rest: {worst} moves at {np.abs(block.rates[far]).max():.3g} per second",
+            f"the data contradict a start at rest: {worst} moves at {np.abs(slow.rates[far]).max():.3g} per second",
             file=sidecar,
             field="start",
             value=start.state,
             allowed="'moving', or the frames from the release on",
         )
-    known[m:] = np.hypot(still, let_go)
+    doubtful = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read.error) + let_go  # what is longer may be bent
+    known[m:] = np.where(doubtful, np.abs(block.rates), np.hypot(still, let_go))
     angles = pose.angles.copy()
     first = m - len(arm.creases)
     if start.state == "released":
@@ -75,7 +76,7 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
                     allowed=", ".join(names),
                 )
             assert start.sd is not None
-            _agrees(angles[joint, 0], value, np.hypot(start.sd, shown[first + joint]), crease, sidecar)
+            _agrees(angles[joint, 0], value, np.hypot(start.sd, read.shown[first + joint]), crease, sidecar)
             angles[joint], known[first + joint] = value, start.sd
     else:
         world = forward.world(Hypothesis(), np.array([f.start for f in forward.subject.nominals]), ())
@@ -83,7 +84,7 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: np.ndarray, s
         sd = np.hypot(RESTS if start.sd is None else start.sd, doubt)
         for joint, value in enumerate(rest):
             name = forward.model.name("crease", int(arm.creases[joint]))
-            _agrees(angles[joint, 0], value, np.hypot(sd[joint], shown[first + joint]), name, sidecar)
+            _agrees(angles[joint, 0], value, np.hypot(sd[joint], read.shown[first + joint]), name, sidecar)
         angles[:, 0], known[first : first + len(rest)] = rest, sd
     return replace(block, pose=replace(pose, angles=angles), rates=np.zeros(m), known=known)
 

@@ -13,11 +13,11 @@ from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Block, Prediction, Predictor
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject, apply
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.hypotheses.weight import weighed
 from origami_sim.model import Model, Parameters
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.channels import component_names
 from origami_sim.predict.begun import within
-from origami_sim.predict.weight import weighed
 from origami_sim.recording import Recording
 
 if TYPE_CHECKING:

@@ -37,6 +37,29 @@ def test_a_rate_is_known_as_well_as_the_recording_tells():
     assert np.std(found) == pytest.approx(1.0, rel=0.15) and abs(np.mean(found)) < 0.5
 
 
+@pytest.mark.parametrize("driven", ["ramp", "step", "released"])
+@pytest.mark.parametrize("sigma", [5e-5, 5e-4, 2e-3])
+@pytest.mark.parametrize("frequency", [1.5, 4.0, 10.0])
+def test_what_begins_at_rest_is_not_told_from_rest(driven, sigma, frequency):
+    """Undamped motions from rest; the window about a frame grows until it holds a part of a swing."""
+    rng, times, w = np.random.default_rng(1), np.arange(200) / 200.0, 2.0 * np.pi * frequency
+    swing = {"ramp": times - np.sin(w * times) / w, "step": 1.0 - np.cos(w * times), "released": np.cos(w * times)}
+    most = {False: 0.0, True: 0.0}
+    for _ in range(50):
+        values = (0.2 * swing[driven] + sigma * rng.normal(size=200))[:, None]
+        for slowest in most:
+            _, slope, error = local_line(times, values, np.array([sigma]), 0, slowest=slowest)
+            most[slowest] = max(most[slowest], abs(slope[0] / error[0]))
+    assert most[True] < 6.0 and most[True] <= most[False]
+
+
+def test_the_slowest_rate_still_tells_what_moves():
+    rng, times, sigma = np.random.default_rng(1), np.arange(200) / 200.0, 1e-4
+    values = (0.3 * np.sin(4.0 * times) + sigma * rng.normal(size=200))[:, None]
+    _, slope, error = local_line(times, values, np.array([sigma]), 0, slowest=True)
+    assert slope[0] / error[0] > 6.0 and slope[0] == pytest.approx(1.2, abs=4 * error[0])
+
+
 def test_the_first_value_that_is_not_missing_tells_the_turn():
     values = np.array([[np.nan, 1.0, np.nan], [5.0, 2.0, np.nan], [6.0, 3.0, np.nan]])
     np.testing.assert_array_equal(seen_first(values), [5.0, 1.0, np.nan])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim import Sheet, equilibrium, strip
-from origami_sim.predict.weight import weighed
+from origami_sim.hypotheses.weight import weighed
 from origami_sim.recording import Gravity
 
 G = 9.80665
