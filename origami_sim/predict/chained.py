@@ -12,7 +12,7 @@ from origami_sim.fit.predictor import Block
 from origami_sim.model import Parameters, State
 from origami_sim.model.articulation import turned_by
 from origami_sim.predict.filming import even, film_step, pictured
-from origami_sim.predict.memories import Motion, rested
+from origami_sim.predict.memories import Motion, late_starts, rested
 from origami_sim.predict.shots import Shots
 from origami_sim.predict.worlds import World
 from origami_sim.solve.rigid.batch import RigidBatch
@@ -95,8 +95,10 @@ def followed_worlds(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Worlds that go on from segment to segment, see `film_anew`."""
     r, count = chained.recording, len(worlds)
-    shots = chained.shots(worlds, frames=len(forward.recordings[r].times))
     (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
+    late = late_starts(model, parameters, count)
+    frames = len(forward.recordings[r].times)
+    shots = chained.shots(worlds, frames=frames, late=late if np.any(late) else None)
     begin = State.at_rest(model, count, position=forward.state(shots).x, placed=True)
     begin.memory[:] = rested(forward, r, worlds, 0, begin.x[:, :1], threads)[-1].memory
     drive = forward.driven(shots)

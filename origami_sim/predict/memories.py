@@ -12,6 +12,7 @@ from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.begun import begins
 from origami_sim.predict.drives import reaching
+from origami_sim.predict.measured import lateness
 from origami_sim.predict.worlds import World, distinct_memories, distinct_motions, lasting
 from origami_sim.threads import T, default_threads, shared, sharing
 
@@ -59,7 +60,8 @@ def memories(
         return None
     rows = lasting(model)
     follows = len(rows) > 0 and bool(motion.memory)
-    some, of = distinct_motions(worlds) if follows else distinct_memories(worlds)
+    late = late_starts(model, Parameters.join([p for _, p in worlds]), len(worlds))
+    some, of = distinct_motions(worlds, late) if follows else distinct_memories(worlds)
     worlds, others = [worlds[k] for k in some], range(1, len(some))
     asked = every[every <= max(b.first for b in wanted)]
     own = forward.own_memories(r, worlds[1:], local) if follows and others else {}
@@ -73,6 +75,14 @@ def memories(
         memory[rows, 1:] = own[first][rows]
         out[first] = memory[:, of]
     return out
+
+
+def late_starts(model: Model, parameters: Parameters, worlds: int) -> np.ndarray:
+    """[K, 1] by how much later than their clock says first frames were taken, see `lateness`: the drive is late there.
+
+    Of worlds that go on from segment to segment; a clock that runs fast is off by more in later ones.
+    """
+    return lateness(model, parameters, worlds, np.zeros(1), True)[0]
 
 
 def _carried(
