@@ -414,3 +414,25 @@ def test_a_driven_segment_is_predicted_alike_whichever_others_were_before():
         later.shoot(Hypothesis(), theta, local, blocks=[b])
     again = later.shoot(Hypothesis(), theta, local)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(whole.values, again.values, strict=True))
+
+
+def test_a_late_clock_beside_friction_is_a_late_drive_of_what_rests():
+    """What friction remembers where a segment starts is that of a motion under the drive as it came, by any clock."""
+    truth = Drive(field=(0.0, 0.0, sine(8e-3, 1.5)))
+    motion = simulate(*flap(), truth, duration=2.0, rate=90.0)
+    log = np.arange(0.0, 2.1, 0.002)
+    field = np.stack([truth["field_z"](log)] * 3, axis=1) * [0.0, 0.0, 1.0]
+    fold = Channel("fold", "crease_angle", motion.creases[:, 0, 0], "rad", NOISE, {"crease": 0})
+    recording = Recording("r", motion.times, {"fold": fold}, {"field": DriveChannel("field", field, "T", False, log)})
+    of = Subject.from_model(*flap(), None, [diagnose.factor("crease.stiffness", 0.05)])
+    forward = RigidRollouts(of, [recording], segment=0.3)
+    every = suspects(forward.model, forward.recordings, forward.drive)
+    friction, drive, clock = (
+        next(s for s in every if s.effect == name) for name in ("crease_friction", "drive_delay", "clock_delay")
+    )
+    theta = np.array([[1.0, 3e-5, 0.01, 0.02]])
+    late, same = (forward.predict(Hypothesis((friction, s)), theta) for s in (drive, clock))
+    inner = range(1, len(forward.blocks) - 1)
+    assert max(np.abs(late[b] - same[b]).max() for b in inner) < 0.02 * NOISE
+    none = forward.predict(Hypothesis((friction, drive)), theta * [1.0, 1.0, 1.0, 0.0])
+    assert max(np.abs(late[b] - none[b]).max() for b in inner) > 5.0 * NOISE
