@@ -25,6 +25,9 @@ STILL = 1.5
 Of motion it is 130 times as much there as at the stride, where less than 0.4 % of the variance is motion then.
 """
 
+WALK = 1.15
+"""The same, over that of a random walk, whose scatter it allows for: of motion 2 % of the variance at a stride of two."""
+
 
 @dataclass(frozen=True)
 class NoiseReport:
@@ -63,10 +66,10 @@ def noise_report(times: np.ndarray, values: np.ndarray) -> NoiseReport:
 
     The differences are those of `estimate_noise`. How much larger they are between frames further apart (every second,
     fourth or sixth) gives the correlation of the noise, if it is of first order: the variance of a difference with
-    weights c is sum_j (c * c)_j r^|j|. A stride is used only if one half longer again shows what this correlation
-    says, because motion grows with the sixth power. A low-pass filter that removes the highest
-    frequencies altogether shows as a correlation near 1, where `total` is a rough guess only: over 8000 frames it
-    scatters by 3 % at a correlation of 0.6 and by a third at 0.85.
+    weights c is sum_j (c * c)_j r^|j|. Motion grows with the sixth power of the stride. So a stride is used only if one
+    half longer again shows what this correlation says; the shortest, if that grows no faster than a random walk. A
+    low-pass filter that removes the highest frequencies altogether shows as a correlation near 1, where `total` is a
+    rough guess only: over 8000 frames it scatters by 3 % at a correlation of 0.6 and by a third at 0.85.
     Rest is a run of frames in which windows of 40 spread like the noise of the differences and have no trend: there
     the noise is measured directly, and the correlation needs no assumption.
 
@@ -115,7 +118,7 @@ def _column(times: np.ndarray, column: np.ndarray) -> tuple[float, float, float]
     out = float("nan"), float("nan")
     for k, beyond in ((2, 3), (4, 6), (6, 9)):
         lag_1 = float(np.interp(grown[k], said[k], grid))
-        if not grown[beyond] < STILL * np.interp(lag_1, grid, said[beyond]):
+        if not grown[beyond] < (WALK * beyond if k == 2 else STILL * np.interp(lag_1, grid, said[beyond])):
             break
         out = lag_1, float(np.sqrt(variances[k] / _variance(np.array([lag_1]), k)[0]))
     return rms, *out

@@ -93,6 +93,15 @@ def test_the_correlation_of_a_filtering_tracker_is_found(lag):
         assert report.level < 0.6e-4
 
 
+@pytest.mark.parametrize(("ringing", "frequency"), [(6e-4, 14.0), (6e-4, 10.0), (2e-3, 6.0)])
+def test_ringing_is_no_correlation_of_a_tracker(ringing, frequency):
+    """At 200 frames per second: what rings grows up to strides of six frames as correlated noise does."""
+    t = np.arange(1400) / 200.0
+    swing = 0.3 * np.sin(2.0 * np.pi * t) + ringing * np.sin(2.0 * np.pi * frequency * t)
+    lags = [noise_report(t, swing + 5e-4 * np.random.default_rng(s).standard_normal(1400)).lag_1 for s in range(5)]
+    assert np.all(np.abs(lags) < 0.2)
+
+
 def test_bursts_are_told_by_their_root_mean_square():
     times = np.arange(6000) / 500.0
     generator = np.random.default_rng(4)
