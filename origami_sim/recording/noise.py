@@ -26,7 +26,7 @@ Of motion it is 130 times as much there as at the stride, where less than 0.4 % 
 """
 
 WALK = 1.15
-"""The same, over that of a random walk, whose scatter it allows for: of motion 2 % of the variance at a stride of two."""
+"""The same of the shortest stride, over that of a random walk, for scatter: 2 % of its variance is motion then."""
 
 
 @dataclass(frozen=True)
