@@ -26,11 +26,16 @@ Also the part of what an effect explains to which derivatives tell what another 
 
 
 def proposed(out: Posterior, n: int) -> Key | None:
-    """The n-th set to fit: by turns the most promising one, and one that would do what the best does; None: enough."""
+    """The n-th set to fit: by turns the most promising one, and one that would do what the best does; None: enough.
+
+    Before sets that can at most stand beside a pair comes the better half of that: if it suffices, most of them do not.
+    """
     key = _likely(out)
+    if (key is None or out.promised(key) < max(out.total[k] for k in named(out))) and (half := _better_half(out)):
+        return half
     if n % 2 or key is None:
         key = _analogous(out) or _alike(out) or _alone(out) or key
-    return key or _equivalent(out) or _within(out) or _alike(out, ROUGH) or _better_half(out)
+    return key or _equivalent(out) or _within(out) or _alike(out, ROUGH)
 
 
 def named(out: Posterior) -> list[Key]:
@@ -108,19 +113,19 @@ def _alone(out: Posterior) -> Key | None:
 
     About a model that is far from what was recorded what is linear promises too little, or too much; about a fit that
     leaves white noise it tells which effects could stand in its place. Of an effect that was fitted alone, or is in the
-    best set, there is no need to know more.
+    best set, there is no need to know more, but at another place.
     """
     best = max(out.total, key=lambda k: out.total[k])
     near, bonus = out.total[best] + np.log(UNFITTED), most_gained(out.gains)
-    known = {out.suspect(n).effect for key in out.nodes if key == best or len(key) == 1 for n in key}
+    known = {out.labels(frozenset((n,))) for key in out.nodes if key == best or len(key) == 1 for n in key}
     singles = [k for k, p in out.ranked.items() if k in out.estimates and p + bonus >= near][:LEADING]
-    singles = [k for k in singles if not known & out.effects(k)]
+    singles = [k for k in singles if out.labels(k) not in known]
     instead = in_place_of(out, best)
     if not instead or not singles:
         return next(iter(singles), None)
-    # to leave a strong effect out is not quite linear: the first one tells by how much others are underestimated
+    # to leave a strong effect out is not quite linear: the first ones tell by how much others are underestimated
     key = max(singles, key=lambda k: instead.get(k, np.inf))
-    return key if instead.get(key, np.inf) + max(out.swapped, default=np.inf) >= near else None
+    return key if not out.swapped or instead.get(key, np.inf) + most_gained(out.swapped) >= near else None
 
 
 def _alike(out: Posterior, rough: float = 0.0) -> Key | None:
