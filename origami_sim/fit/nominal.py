@@ -1,7 +1,5 @@
 """The model without any effect, as given and refitted, and what residuals are measured by."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from origami_sim.errors import InputError
@@ -17,10 +15,6 @@ GAP = 0.03
 It only has to be large enough for steps to be linear and small enough for segments to belong together: a third or three
 times as much lead to the same fits.
 """
-
-LOOSE = 1.0
-"""The same with which a fit is sought anew that misses much: each segment follows its own data. With a third the same
-stops are found; with GAP one of 0.1 N m/rad at 12 degrees ends at 0.006 and 8, or 0.017 and 12 degrees."""
 
 ROUNDS = 6
 """Times that weights are read from a fit before they are taken as they are."""
@@ -39,20 +33,6 @@ def white(forward: Predictor, rms: np.ndarray, gap: float) -> Weights:
     noise = forward.blocks[0].noise
     deviation = np.maximum(np.nan_to_num(rms), noise)
     return Weights(deviation, (), gap, sum(level_prior(d, n) for d, n in zip(deviation, noise, strict=True)))
-
-
-def loosened(forward: Predictor, f: Fit) -> Fit:
-    """A fit, or a better one that is found from there with loose ties, which are then tightened (a homotopy).
-
-    Beside impacts tied segments have many minima. Next to free ones are nearly linear in their starts.
-    """
-    at = f
-    for _ in range(ROUNDS):
-        before, at = at.rms(), carried_on(forward, at.reweighted(replace(level(forward, at), gap=LOOSE)))
-        if at.failed or np.all(np.abs(np.log(at.rms() / before)) < SAME):
-            break
-    at = at if at.failed else carried_on(forward, at.reweighted(level(forward, at)))
-    return f if at.failed or np.prod(at.rms() / f.rms()) > 1.0 else at
 
 
 def nominal_fits(forward: Predictor) -> tuple[Fit, Fit, Weights]:

@@ -13,6 +13,7 @@ from origami_sim.fit.least_squares import OWED
 from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect, distinct_sites
 from origami_sim.infer.posterior import Estimate, Key, Node, Posterior
 from origami_sim.infer.screen import Signature
+from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.threads import shared
 
 LEADING = 12
@@ -179,8 +180,8 @@ def _judge(
 
 
 def _compatible(out: Posterior, key: Key, n: int) -> bool:
-    """Whether a suspect can be added to a set."""
-    if len(key) >= out.hyper.most:
+    """Whether a suspect can be added to a set, but not to a moment that no law gives: that would do the same."""
+    if len(key) >= out.hyper.most or UNLISTED in out.effects(key):
         return False
     s = out.suspect(n)
     return all(distinct_sites(out.suspect(k), s) and not _same_place(out.suspect(k), s) for k in key)

@@ -84,7 +84,8 @@ class Posterior:
             all were tried over their ranges. swapped: by how much single effects were better than they promised in
             the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
             by that fit: as estimated, as promised, and as fitted. rough: whether fits end in many basins, see `basins`.
-            futile: sets that were fitted since one took the lead.
+            futile: sets that were fitted since one took the lead. beyond: the model without any effects, about which
+            a moment that no law gives was sought.
     """
 
     signatures: list[Signature]
@@ -103,6 +104,7 @@ class Posterior:
     smooth: list[np.ndarray] = field(default_factory=list)
     ahead: dict[Key, tuple[float, Estimate]] = field(default_factory=dict)
     renewed: set[tuple[Key, Key]] = field(default_factory=set)
+    beyond: Node | None = None
     polished: set[Key] = field(default_factory=set)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False

@@ -15,12 +15,12 @@ from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
 from origami_sim.fit.implied import OwnColumns, log_evidence, with_own_noise
 from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed
-from origami_sim.fit.nominal import level, loosened
+from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.spectra import without_idle
-from origami_sim.infer.basins import Calm, elsewhere
+from origami_sim.infer.basins import Calm, elsewhere, loosened, tightened
 from origami_sim.infer.budget import FAR, astray, over_noise
 from origami_sim.infer.columns import Columns
 from origami_sim.infer.components import without_unseen_components
@@ -125,11 +125,12 @@ def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:
     """Enters a smooth moment of a crease that no law gives, if it may be as probable as the best set.
 
     It is fitted alone, and competes with what was found: where that is right the moment explains less, as it cannot do
-    what laws of the drive, of memory or with sharp bends do.
+    what laws of the drive, of memory or with sharp bends do. Once about each fit of the model without any effects.
     """
-    if all(s.status for s in out.signatures):  # nothing can be tested
+    if out.beyond is out.nodes[frozenset()] or all(s.status for s in out.signatures):  # or nothing can be tested
         return
-    best, none = max(out.total[k] for k in named(out)), out.nodes[frozenset()].fit
+    out.beyond = out.nodes[frozenset()]
+    best, none = max(out.total[k] for k in named(out)), out.beyond.fit
     about = beside(forward, none, anywhere(forward), out.hyper)
     if not about:
         return
@@ -183,12 +184,18 @@ def extended(out: Posterior, forward: Predictor, most: int, *, progress: Callabl
         if key is None:
             return
         _tried(out, forward, key)
+        if len(out.leader) > 2:  # many laws may imitate what none gives: it is known before more of them are tried
+            beyond_the_catalogue(out, forward)
 
 
 def _again(out: Posterior, forward: Predictor) -> bool:
-    """Fits a set anew of which the fit of a larger one promises more, if it may then be best; whether there was one."""
+    """Fits a set anew of which the fit of a larger one promises more, if it may then be best; whether there was one.
+
+    The model without any effects is fitted anew in any case, once: all that is promised of single ones depends on it.
+    """
     least = max(out.total[k] for k in named(out)) + np.log(UNFITTED)
-    early = {k: out.ahead[k][0] for k in named(out) if k in out.ahead and out.ahead[k][0] >= least}
+    stale = {frozenset()} - {k for k, _ in out.renewed}
+    early = {k: out.ahead[k][0] for k in named(out) if k in out.ahead and (out.ahead[k][0] >= least or k in stale)}
     if not early:
         return False
     key = max(early, key=lambda k: early[k])
@@ -200,6 +207,9 @@ def _again(out: Posterior, forward: Predictor) -> bool:
         node, effects = _node(out, forward, key, f)
         if node.evidence.max() > before.evidence.max():
             _entered(out, forward, node, effects, log_priors(out.signatures))
+            if not key:
+                out.gains.clear()
+                out.realised.pop(key, None)
     return True
 
 
@@ -260,7 +270,11 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
     if f.failed:
         return f
     if forward.abrupt and astray(forward, f):
-        f = loosened(forward, f)
+        loose = loosened(forward, f)
+        if not loose.failed and not astray(forward, loose):
+            f = tightened(forward, loose, f)
+        elif not astray(forward, out.nodes[out.leader].fit):
+            return f  # it is no rival
     known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
     own, _ = with_own_noise(forward, f, out.hyper, known)
     return own if (on := _to_the_end(forward, own)).failed else on

@@ -9,9 +9,11 @@ from origami_sim.diagnose.arrange import arranged, shortened
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.effects import CATALOGUE
 from origami_sim.fit.least_squares import fit
-from origami_sim.fit.nominal import level, loosened, nominal_fits
+from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.infer.basins import loosened, tightened
+from origami_sim.infer.budget import astray
 from origami_sim.infer.scan import over_shapes, scanned
 
 SWING = {"duration": 4.0, "panels": 2, "rate": 100}
@@ -97,8 +99,11 @@ def test_a_hard_stop_is_found_with_loose_ties_from_where_a_fit_is_stuck(bounced)
     begin = scanned(forward, Hypothesis((contact,)), by, base.local, None)
     stuck = fit(forward, Hypothesis((contact,)), by, theta=begin, local=base.local)
     assert stuck.theta[-2] < 0.2 * HARD and abs(stuck.theta[-1] + STOP) > 0.05
-    found = loosened(forward, stuck)
+    loose = loosened(forward, stuck)
+    assert not astray(forward, loose)
+    found = tightened(forward, loose, stuck)
     assert found.theta[-2] == pytest.approx(HARD, rel=0.05) and found.theta[-1] == pytest.approx(-STOP, abs=1e-3)
+    assert np.all(loosened(forward, base).rms() > 2.0 * loose.rms())  # what explains nothing does not so either
 
 
 def test_a_hard_stop_is_named_with_intervals_that_cover(bounced):
