@@ -6,7 +6,7 @@ from origami_sim.effects._effect import Effect, Parameter, scalar
 from origami_sim.physics.kinematics import corner_rows
 
 TINY = wp.constant(scalar(1e-300))
-"""Square of a length that no triangle has [m^4]: one without an area feels nothing."""
+"""Square of an area [m^4] that is smaller than that of any triangle: one without an area feels nothing."""
 
 
 @wp.func
@@ -25,7 +25,7 @@ def force(
     s12 = wp.dot(v1 + v2, d)
     s23 = wp.dot(v2 + v3, d)
     s31 = wp.dot(v3 + v1, d)
-    # (1/2) rho Cd (A / 3) |vn| vn / 2 with vn = s / (2 |d|), of which a division by |d|^2 is left
+    # (1/2) rho Cd (A / 3) |vn| vn / 2 with A = |d| / 2 and vn = s / (2 |d|), of which a division by |d|^2 is left
     c = air_density * drag_coefficient * scalar(-1.0) / (scalar(96.0) * wp.max(wp.dot(d, d), TINY))
     f12 = c * wp.abs(s12) * s12
     f23 = c * wp.abs(s23) * s23

@@ -26,10 +26,10 @@ from origami_sim.infer.screen import Signature, screen
 CALMING = 3
 """Effects, the best over their ranges, of which the best fit tells more of a rough model. It bounds the time."""
 
-
 LOOSE = 1.0
-"""The same with which a fit is sought anew that misses much: each segment follows its own data. With a third the same
-stops are found; with GAP one of 0.1 N m/rad at 12 degrees ends at 0.006 and 8, or 0.017 and 12 degrees."""
+"""Gaps between segments, as a part of usual rates, with which a fit is sought anew that misses much: each segment
+follows its own data. With a third the same stops are found; with `GAP`, with which fits are made, one of 0.1 N m/rad at
+12 degrees ends at 0.006 and 8, or 0.017 and 12 degrees."""
 
 
 def loosened(forward: Predictor, f: Fit) -> Fit:

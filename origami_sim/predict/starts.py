@@ -170,8 +170,8 @@ def local_line(
     """Value, rate and its standard deviation (D,) at a frame, from a cubic over a window.
 
     The window grows while its cubic fits, and its rate is within what each smaller one left possible: what a cubic
-    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997). That chance allows a
-    bias of some standard deviations.
+    bends away from shows there before it shows in the scatter (Goldenshluger & Nemirovski 1997). That leaves room
+    for a bias of some standard deviations.
 
     Args:
         slowest: of all these windows, that of which the rate is fewest standard deviations from zero: what is at rest
