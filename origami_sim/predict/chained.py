@@ -96,7 +96,7 @@ def followed_worlds(
     """Worlds that go on from segment to segment, see `film_anew`."""
     r, count = chained.recording, len(worlds)
     (model, _), parameters = worlds[0], Parameters.join([p for _, p in worlds])
-    late = late_starts(model, parameters, count)
+    late = late_starts(worlds)
     frames = len(forward.recordings[r].times)
     shots = chained.shots(worlds, frames=frames, late=late if np.any(late) else None)
     begin = State.at_rest(model, count, position=forward.state(shots).x, placed=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from origami_sim.drive import Drive
+from origami_sim.effects import get
 from origami_sim.fit.predictor import Block
 from origami_sim.model import Model, Parameters, State
 from origami_sim.predict.begun import begins
@@ -60,8 +61,7 @@ def memories(
         return None
     rows = lasting(model)
     follows = len(rows) > 0 and bool(motion.memory)
-    late = late_starts(model, Parameters.join([p for _, p in worlds]), len(worlds))
-    some, of = distinct_motions(worlds, late) if follows else distinct_memories(worlds)
+    some, of = distinct_motions(worlds, late_starts(worlds)) if follows else distinct_memories(worlds)
     worlds, others = [worlds[k] for k in some], range(1, len(some))
     asked = every[every <= max(b.first for b in wanted)]
     own = forward.own_memories(r, worlds[1:], local) if follows and others else {}
@@ -77,12 +77,15 @@ def memories(
     return out
 
 
-def late_starts(model: Model, parameters: Parameters, worlds: int) -> np.ndarray:
+def late_starts(worlds: list[World]) -> np.ndarray:
     """[K, 1] by how much later than their clock says first frames were taken, see `lateness`: the drive is late there.
 
     Of worlds that go on from segment to segment; a clock that runs fast is off by more in later ones.
     """
-    return lateness(model, parameters, worlds, np.zeros(1), True)[0]
+    model, count = worlds[0][0], len(worlds)
+    if all(get(e).family != "measurement" for e in model.effects):
+        return np.zeros((count, 1))
+    return lateness(model, Parameters.join([p for _, p in worlds]), count, np.zeros(1), True)[0]
 
 
 def _carried(

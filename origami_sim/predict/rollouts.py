@@ -101,7 +101,7 @@ class Rollouts(Worlds, ABC):
         block = Block(index, first, times, kept, noise, pose, rates, known, **also)
         if found is None or first > 0:
             return block
-        return stated(self, block, self.readings.usual_rates(index), found, self.readings.slowest(index))
+        return stated(self, block, self.readings.usual_rates(index), found, partial(self.readings.slowest, index))
 
     def _shot(self, each: Sequence[Hypothesis], theta, local, wanted: list[int]) -> Prediction:
         effects = tuple(dict.fromkeys(e for h in each for e in h.effects))

@@ -1,6 +1,6 @@
 """Starts that an experimenter states: released at rest, at equilibrium, or already moving."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,11 +29,11 @@ CONTRADICTED = 6.0
 """Standard deviations by which a reading may differ from what is stated before it is refused."""
 
 
-def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow: Reading) -> Block:
+def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slowest: Callable[[], Reading]) -> Block:
     """The first block of a recording, with what is stated about its start.
 
     Args:
-        usual: (m,) usual rates of the coordinates. read, slow: the first frame, and with `Readings.slowest` rates.
+        usual: (m,) usual rates of the coordinates. read: the first frame. slowest: reads it as `Readings.slowest` does.
 
     Raises:
         InputError: a crease that does not exist; a start that the data contradict; no equilibrium.
@@ -42,6 +42,7 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow
     start = recording.start
     if start is None or start.state == "moving":
         return block
+    slow = slowest()
     arm, m = forward.articulation, forward.articulation.size
     sidecar = recording.metadata.get("sidecar")
     pose, known = block.pose, block.known.copy()

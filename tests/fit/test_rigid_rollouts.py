@@ -433,6 +433,6 @@ def test_a_late_clock_beside_friction_is_a_late_drive_of_what_rests():
     theta = np.array([[1.0, 3e-5, 0.01, 0.02]])
     late, same = (forward.predict(Hypothesis((friction, s)), theta) for s in (drive, clock))
     inner = range(1, len(forward.blocks) - 1)
-    assert max(np.abs(late[b] - same[b]).max() for b in inner) < 0.02 * NOISE
+    assert max(np.abs(late[b] - same[b]).max() for b in inner) < 1e-3 * NOISE
     none = forward.predict(Hypothesis((friction, drive)), theta * [1.0, 1.0, 1.0, 0.0])
     assert max(np.abs(late[b] - none[b]).max() for b in inner) > 5.0 * NOISE

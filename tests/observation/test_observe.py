@@ -91,7 +91,7 @@ def test_stamps_that_are_rounded_may_end_after_the_run(motion):
     end = float(motion.times[-1])
     given = channel("crease_angle", [0.0, 0.0], crease=0)
     late, exact = (observe(motion, recording([0.0, t], given))["c"] for t in (end + 1e-7, end))
-    np.testing.assert_allclose(late, exact, atol=1e-5)
+    np.testing.assert_allclose(late, exact, rtol=0, atol=1e-6)
 
 
 def test_a_run_shorter_than_the_recording(motion):
