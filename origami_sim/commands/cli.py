@@ -158,6 +158,12 @@ def _parser() -> argparse.ArgumentParser:
         "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
     )
     p.add_argument(
+        "--limit",
+        type=float,
+        metavar="S",
+        help="seconds after which the verdict is on what has been fitted (default 300, thorough 3000)",
+    )
+    p.add_argument(
         "--start-at",
         choices=("rest", "fit"),
         help="simulate from rest, or fit every start (default: as recorded)",

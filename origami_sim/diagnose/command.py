@@ -46,7 +46,7 @@ from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
 
-THOROUGH = Options(rate=400.0, fits=48)
+THOROUGH = Options(rate=400.0, fits=48, limit=3000.0)
 
 
 def run(args: Namespace) -> int:
@@ -112,7 +112,8 @@ def run(args: Namespace) -> int:
             raise
         raise KeyboardInterrupt(f"interrupted after the verdict, {keep.found.verdict}: {files.shown}") from None
     progress.end()
-    keep.clear()
+    if not found.ended:  # else the same command with more time goes on from there
+        keep.clear()
     if args.json:
         print(json.dumps(_summary(found, files.made), allow_nan=False))
     else:
@@ -255,7 +256,8 @@ def _options(args: Namespace, settings: Settings) -> Options:
         raise InputError("segments have starts of their own", field="--start-at", value="rest", allowed="no --segment")
     options = THOROUGH if args.thorough else Options()
     motion = args.motion if args.motion != "auto" else settings.motion or "auto"
-    return replace(options, motion=motion, panels=args.panels, segment=args.segment, start=args.start_at)
+    limit = options.limit if args.limit is None else args.limit
+    return replace(options, motion=motion, panels=args.panels, segment=args.segment, start=args.start_at, limit=limit)
 
 
 def _check_model(folder: Path, model: str) -> None:

@@ -48,7 +48,7 @@ from origami_sim.observation.channels import stacked, units_of
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis
-from origami_sim.threads import in_step, leads, shared
+from origami_sim.threads import in_step, leads, shared, told
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
@@ -140,15 +140,20 @@ def _diagnosed(
             noted.append(
                 f"Not suspected, as it cannot act on this device or show in these recordings: {', '.join(idle)}."
             )
-    told = lambda part: tell("screen", part)  # noqa: E731
-    calm = None if not rough else calmest(forward, every, given, base, told)
+    screened = lambda part: tell("screen", part)  # noqa: E731
+    calm = None if not rough else calmest(forward, every, given, base, screened)
     if calm is not None:
         weights = calm.weights
-    signatures = calm.signatures if calm is not None else screen(forward, every, base, weights, progress=told)
+    signatures = calm.signatures if calm is not None else screen(forward, every, base, weights, progress=screened)
     lap("screen")
     tell("search", 0.0)
-    store, lead = keep is not None and keep.store, lambda part: tell("search", part)
-    how = {"given": given, "calm": calm, "progress": lead, "most": o.fits, "store": store}
+
+    def going_on(part: float, so_far: Posterior) -> bool:
+        tell(f"search, so far {so_far.label(so_far.leader) if so_far.leader else 'no effect'}", part)
+        return told(lambda: clock.perf_counter() - began < o.limit)
+
+    store = keep is not None and keep.store
+    how = {"given": given, "calm": calm, "going_on": going_on, "most": o.fits, "store": store}
     posterior = search(forward, base, signatures, weights, **how)
     lap("search")
     lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
@@ -168,9 +173,9 @@ def _diagnosed(
         said: list[str] = []
         return attempt(said, left_out, lambda: estimated(forward, f, weights).rms, nowhere), said
 
-    told = shared([partial(error, node.fit) for node in posterior.nodes.values()])
-    errors = {key: rms for key, (rms, _) in zip(posterior.nodes, told, strict=True)}
-    noted += [note for _, notes in told for note in notes]
+    each_error = shared([partial(error, node.fit) for node in posterior.nodes.values()])
+    errors = {key: rms for key, (rms, _) in zip(posterior.nodes, each_error, strict=True)}
+    noted += [note for _, notes in each_error for note in notes]
     after = next(errors[k] for k, n in posterior.nodes.items() if n.fit.hypothesis is best.hypothesis)
     noise = recorder_noise(forward, best)
     scores = attempt(noted, "The screening cannot be shown", lambda: scored(posterior), [])
@@ -204,7 +209,12 @@ def _diagnosed(
         changed=[e for e in best.hypothesis.effects if e in forward.model.effects],
         subject=subject.name,
         recordings=[r.name for r in recordings],
+        ended=posterior.ended,
     )
+    if out.ended:
+        out.sentence += f" The search ended at its limit of {o.limit:g} s: sets of effects that were estimated and not "
+        out.sentence += f"fitted hold p = {out.unfitted:.2f}."
+        out.notes.insert(0, "With a larger limit (--limit) the same command goes on from where the search ended.")
 
     def curves() -> dict:
         return {"traces": traces(forward, given, base, best, noise)}
@@ -220,7 +230,7 @@ def _diagnosed(
         # what acts now and then goes with nothing that the device does
         steady = judged.verdict == "UNKNOWN" and bursts(best).probability < 0.5
         more = unnamed(forward, base, best) if steady else ""
-        return {"sentence": f"{judged.sentence} {more}".strip()}
+        return {"sentence": f"{out.sentence} {more}".strip()}
 
     def experiments() -> dict:
         progress = lambda part: tell("next experiment", part)  # noqa: E731

@@ -19,12 +19,15 @@ class Options:
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; what was recorded faster is averaged to it.
         fits: sets of effects that are fitted at most since one took the lead; as many more if those are more probable.
+        limit: seconds from the beginning after which no further set is fitted: the verdict is then what is known, and
+            says how probable what was not fitted is. It is twice what the slowest known recording takes on one core;
+            half of it would end the search beside hard stops before it is done.
         threads: see `Batch`.
         possible: what the set-up can do in a further recording; None: what the scene says, else the defaults. What a
             sidecar states goes before either.
 
     Raises:
-        InputError: a rate that is not positive, fewer than 4 fits.
+        InputError: a rate or a limit that is not positive, fewer than 4 fits.
     """
 
     motion: str = "auto"
@@ -33,12 +36,15 @@ class Options:
     start: str | None = None
     rate: float = 200.0
     fits: int = 16
+    limit: float = 300.0
     threads: int | None = None
     possible: Possible | None = None
 
     def __post_init__(self):
         if not self.rate > 0:
             raise InputError("frames are compared at a positive rate", field="rate", value=self.rate, allowed="> 0 Hz")
+        if not self.limit > 0:
+            raise InputError("a search takes time", field="limit", value=self.limit, allowed="> 0 s")
         if self.fits < 4:
             raise InputError("too few fits to find an effect", field="fits", value=self.fits, allowed="4 or more")
 

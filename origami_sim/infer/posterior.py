@@ -85,7 +85,7 @@ class Posterior:
             the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
             by that fit: as estimated, as promised, and as fitted. rough: whether fits end in many basins, see `basins`.
             futile: sets that were fitted since one took the lead. beyond: the model without any effects, about which
-            a moment that no law gives was sought.
+            a moment that no law gives was sought. ended: whether the search was ended before it was done.
     """
 
     signatures: list[Signature]
@@ -112,6 +112,7 @@ class Posterior:
     realised: dict[Key, list[tuple[float, float, float]]] = field(default_factory=dict)
     rough: bool = False
     futile: int = 0
+    ended: bool = False
     _labels: dict[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def probabilities(self, among: Iterable[Key] | None = None) -> dict[Key, float]:

@@ -149,7 +149,7 @@ def over_their_range(
     suspects: Sequence[Suspect],
     base: Fit,
     weights: Weights,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], object] | None = None,
     grid: np.ndarray = GRID,
 ) -> Iterator[tuple[np.ndarray, float] | None]:
     """Of each suspect beside a fit, the best of a few strengths, and the log likelihood that it gains.

@@ -33,6 +33,9 @@ from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
 
+GoingOn = Callable[[float, Posterior], bool]
+"""Told the part of a search that is done, and what is known so far; says whether it goes on."""
+
 FITS = 16
 """Sets that are fitted at most since one took the lead for which the one before is not worth a fit (`UNFITTED`).
 
@@ -48,7 +51,7 @@ def search(
     *,
     given: Fit | None = None,
     calm: Calm | None = None,
-    progress: Callable[[float], None] | None = None,
+    going_on: GoingOn = lambda part, so_far: True,
     most: int = FITS,
     store: bool = False,
 ) -> Posterior:
@@ -58,6 +61,8 @@ def search(
         given: the model with its numbers as they were given, about which single effects are judged too if the refit
             took them further than chance would.
         calm: what makes it linear if it has many basins, see `basins`.
+        going_on: asked before each fit, and told the part of them that is done and what is known so far. If it says no,
+            what has been fitted by then is the answer (`Posterior.ended`).
     """
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
@@ -66,14 +71,21 @@ def search(
     elif given is not None and strained(base):
         _about_given(out, forward, base, given)
     for _ in range(most):  # what is named has to be fitted, however many were
-        extended(out, forward, most, progress=progress)
-        while polished(out, forward) or reconsidered(out, forward, base, progress=progress):
-            extended(out, forward, most, progress=progress)
-        if (key := out.most_probable) in out.nodes:
+        extended(out, forward, most, going_on)
+        while polished(out, forward, most, going_on) or reconsidered(out, forward, base, going_on):
+            extended(out, forward, most, going_on)
+        if (key := out.most_probable) in out.nodes or out.ended:
             break
         _tried(out, forward, key)
-    beyond_the_catalogue(out, forward)
+    if not out.ended:
+        beyond_the_catalogue(out, forward)
     return out
+
+
+def _ended(out: Posterior, most: int, going_on: GoingOn) -> bool:
+    """Whether the search is to end before the next fit."""
+    out.ended = out.ended or not going_on(min(out.futile / most, 1.0), out)
+    return out.ended
 
 
 def _about_given(out: Posterior, forward: Predictor, base: Fit, given: Fit) -> None:
@@ -102,20 +114,19 @@ def _begun(out: Posterior, forward: Predictor, calm: Calm) -> None:
     out.reconsidered = out.rough = True
 
 
-def reconsidered(
-    out: Posterior, forward: Predictor, base: Fit, *, progress: Callable[[float], None] | None = None
-) -> bool:
+def reconsidered(out: Posterior, forward: Predictor, base: Fit, going_on: GoingOn) -> bool:
     """Simulates every single effect at several strengths where nothing explains a recording; whether any promises more.
 
     A model that snaps, or a crease that sticks, has no derivatives that tell why. So before nothing is said to explain
     a recording, each effect is tried over its range, once, and the best of them is fitted.
     """
-    if out.reconsidered or over_noise(forward, out.nodes[out.leader].fit) < FAR:
+    if out.ended or out.reconsidered or over_noise(forward, out.nodes[out.leader].fit) < FAR:
         return False
     out.reconsidered = True
     alone = [k for k in out.estimates if len(k) == 1]
     suspects = [out.suspect(n) for k in alone for n in k]
-    if not _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), progress)):
+    told = lambda part: going_on(part, out)  # noqa: E731
+    if not _promised(out, alone, over_their_range(forward, suspects, base, level(forward, base), told)):
         return False
     _tried(out, forward, next(k for k in out.ranked if k in out.begun and k in out.estimates))
     return True
@@ -172,11 +183,9 @@ def _promised(out: Posterior, alone: Sequence[Key], found: Iterable[tuple[np.nda
     return some
 
 
-def extended(out: Posterior, forward: Predictor, most: int, *, progress: Callable[[float], None] | None = None) -> None:
+def extended(out: Posterior, forward: Predictor, most: int, going_on: GoingOn) -> None:
     """Fits sets until none that has not been fitted holds much of the posterior, or so many in turn did not lead."""
-    while out.futile < most:
-        if progress:
-            progress(out.futile / most)
+    while out.futile < most and not _ended(out, most, going_on):
         if _again(out, forward):
             out.futile += 1
             continue
@@ -322,7 +331,7 @@ def _with_seen_components(out: Posterior, forward: Predictor, key: Key) -> None:
         _add(out, forward, frozenset(members_of(hypothesis, out)), found, log_priors(out.signatures))
 
 
-def polished(out: Posterior, forward: Predictor) -> bool:
+def polished(out: Posterior, forward: Predictor, most: int, going_on: GoingOn) -> bool:
     """Fits leaders on by their own noise, and takes all their derivatives where they end; whether anything changed.
 
     Leaders are the best set, which is believed by what its fit reaches and not by what derivatives promise, and those
@@ -336,7 +345,7 @@ def polished(out: Posterior, forward: Predictor) -> bool:
         reach = {k: out.total[k] + 0.5 * out.nodes[k].owed for k in [*named(out), out.leader]}
         idle = not out.told(out.leader)
         leaders = [k for k, most in reach.items() if (most >= least or (idle and not k)) and k not in out.polished]
-        if not leaders:
+        if not leaders or _ended(out, most, going_on):
             return some
         key = max(leaders, key=lambda k: reach[k])
         before, now = out.total[key], out.nodes[key].fit

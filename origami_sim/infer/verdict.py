@@ -186,6 +186,12 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         text += MORE_LAWS if more_laws else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
+    if d.tie and p.ended and max(chance, key=lambda k: (chance[k], k in p.nodes)) not in p.nodes:
+        likely = [c for c in d.credible if classes[c] > 1.0 - CREDIBLE][:LISTED]
+        text = "Not decided yet. Estimated to be most probable, and not fitted: "
+        text += f"{joined([f'{_name(c)} (p = {classes[c]:.2f})' for c in likely])}. Of what was fitted the best is "
+        text += f"{say(shown)}, which {explained}." if suspects else "the model without any effect."
+        return Judgement(d.word, text, d.probability, chosen, **common)
     if d.tie:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []
@@ -422,7 +428,7 @@ def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> 
     classes = {k: p.effects(k) for k in p.nodes}
     mine = [k for k, c in classes.items() if c == effects]
     mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
-    return max(mine, key=lambda k: chance.get(k, 0.0))
+    return max(mine, key=lambda k: (chance.get(k, 0.0), p.total[k]))
 
 
 def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]], float]:

@@ -189,6 +189,7 @@ class Diagnosis:
             already: their numbers are changes of what it has.
         unfinished: stages after the verdict that were not reached when this was written; empty at the end. Fields that
             they give, from `places` on, are empty until then.
+        ended: whether the search for effects was ended by its limit of time.
     """
 
     verdict: str
@@ -226,6 +227,7 @@ class Diagnosis:
     folds: list[Fold] = field(default_factory=list)
     baselines: list[Baseline] = field(default_factory=list)
     unfinished: list[str] = field(default_factory=list)
+    ended: bool = False
 
     @property
     def exit_code(self) -> int:

@@ -34,6 +34,22 @@ def stopped_at(name: str, by):
     return told
 
 
+def test_a_search_that_ends_at_its_limit_has_a_verdict_and_goes_on_with_more_time(recorded, tmp_path, capfd):
+    out = tmp_path / "out"
+    arguments = ("diagnose", recorded, "--model", "pendulum_chain", "--out", out, *QUICK)
+    assert main(*arguments, "--limit", "1e-9") == EXIT["TIE"]
+    early = json.loads((out / "diagnosis.json").read_text())
+    assert early["ended"] and early["verdict"] == "TIE" and "crease_friction" not in str(early["patch"])
+    said = capfd.readouterr()
+    assert "search, so far no effect" in said.err
+    assert "Not decided yet" in said.out and "dry friction" in said.out and "its limit of 1e-09 s" in said.out
+    assert (out / ".resume").exists()
+    assert main(*arguments) == EXIT["MECHANISM"]
+    assert not json.loads((out / "diagnosis.json").read_text())["ended"]
+    assert "so far crease_friction at hinge1" in capfd.readouterr().err
+    assert not (out / ".resume").exists()
+
+
 def test_a_verdict_outlives_the_process_and_all_that_fails_after_it(recorded, tmp_path, monkeypatch, capfd):
     out = tmp_path / "out"
     arguments = ("diagnose", recorded, "--model", "pendulum_chain", "--out", out, *QUICK)
