@@ -271,8 +271,9 @@ def _diagnosed(
         *([] if film is None else [Part("replay", "The replay could not be written", replay, alone=True, of=keep)]),
         Part("held out", "Held-out errors are estimates by one linear step", left_out_in_turn),
         Part("next experiment", "The next experiment could not be told", experiments),
-        Part("baselines", "Baselines could not be told", others),
     ]
+    if out.verdict != "UNTESTABLE":  # else there is nothing to be better than
+        parts.append(Part("baselines", "Baselines could not be told", others))
     if keep is not None and keep.store:
         fault = "The search could not be stored"
         make = lambda: Stored.of(forward, given, base, posterior, compared)  # noqa: E731

@@ -10,7 +10,7 @@ import numpy as np
 from origami_sim.device.scene import Setting, Settings, _parse, scene_module, scene_settings
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, nearest
 from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
@@ -177,7 +177,8 @@ def _factor(parameters: Parameters, name: str, given: float | str) -> Free:
     owner, _, parameter = name.partition(".")
     if (owner, parameter) not in set(parameters):
         known = sorted(".".join(key) for key in parameters)
-        raise InputError("there is no such parameter", field="priors", value=name, allowed=", ".join(known))
+        allowed = ", ".join(known) + nearest(name, known)
+        raise InputError("there is no such parameter", field="priors", value=name, allowed=allowed)
     text = str(given).strip()
     spread = _positive(name, text.removesuffix("%"), given, "0.05 or 5 %")
     return factor(name, 0.01 * spread if text.endswith("%") else spread)
@@ -199,7 +200,7 @@ def spreads(settings: Settings, priors: Mapping[str, float | str], *, source: ob
                 file=source,
                 field="priors",
                 value=name,
-                allowed=", ".join(numbers),
+                allowed=", ".join(numbers) + nearest(name, numbers),
             )
         out[name] = _spread(s, given, settings, source)
     return out

@@ -214,8 +214,9 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
-    text += f", p = {d.probability:.2f}; {who} {explained}.{beyond}"
     more = 1.0 - classes.get(d.lead, 0.0) * (1.0 - d.foreign) / d.probability
+    others = ", whatever acts besides" if 1.0 - CREDIBLE < more <= ALONE else ""
+    text += f", p = {d.probability:.2f}{others}; {who} {explained}.{beyond}"
     if more > ALONE:
         each = _besides(classes, d.lead)
         likely = f": {joined([f'{title(e)} (p = {v:.2f})' for e, v in each])}" if each else ""

@@ -65,12 +65,13 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
 
 
 def _named(n: Free, s: Suspect) -> str:
-    """A number of a suspect in words; of a branch of a spectrum with its number, if there are several."""
-    name, _, branch = n.name.rpartition("_")
-    if not branch.isdigit():
+    """A number of a suspect in words; that of a branch or a term says which, if there are several."""
+    name, _, place = n.name.rpartition("_")
+    if not place.isdigit():
         return n.name.replace("_", " ")
-    several = any(f.name == f"{name}_{int(branch) + 1}" or branch != "1" for f in s.free)
-    return f"{name} of branch {branch}:" if several else name
+    several = any(f.name == f"{name}_{int(place) + 1}" or place != "1" for f in s.free)
+    of = "branch" if any(f.name.startswith("time") for f in s.free) else "term"
+    return f"{name}, {of} {place}:" if several else name
 
 
 def elsewhere(f: Fit) -> str:
