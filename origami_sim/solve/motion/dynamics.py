@@ -24,6 +24,7 @@ from origami_sim.solve.oversights import (
     beyond_breakdown,
     beyond_crease_tables,
     idle_drives,
+    lumped_masses,
     outside_tables,
     refuse_start_inside_the_ground,
     refuse_start_outside_tables,
@@ -402,6 +403,7 @@ def _simulated(
         notes=[
             *said,
             *flat,
+            *lumped_masses(model, parameters),
             *idle_drives(model, parameters, drive),
             *beyond_breakdown(model, parameters, applied, drive_end),
             *below_the_ground(model, parameters, last.x),
