@@ -48,13 +48,18 @@ def named(out: Posterior) -> list[Key]:
 
 
 def _likely(out: Posterior) -> Key | None:
-    """The set to fit next: of those that may be named that which promises most, if it may be as probable as any."""
+    """The set to fit next: of those that may be named that which promises most, if it may be as probable as any.
+
+    What only adds to the best effects changes what is said only if it takes the lead, which it has to promise.
+    """
     fitted = named(out)
     others = out.estimates if len(fitted) == len(out.nodes) else [k for k in out.estimates if not out.imitates(k)]
-    least = max(out.total[k] for k in fitted) + np.log(UNFITTED)
+    best = max(fitted, key=lambda k: out.total[k])
+    near = out.total[best] + np.log(UNFITTED)
+    least = {k: out.total[best] if best and k > best else near for k in others}
     unfitted = {k: _most(out, k) for k in others}
     # another start of the shape of a set that was fitted has to promise more than that did
-    better = [k for k, w in unfitted.items() if w > max(least, out.hoped.get(out.labels(k), -np.inf) + OWED)]
+    better = [k for k, w in unfitted.items() if w > max(least[k], out.hoped.get(out.labels(k), -np.inf) + OWED)]
     return max((k for k in better if not _idle(out, k)), key=lambda k: unfitted[k], default=None)
 
 
