@@ -38,7 +38,7 @@ def run(args: Namespace) -> int:
     first = at(build, {n: v[0] for n, v in grid.items()})
     columns, pair = measures(first), [part.strip() for part in (args.pareto or "").split(",")]
     if args.pareto:  # told before anything is computed
-        _check_front(pair, [*grid, *columns])
+        _check_front(pair, [n for n in grid if not isinstance(settings[n].value, (str, bool))] + [*columns])
     duration = None
     if not args.equilibrium:
         stated = float(settings["duration"].value) if "duration" in settings else 0.0

@@ -51,10 +51,10 @@ class Sweep:
         """Rows that no other row beats in all measures, by the first one.
 
         Args:
-            measures: the smaller the better; "-angle": the larger the better.
+            measures: of these or of the inputs, the smaller the better; "-angle": the larger the better.
 
         Raises:
-            InputError: no such measure.
+            InputError: no such measure or number.
         """
         values = np.stack([self._toward(m) for m in measures], axis=1)
         known = np.all(np.isfinite(values), axis=1)
@@ -102,8 +102,9 @@ class Sweep:
 
     def _toward(self, measure: str) -> np.ndarray:
         name = measure.lstrip("-")
-        if name not in self.measures:
-            raise InputError("there is no such measure", field="measure", value=name, allowed=", ".join(self.measures))
+        known = [n for n in (*self.measures, *self.inputs) if np.issubdtype(self.columns[n].dtype, np.number)]
+        if name not in known:
+            raise InputError("there is no such measure", field="measure", value=name, allowed=", ".join(known))
         return -self.columns[name] if measure.startswith("-") else self.columns[name]
 
 

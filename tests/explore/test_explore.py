@@ -283,7 +283,8 @@ def test_pareto_front():
     assert 0 < len(front) < 6 and np.all(np.diff(mass[front]) >= 0) and np.all(np.diff(fold_[front]) > 0)
     for k in set(range(6)) - set(front.tolist()):
         assert any(mass[j] <= mass[k] and fold_[j] >= fold_[k] for j in front)
-    with pytest.raises(InputError, match="no such measure"):
+    assert found.columns["gap"][found.pareto("gap", "-fold")[0]] == 1e-3  # of what was varied, too
+    with pytest.raises(InputError, match="no such measure.*fold, mass, gap, stiffness"):
         found.pareto("weight")
 
 
@@ -343,7 +344,10 @@ def test_sweep_from_the_command_line(call, tmp_path):
     assert first["computed"] == 6 and first["columns"]["gap"] == pytest.approx([1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
     assert max(first["columns"]["hinge_deg"]) > 30
     assert (tmp_path / first["pareto"]).is_file() and (tmp_path / first["table"]).is_file()
-    again = json.loads(call(*line)[1])
+    again = json.loads(call(*line, "--pareto", "field,-hinge_deg")[1])
+    assert (tmp_path / again["pareto"]).is_file()
+    code, _, err = call(*line[:4], "--vary", "held=true", "--pareto", "held,-hinge_deg", "--out", "words")
+    assert code == 2 and "no such measure" in err and not (tmp_path / "words").exists()
     assert again["computed"] == 0 and again["columns"] == first["columns"]
     code, out, _ = call("sweep", "my_flap.py", "--vary", "gap=2mm", "--equilibrium", "--out", "rest")
     assert code == 0 and "hinge_deg" in out
