@@ -1,14 +1,11 @@
 """What a designer may have overlooked, in sentences: idle drives, what is inside the ground, tables left."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
-from origami_sim.model.bodies import body_of
 from origami_sim.model.clearance import gaps, heights
 from origami_sim.physics.materials import G
 
@@ -32,16 +29,9 @@ BREAKDOWN = 35e6, 70e6
 Smirnov, Springhetti, Morozov and Lukin 2018, Technical Physics: 35 to 70 kV/mm, slowly raised voltage.
 """
 
-LUMPED = 0.1
-"""Part by which a panel's moment of inertia about a crease may be too large before a note says so.
-
-Masses at the corners of a rectangle make it 0.5 too large, with two elements between creases 0.125, with four 0.03. A
-panel then swings slower by half of that. Half notes sheets of three elements, double lets those of two pass.
-"""
-
 FLAT = 1e-9
-"""Thickness over the device's size below which panels lie in one plane, or a node on the line of a crease: rounding
-leaves 1e-16, and what is folded by 1e-6 rad is no longer flat. Half and double change nothing."""
+"""Thickness over the device's size below which panels lie in one plane: rounding leaves 1e-16, and what is folded by
+1e-6 rad is no longer flat. Half and double change nothing."""
 
 _CHANNELS = {
     "field": "field_",
@@ -267,56 +257,6 @@ def beyond_crease_tables(model: Model, parameters: Parameters, angles: np.ndarra
     return [
         f"{model.name('crease', int(c))} folds to {at:.4g} deg, and the table of its moment goes from {low:.4g} to "
         f"{high:.4g} deg{others}: beyond, the moment goes straight on, which may be wrong."
-    ]
-
-
-def lumped_masses(model: Model, parameters: Parameters) -> list[str]:
-    """The panel that resists turning about a crease most in excess of its body, as its mass sits at its corners.
-
-    Panels that are joined by lines which are no creases are one. Those whose node masses were chosen to have their
-    inertia are right.
-    """
-    if model.panels == "rigid" or ("body", "mass") not in parameters:
-        return []
-    x, panels, mass = model.position, model.triangle_panel, parameters["body", "mass"][:, 0]
-    corners = x[model.triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    third = mass[panels] * area / np.bincount(panels, area)[panels] / 3.0
-    at_corners = np.bincount(model.triangles.ravel(), np.repeat(third, 3), minlength=len(x))
-    chosen = ~np.isclose(at_corners, parameters["inertia", "mass"][:, 0], rtol=1e-6)
-    sides: dict[tuple[int, int], list[int]] = {}
-    for nodes, panel in zip(model.triangles.tolist(), panels.tolist(), strict=True):
-        for a, b in zip(nodes, [*nodes[1:], nodes[0]], strict=True):
-            sides.setdefault((min(a, b), max(a, b)), []).append(panel)
-    pairs = np.array([sides[min(j, k), max(j, k)] for _, j, k, _ in model.bends.tolist()], int).reshape(-1, 2)
-    joints = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(mass), len(mass)))
-    whole = connected_components(joints, directed=False)[1]
-    worst, of = (1.0, 0, 0), {}
-    for c, (_, j, k, _) in enumerate(model.creases.tolist()):
-        along = (x[k] - x[j]) / np.linalg.norm(x[k] - x[j])
-        for panel in sides[min(j, k), max(j, k)]:
-            w = whole[panel]
-            if w not in of:
-                mine, triangles = np.flatnonzero(whole == w), whole[panels] == w
-                bodies = [(mass[p], *body_of(parameters, int(p))) for p in mine]
-                nodes, place = np.unique(model.triangles[triangles], return_inverse=True)
-                of[w] = bodies, nodes, np.bincount(place.ravel(), np.repeat(third[triangles], 3))
-            bodies, nodes, share = of[w]
-            away = np.sum(np.cross(x[nodes] - x[j], along) ** 2, axis=1)
-            off = away > (FLAT * _size(model)) ** 2
-            if not np.any(model.free[nodes[off]]) or np.any(chosen[nodes[off]]):
-                continue
-            true = sum(along @ t @ along + m * np.sum(np.cross(at - x[j], along) ** 2) for m, at, t in bodies)
-            worst = max(worst, (float(share @ away / true), panel, c))
-    ratio, panel, crease = worst
-    if ratio <= 1.0 + LUMPED:
-        return []
-    triangle = np.count_nonzero(panels == panel) == 1
-    better = "panels='rigid' has it" if triangle else "triangulation='center' and panels='rigid' have it"
-    return [
-        f"The mass of {model.name('panel', panel)} sits at its corners, so that its moment of inertia about "
-        f"{model.name('crease', crease)} is {ratio - 1.0:.0%} too large and it swings {np.sqrt(ratio) - 1.0:.0%} "
-        f"slower: {better} right."
     ]
 
 

@@ -284,7 +284,7 @@ def test_pareto_front():
     for k in set(range(6)) - set(front.tolist()):
         assert any(mass[j] <= mass[k] and fold_[j] >= fold_[k] for j in front)
     assert found.columns["gap"][found.pareto("gap", "-fold")[0]] == 1e-3  # of what was varied, too
-    with pytest.raises(InputError, match="no such measure.*fold, mass, gap, stiffness"):
+    with pytest.raises(InputError, match=r"no such measure.*fold, mass, gap, stiffness"):
         found.pareto("weight")
 
 

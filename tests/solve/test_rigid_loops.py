@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from origami_sim import Sheet, miura, simulate, strip
+from origami_sim.errors import InputError
+from origami_sim.pattern.mesh import uncreased
 
 
 @pytest.mark.parametrize(("cells", "duration"), [(2, 0.3), (6, 0.02)])
@@ -27,3 +29,9 @@ def test_loops_that_start_flat_are_noted(pattern, said):
     sheet = Sheet(pattern, thickness=5e-4, panels="rigid").crease(stiffness=1e-3)
     run = simulate(*sheet.build(), duration=0.02, rate=100.0)
     assert any("start flat" in n for n in run.notes) == said
+
+
+def test_faces_that_meet_at_a_flat_edge_are_refused_with_what_to_do():
+    flat = uncreased(strip([0.01] * 6, 0.02))
+    with pytest.raises(InputError, match=r"joined by creases.*panel 1, panel 2, panel 3 and 2 more.*flat \('F'\) edge"):
+        simulate(*Sheet(flat, thickness=1e-3, panels="rigid").build(), duration=0.1)

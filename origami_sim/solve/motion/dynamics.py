@@ -16,6 +16,7 @@ from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
 from origami_sim.quantities import converted
 from origami_sim.solve.batch import Evaluation
+from origami_sim.solve.lumping import lumped_masses
 from origami_sim.solve.motion.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.motion.frames import check_frames, check_memory
 from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
@@ -24,7 +25,6 @@ from origami_sim.solve.oversights import (
     beyond_breakdown,
     beyond_crease_tables,
     idle_drives,
-    lumped_masses,
     outside_tables,
     refuse_start_inside_the_ground,
     refuse_start_outside_tables,

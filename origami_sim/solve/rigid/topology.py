@@ -7,6 +7,9 @@ from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.motions import FARTHER, possible, screw
 
+NAMED = 3
+"""Panels that a sentence names; more are counted."""
+
 
 class Topology:
     """Tree of a model's panels: bodies, joints, how the root may move, and the loops to be closed.
@@ -24,11 +27,13 @@ class Topology:
         panels = arm.order
         apart = sorted(set(range(max(model.panel_count, 1))) - set(panels))
         if apart:
+            names, more = [model.name("panel", p) for p in apart[:NAMED]], len(apart) - NAMED
             raise InputError(
                 "rigid panels have to be joined by creases",
                 field="panels",
-                value=", ".join(model.name("panel", p) for p in apart),
-                allowed="one connected sheet, or panels='elastic'",
+                value=", ".join(names) + (f" and {more} more" if more > 0 else ""),
+                allowed="one connected sheet, in which faces that meet at a flat ('F') edge are one face; or "
+                "panels='elastic'",
             )
         body = {p: b for b, p in enumerate(panels)}
         self._creases = model.creases
