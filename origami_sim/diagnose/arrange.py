@@ -130,7 +130,9 @@ def slowly(subject: Subject, recordings: list[Recording], o: Options) -> tuple[P
             raise InputError("a quasi-static motion has no such start", field=what, value=value, allowed="none")
     few = [calmer(r) for r in recordings]
     if sum(len(r.times) for r in few) < sum(len(r.times) for r in recordings):
-        notes.append(f"Frames are averaged to {sum(len(r.times) for r in few):,}, in which what is slow shows.")
+        notes.append(
+            f"Frames and drive are averaged to {sum(len(r.times) for r in few):,}, in which what is slow shows."
+        )
     out, more = _slow_panels(subject, few, o)
     if asked == "auto":
         nominal = np.array([f.start for f in out.subject.nominals])

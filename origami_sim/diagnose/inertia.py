@@ -63,8 +63,8 @@ def _paced(recording: Recording, slowest: float) -> Recording:
 
 
 def calmer(recording: Recording) -> Recording:
-    """The recording thinned to about `FRAMES` frames: what is slow shows in as many."""
-    return thinned(recording, max(1, len(recording.times) // FRAMES))
+    """The recording and its drive thinned to about `FRAMES` frames: what is slow shows in as many."""
+    return thinned(recording, max(1, len(recording.times) // FRAMES), driven=True)
 
 
 def frequency(model: Model, parameters: Parameters, drive: Drive, recording: Recording) -> float:

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.prepare import among, prepared
+from origami_sim.diagnose.prepare import among, prepared, thinned
 from origami_sim.errors import InputError
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.hypotheses.suspects import suspects
@@ -59,6 +60,29 @@ def test_thinned_frames_are_means_that_follow_a_bend():
     holed = thin(swing + holes + rng.normal(0.0, 0.01, 4001)).channels["a"]
     assert np.nanstd((holed.values - swing[::5])[1:-1]) == pytest.approx(holed.noise, rel=0.08)
     assert np.isnan(holed.values).sum() <= 2
+
+
+def test_means_across_the_end_of_a_ramp_are_what_the_mean_drive_gives():
+    """A flap in a field that goes up and down in steps with ramps of 2 s, twice a second: K a = m B cos a."""
+    t = np.arange(0.0, 121.0, 0.5)
+    levels = np.interp(t, [0, 20, 22, 50, 52, 90, 92, 121], [0, 0, 0.02, 0.02, -0.01, -0.01, 0.005, 0.005])
+
+    def angle(b: np.ndarray) -> np.ndarray:
+        return np.array([brentq(lambda a: 2e-3 * a - 0.05 * v * np.cos(a), -1.5, 1.5, xtol=1e-12) for v in b])
+
+    channel = Channel("fold", "crease_angle", angle(levels), "rad", 1.5e-3, {"crease": 0})
+    field = DriveChannel("field_z", levels, "T", False)
+    recording = Recording("stairs", t, {"fold": channel}, {"field_z": field})
+    for every in (2, 3):
+        apart = {}
+        for driven in (True, False):
+            mean = thinned(recording, every, driven=driven)
+            apart[driven] = np.abs(mean.channels["fold"].values - angle(mean.drive["field_z"].at(mean.times))).max()
+        assert apart[False] > 10e-3 and apart[True] < 1e-4
+    own = replace(recording, drive={"field_z": replace(field, times=t + 0.0)})  # a clock of its own
+    assert thinned(own, 2, driven=True).drive["field_z"].at(t[::2]) == pytest.approx(
+        thinned(recording, 2, driven=True).drive["field_z"].values, abs=1e-15
+    )
 
 
 @pytest.mark.parametrize(("rate", "every"), [(400, 2), (500, 2), (700, 3), (800, 4)])
