@@ -40,8 +40,9 @@ Half and double change the verdict of no strip, and the probability of what is n
 ROUNDS = 8
 """Times that a suspect is simulated again, at most, until its strength suits. A delay of a field took three."""
 
-CHUNK = 6
-"""Suspects that are simulated together, so that progress shows and cores share them."""
+CHUNK, ALONG = 6, 24
+"""Suspects that are simulated together, so that progress shows and cores share them; and of equilibria along time or
+loads, of which every frame takes its time however many worlds there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,8 @@ def screen(
         sized: whether the scales of strengths are known to suit.
     """
     single = [one for s in suspects if not _together(s, suspects) for one in along_each_axis(s)]
-    groups = [single[k : k + CHUNK] for k in range(0, len(single), CHUNK)]
+    count = ALONG if forward.curve else CHUNK
+    groups = [single[k : k + count] for k in range(0, len(single), count)]
     goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
     jobs = [partial(_signatures, forward, group, base, weights, goal, sized) for group in groups]
     each = side_by_side(jobs, forward.threads, progress)

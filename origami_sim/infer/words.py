@@ -58,7 +58,9 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
         strength = f"{_named(n, s)} {said(t, n.unit, digits)}{at_each}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""
+        gone = {n.name.rpartition("_")[2] for n in s.strengths if bound[id(n)]}  # branches of a spectrum
         shape = [n for n in s.free if n not in s.strengths and not bound[id(n)]] if len(every) == 1 else []
+        shape = [n for n in shape if n.name.rpartition("_")[2] not in gone]
         more = "".join(f"; {_named(n, s)} {said(value[id(n)], n.unit)}" for n in shape[:2])
         sites.setdefault(what, []).append(f"{where}({strength}{interval}{more})")
     return joined([f"{what} {joined(each)}" for what, each in sites.items()])

@@ -207,6 +207,16 @@ def test_a_world_without_an_equilibrium_is_reported():
     assert run.failures and "frame 0" in str(run.failures[0])
 
 
+def test_a_world_that_falls_at_every_step_is_given_up():
+    """A crease that is wound up by more than a turn has no equilibrium within the half turn that is searched."""
+    sheet = Sheet(strip([0.02, 0.02], 0.02), thickness=1e-3, panels="rigid").crease(stiffness=K).fix(panels=[0])
+    sheet.set("crease_offset", offset_moment=7.5 * K).on("crease_drive")
+    sheet.set("crease_drive", drive_stiffness=1e-4, target_angle=1.0)
+    run = quasistatic(*sheet.build(), Drive(load=ramp(1.0, 9.0)), np.arange(10.0))
+    assert "that it keeps" in run.failures[0].cause and "20 equilibria" not in run.notes[0]
+    assert int(run.notes[0].split("frames, ")[1].split()[0]) < 30
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -53,6 +53,12 @@ LARGE = 0.05
 SUDDEN = 0.9
 """Part of a large move that one half of a step may make; half is even, 3/4 a parabola from rest, 1 a jump."""
 
+FALLS = 8
+"""Shortest steps in a row, from each of which a world falls, after which it is given up: a snap takes one or two.
+
+A flap that is wound up by more than a turn falls at every step, at a tenth of a second each.
+"""
+
 FARTHEST = 4.0
 """Length of a step over that of the one before, up to which it is looked ahead from there."""
 
@@ -237,7 +243,7 @@ class March:
         self.jumps: list[Jump] = []
         self.failures: list[Failure] = []
         self.steps, self.time = 0, 0.0
-        self.alive = np.ones(0, bool)
+        self.alive, self._falls = np.ones(0, bool), np.zeros(0, int)
         self.state: State
 
     def begin(self, state: State, time: float, before: np.ndarray | None = None):
@@ -247,7 +253,7 @@ class March:
             before: level of the drive in which it had rested for ever [channels, W]; None: nothing acted on the state.
         """
         self.state, self.time = state, time
-        self.alive = np.ones(state.worlds, bool)
+        self.alive, self._falls = np.ones(state.worlds, bool), np.zeros(state.worlds, int)
         if before is not None:
             self._from_afar(before, FOREVER)
         self._from_afar(levels(self.drive, time, state.worlds), INSTANT)
@@ -286,14 +292,15 @@ class March:
             if not good and not last:
                 todo.append(self.time + 0.5 * dt)
                 continue
+            lost = self.alive & ~found
             if not good:
-                lost = self.alive & ~found
                 if np.any(lost):
                     level = levels(self.drive, to, len(found))
                     whole, found = self.search.settle(level, self.state, whole.x, self.alive, dt=dt, time=to)
                     sudden |= lost & found & (self._apart(self.state, whole) > LARGE * self.size)
                 self._say(sudden, whole, frame, to)
-            self._take(whole, found, frame, to)
+            self._falls = np.where(lost, self._falls + 1, 0)
+            self._take(whole, found & (self._falls < FALLS), frame, to)
             if np.any(sudden):  # nothing goes on as it went in a jump
                 self._before = None
             todo.pop()
@@ -350,7 +357,8 @@ class March:
         """Goes on to a state; worlds without an equilibrium stay where they were and are given up."""
         for w in np.flatnonzero(self.alive & ~found):
             at = self.time if time is None else time
-            cause = f"no stable equilibrium at frame {frame}, nor anywhere that it could fall to"
+            where = "that it keeps" if self._falls[w] >= FALLS else "nor anywhere that it could fall to"
+            cause = f"no stable equilibrium at frame {frame}, {where}"
             self.failures.append(Failure(int(w), at, self._worst(int(w), at), cause))
         self.alive = self.alive & found
         out = new.copy()

@@ -294,10 +294,16 @@ class Settling(ABC):
 
     def _solved(self, factors, x: np.ndarray, going: np.ndarray) -> np.ndarray:
         f = self._unbalanced(x)
-        out = np.zeros_like(f)
-        for w in np.flatnonzero(going):
-            out[:, w] = factors[w].solve(f[:, w])
+        out, of = np.zeros_like(f), dict[int, list[int]]()
+        for w in np.flatnonzero(going).tolist():
+            of.setdefault(id(factors[w]), []).append(w)
+        for mine in of.values():
+            out[:, mine] = self._each(factors[mine[0]], f[:, mine])
         return out
+
+    def _each(self, factor, right: np.ndarray) -> np.ndarray:
+        """What a tangent gives for forces [m, k] of several worlds."""
+        return np.stack([factor.solve(one) for one in right.T], axis=1)
 
     def _copies(self, w: int, count: int) -> Held:
         """Copies of a world, from whose differences its tangent comes."""
@@ -379,12 +385,12 @@ class _Small:
     """A dense tangent of any symmetry along some directions [m, d], shifted."""
 
     def __init__(self, k: np.ndarray, shift: float, along: np.ndarray):
-        self._along = along
         k = k + shift * np.eye(len(k))
-        self._inverse = np.linalg.pinv(k, rcond=1e-15)
+        self._whole = along @ np.linalg.pinv(k, rcond=1e-15) @ along.T
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        return self._along @ (self._inverse @ (self._along.T @ right))
+        """What gives forces [m, k]; each column is the same to the last digit whatever others are beside it."""
+        return np.einsum("ab,bk->ak", self._whole, right)
 
 
 class SettlingPanels(Settling):
@@ -415,6 +421,9 @@ class SettlingPanels(Settling):
 
     def _unbalanced(self, x):
         return np.einsum("mnwa,nwa->mw", self.tree.rates(x), self._force(x))
+
+    def _each(self, factor, right):
+        return factor.solve(right)
 
     def _moved(self, x, s):
         if not self.loops:
