@@ -10,7 +10,6 @@ from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.infer.verdict import Judgement, log_odds
-from origami_sim.infer.words import kind
 from origami_sim.observation.channels import units_of
 from origami_sim.report.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 
@@ -30,7 +29,7 @@ def table(
         out.append(
             Candidate(
                 p.label(key) if key else "nominal refitted",
-                kind(f),
+                _kind(f),
                 [s.effect for s in f.hypothesis.suspects],
                 [s.site for s in f.hypothesis.suspects],
                 numbers(f),
@@ -227,3 +226,9 @@ def patch(best: Fit) -> dict[str, float]:
         where = "" if n.entities is None else "@" + ",".join(map(str, n.entities))
         out[n.label + where] = float(t)
     return out
+
+
+def _kind(f: Fit) -> str:
+    """nominal, mechanism or measurement."""
+    kinds = {s.kind for s in f.hypothesis.suspects}
+    return "measurement" if kinds == {"measurement"} else "mechanism" if kinds else "nominal"

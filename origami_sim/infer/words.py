@@ -16,14 +16,6 @@ PEOPLE = ("Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
 """Names with which titles of effects begin; they keep their capital."""
 
 
-def kind(f: Fit) -> str:
-    """nominal, mechanism or measurement."""
-    kinds = {s.kind for s in f.hypothesis.suspects}
-    if not kinds:
-        return "nominal"
-    return "measurement" if kinds == {"measurement"} else "mechanism"
-
-
 def pooled(errors: np.ndarray) -> float:
     """Root mean square of what components miss, in multiples of their noise (D,)."""
     return float(np.sqrt(np.nanmean(np.square(errors))))

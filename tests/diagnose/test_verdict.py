@@ -292,6 +292,19 @@ def test_other_numbers_of_a_single_effect_are_said_unless_they_lie_on_a_bound(he
     )
 
 
+def test_times_of_branches_without_a_stiffness_are_not_said():
+    n = {"stiffness": ("N m/rad", 1e-5), "time": ("s", 1.0)}
+    free = tuple(
+        Free("crease_relaxation", f"{k}_{i}", unit, float(k == "time"), scale)
+        for k, (unit, scale) in n.items()
+        for i in (1, 2)
+    )
+    suspect = Suspect("crease_relaxation", "hinge", "crease", free, (0,))
+    values, sd = np.array([0.0, 4e-4, 8.7, 23.9]), np.full(4, 1e-6)
+    text = say(fitted([suspect], values, sd, (values - 2 * sd, values + 2 * sd), np.array([True, False, False, False])))
+    assert "time, branch 2: 23.9 s" in text and "8.7" not in text
+
+
 @pytest.mark.parametrize(("numbers", "far", "words"), [(0.7, 2.0, True), (0.7, 0.5, False), (0.2, 2.0, False)])
 def test_where_numbers_explain_more_the_one_that_moved_farthest_is_said(numbers, far, words):
     known = (Free("", "mass", "kg", 0.02, 1e-3, spread=1e-3), Free("", "stiffness", "N m/rad", 3e-3, 1e-4, spread=1e-4))
