@@ -10,6 +10,7 @@ from the upright vertical.
 import numpy as np
 
 from origami_sim.design.build import Sheet
+from origami_sim.device.begun import filmed
 from origami_sim.device.scene import Outcome, Progress, Settings, motion_of
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State
@@ -138,8 +139,7 @@ def replicate(s: Settings, recording: Recording, progress: Progress | None = Non
     """Simulates what was recorded, from the recording's own initial state, frame by frame."""
     s = from_recording(s, recording)
     model, parameters, drive = build(s)
-    rate = round(1.0 / float(np.median(np.diff(recording.times))))
-    duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
+    duration, rate = filmed(recording)
     lasting = {"duration": duration, "rate": rate, "accuracy": s.accuracy}
     motion = simulate(model, parameters, drive, **lasting, state=start(s, model), progress=progress)
     return motion, s

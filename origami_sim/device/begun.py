@@ -1,10 +1,13 @@
-"""Where a recorded motion begins, as a state of the model that is simulated beside it."""
+"""Where a recorded motion begins, as a state of the model that is simulated beside it, and which frames it has."""
 
 import numpy as np
 
-from origami_sim.model import Model, State
+from origami_sim.drive import Drive
+from origami_sim.errors import InputError
+from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.recording import Recording, initial_angles
+from origami_sim.solve.statics.equilibria import equilibrium
 
 CLEAR = 3.0
 """Standard deviations of the noise from which the first frame shows another pose than the reference state."""
@@ -13,7 +16,46 @@ MOVING = 2.0
 """Standard errors from which a rate of the first frames is one."""
 
 
-def begun(model: Model, recording: Recording) -> State | None:
+def filmed(recording: Recording) -> tuple[float, float]:
+    """Seconds and frames per second of a simulation that is laid over a recording.
+
+    Its frames lie on the recorded ones; a whole number a second does that even where a clock rounds its times.
+    """
+    times = recording.times - recording.times[0]
+    own = 1.0 / float(np.median(np.diff(times)))
+
+    def beside(rate: float) -> float:
+        return round(float(np.abs(times - np.round(times * rate) / rate).mean()), 9)  # [s], to less than clocks tell
+
+    rate = min((float(r) for r in (round(own), own) if r > 0), key=beside)
+    return float(np.ceil(times[-1] * rate - 1e-6)) / rate, rate
+
+
+def begun(model: Model, parameters: Parameters, drive: Drive, recording: Recording) -> State | None:
+    """The state in which a recording begins; None where the model starts as it does by itself.
+
+    Where the sidecar states an equilibrium, it is that in the drive of the first frame, the nearest to what is seen.
+    Else it is as `seen` tells.
+
+    Raises:
+        InputError: there is no such equilibrium.
+    """
+    state = seen(model, recording)
+    if recording.start is None or recording.start.state != "equilibrium":
+        return state
+    found = equilibrium(model, parameters, drive, state=state)
+    if not found.converged:
+        raise InputError(
+            f"the model has no equilibrium in the drive of the first frame ({found.message.rstrip('.')})",
+            file=recording.metadata.get("sidecar"),
+            field="start",
+            value="equilibrium",
+            allowed="released, moving",
+        )
+    return found.state
+
+
+def seen(model: Model, recording: Recording) -> State | None:
     """The state at the recorded fold angles and their rates; None where the model starts as it does by itself.
 
     That is where no fold angle is recorded or stated, or where the first frame shows the reference state; and for

@@ -27,7 +27,7 @@ import numpy as np
 
 from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import Design, is_design, read_design
-from origami_sim.device.begun import begun
+from origami_sim.device.begun import begun, filmed
 from origami_sim.device.scene import (
     NAMES,
     Outcome,
@@ -39,14 +39,15 @@ from origami_sim.device.scene import (
     read_calibration,
     scene_module,
 )
-from origami_sim.drive import Drive
+from origami_sim.drive import Drive, as_signal
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import PATTERNS
 from origami_sim.model import Model, Parameters
 from origami_sim.quantities import ANY, Quantity, converted, parsed
-from origami_sim.recording import Recording, applied_drive
+from origami_sim.recording import Recording, recorded_signals
 from origami_sim.recording.placed import surrounded
 from origami_sim.solve.motion.dynamics import Trajectory
+from origami_sim.solve.motion.quasistatic import quasistatic
 
 SETTLE = 1.0
 """Seconds that a device is simulated for after its ramps have ended, unless it says how long.
@@ -241,11 +242,15 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
     def replicate(s: Settings, recording: Recording, progress: Progress | None = None) -> tuple[Trajectory, Settings]:
         """What was recorded, from where it begins, in the drive that was recorded over the device's own."""
         model, parameters, drive, *_ = out.build(s)
-        rate = round(1.0 / float(np.median(np.diff(recording.times))))
-        duration = float(np.ceil((recording.times[-1] - recording.times[0]) * rate - 1e-6)) / rate
-        stated = {n: v for n, v in applied_drive(recording).signals.items() if not v.is_zero}
-        drive = surrounded(drive, recording).replace(**stated)
-        state = None if s.motion == "quasistatic" else begun(model, recording)
+        told = {n: as_signal(v) for n, v in recorded_signals(recording).items()}
+        told = {n: v for n, v in told.items() if n in drive.signals or not v.is_zero}  # of what a device lacks: nothing
+        drive = surrounded(drive, recording).replace(**told)
+        s = s.with_motion(recording.motion or s.motion)
+        if s.motion == "quasistatic":
+            rested = recording.start is not None and recording.start.state == "equilibrium"
+            times, before = recording.times - recording.times[0], drive.held(0.0) if rested else None
+            return quasistatic(model, parameters, drive, times, before=before, progress=progress), s
+        (duration, rate), state = filmed(recording), begun(model, parameters, drive, recording)
         return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state), s
 
     out.raw, out.build = raw, extended(whole)

@@ -3,7 +3,7 @@
 from origami_sim.recording.axes import Axes, mistaken_axes
 from origami_sim.recording.camera import Camera
 from origami_sim.recording.dataset import DataSet, read_dataset
-from origami_sim.recording.drives import applied_drive, by_component
+from origami_sim.recording.drives import applied_drive, by_component, recorded_signals
 from origami_sim.recording.initial_state import AngleEstimate, initial_angles
 from origami_sim.recording.lint import Series, lint, lint_report
 from origami_sim.recording.noise import NoiseReport, noise_report
@@ -37,6 +37,7 @@ __all__ = [
     "noise_report",
     "read_dataset",
     "read_recording",
+    "recorded_signals",
     "simulate_double_pendulum",
     "stand_in_double_pendulum",
 ]

@@ -39,16 +39,21 @@ def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
         raise InputError("a quasi-static curve has no course in time: state the step", field="step")
     if step is not None and not 0 <= step < recording.frame_count:
         raise InputError("no such step", field="step", value=step, allowed=f"0 to {recording.frame_count - 1}")
-    signals = {}
-    for name, drive in recording.drive.items():
-        family = name.split("_")[0]
-        if family in UNITS:
-            signals |= _signals(name, drive, recording, step)
+    signals = recorded_signals(recording, step)
     groups = [int(name.removeprefix("voltage_")) for name in signals if name.startswith("voltage_")]
     applied = surrounded(Drive(voltage=[0.0] * (max(groups, default=0) + 1)), recording).replace(**signals)
     if step is None or not recording.sources:
         return applied
     return applied.held(float(recording.times[step] - recording.times[0]))
+
+
+def recorded_signals(recording: Recording, step: int | None = None) -> dict:
+    """Signals of what was recorded of a drive, by channel of the simulator; see `applied_drive`."""
+    signals = {}
+    for name, drive in recording.drive.items():
+        if name.split("_")[0] in UNITS:
+            signals |= _signals(name, drive, recording, step)
+    return signals
 
 
 def switches(recording: Recording) -> dict[str, tuple[np.ndarray, np.ndarray]]:
