@@ -28,6 +28,8 @@ LATE = {
     ("solve.motion", "view"): "the same of a trajectory",
     ("observation", "view"): "the same of a comparison",
     ("view", "folding"): "what is told of a folding beside its drawing",
+    ("device", "observation"): "a comparison begins where channels show the device",
+    ("device", "predict"): "as the diagnosis reads that",
     ("device", "report"): "a calibration may be one that a diagnosis has patched",
 }
 """Imports against the order, inside the functions that need them."""

@@ -42,7 +42,7 @@ from origami_sim.device.scene import (
 from origami_sim.drive import Drive, as_signal
 from origami_sim.errors import InputError, nearest
 from origami_sim.files import PATTERNS
-from origami_sim.model import Model, Parameters
+from origami_sim.model import Model, Parameters, State
 from origami_sim.quantities import ANY, Quantity, converted, parsed
 from origami_sim.recording import Recording, recorded_signals
 from origami_sim.recording.placed import surrounded
@@ -250,8 +250,13 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
             rested = recording.start is not None and recording.start.state == "equilibrium"
             times, before = recording.times - recording.times[0], drive.held(0.0) if rested else None
             return quasistatic(model, parameters, drive, times, before=before, progress=progress), s
-        (duration, rate), state = filmed(recording), begun(model, parameters, drive, recording)
-        return motion_of(s, model, parameters, drive, duration=duration, rate=rate, progress=progress, state=state), s
+
+        def roll(state: State | None, part: Recording, told: Progress | None = None) -> Trajectory:
+            (duration, rate), worlds = filmed(part), 1 if state is None else state.worlds
+            each = Parameters.join([parameters], repeat=worlds)
+            return motion_of(s, model, each, drive, duration=duration, rate=rate, progress=told, state=state)
+
+        return roll(begun(model, parameters, drive, recording, roll), recording, progress), s
 
     out.raw, out.build = raw, extended(whole)
     out.run, out.own_run = own.get("run", run), "run" in own

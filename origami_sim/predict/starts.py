@@ -23,6 +23,9 @@ The reading only says where fits begin; the data themselves decide. Twice or hal
 POSSIBLE = 2.0
 """Standard deviations within which a rate that a window tells is possible."""
 
+BENT = 1.5
+"""Noise, in multiples of what is stated, from which on a window holds more than a motion and noise."""
+
 NEAR = 4
 """Frames from where a segment begins within which its start has to be seen."""
 
@@ -195,7 +198,7 @@ def local_line(
             scatter = np.sqrt(np.sum((values[good, d] - design @ fit) ** 2) / (len(good) - 4))
             doubt = max(scatter, noise[d]) * np.linalg.norm(np.linalg.pinv(design)[1]) / span
             rate = fit[1] / span
-            bent = scatter > 1.5 * noise[d]
+            bent = scatter > BENT * noise[d]
             low, high = max(low, rate - POSSIBLE * doubt), min(high, rate + POSSIBLE * doubt)
             begun = bool(np.isfinite(level[d]))
             fits = not begun or not (bent or low > high)
