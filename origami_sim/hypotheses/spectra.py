@@ -52,9 +52,14 @@ def without_idle(s: Suspect, values: np.ndarray, every: Sequence[Suspect]) -> tu
     """
     # a branch's numbers end in its number: stiffness_2, time_2
     idle = {f.name[-2:] for f, v in zip(s.free, values, strict=True) if f in s.strengths and abs(v) < IDLE * f.scale}
-    kept = np.array([v for f, v in zip(s.free, values, strict=True) if f.name[-2:] not in idle])
+    left = [(f.name, v) for f, v in zip(s.free, values, strict=True) if f.name[-2:] not in idle]
+    kept = np.array([v for _, v in left])
     shorter = [t for t in every if t.label == s.label and len(t.free) == len(kept) < len(values)]
     if not shorter:
         return s, values
-    times = np.log(kept[1::2])
-    return min(shorter, key=lambda t: float(np.abs(times - np.log([f.start for f in t.free[1::2]])).sum())), kept
+    times = np.log([v for name, v in left if name.startswith("time_")])  # beside what a branch remembers at the start
+
+    def apart(t: Suspect) -> float:
+        return float(np.abs(times - np.log([f.start for f in t.free if f.name.startswith("time_")])).sum())
+
+    return min(shorter, key=apart), kept

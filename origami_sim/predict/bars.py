@@ -130,7 +130,10 @@ def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
     quiet = model.with_effects(*added)
     out = parameters.for_model(quiet)
     with np.errstate(divide="ignore"):
-        mobility = np.any(model.free, axis=1)[:, None] / parameters["inertia", "mass"]
+        mass = parameters["inertia", "mass"]
+        mobility = np.divide(
+            1.0, mass, out=np.zeros_like(mass), where=np.any(model.free, axis=1)[:, None]
+        )  # of held: 0
         if "bars" in model.effects:
             lighter = 1.0 / np.maximum(mobility[model.bars].sum(axis=1), 1e-300)
             dashpot = 2 * RATIO * np.sqrt(parameters["bars", "stiffness"] * np.minimum(lighter, 1e300))

@@ -157,6 +157,12 @@ def test_branches_that_a_fit_leaves_at_nothing_are_left_out():
     assert without_idle(three, np.array([0.0, 1.0, scale, 30.0, 1e-9 * scale, 9.0]), every)[0] is late
     shorter, kept = without_idle(three, np.array([scale, 1.0, 0.0, 10.0, 2 * scale, 50.0]), every)
     assert len(shorter.free) == 4 and kept.tolist() == [scale, 1.0, 2 * scale, 50.0]
+    begun = tuple(replace(three.free[0], name=f"begun_{n}", recording=0) for n in (1, 2, 3))  # which may be negative
+    more = [replace(s, free=(*s.free, *begun[: len(s.free) // 2])) for s in every]
+    held = np.array([scale, 1.0, 0.0, 10.0, 2 * scale, 50.0, -1.0, 0.0, -3.0])
+    with np.errstate(invalid="raise"):
+        shorter, kept = without_idle(more[-1], held, more)
+    assert len(shorter.free) == 6 and kept.tolist() == [scale, 1.0, 2 * scale, 50.0, -1.0, -3.0]
     whole = np.array([scale, 1.0, scale, 10.0, scale, 50.0])
     assert without_idle(three, whole, every) == (three, whole)
 
