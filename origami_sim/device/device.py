@@ -48,6 +48,7 @@ from origami_sim.recording import Recording, recorded_signals
 from origami_sim.recording.placed import surrounded
 from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.motion.quasistatic import quasistatic
+from origami_sim.units import UNITS, spelled
 
 SETTLE = 1.0
 """Seconds that a device is simulated for after its ramps have ended, unless it says how long.
@@ -294,7 +295,8 @@ def _settings(build: Callable, path: Path, own: Mapping[str, Any]) -> tuple[Sett
         value, unit = valued(p.default)
         if value is not None:
             defaults[name] = p.default
-            settings.append(Setting(name, value, unit, path.name, meaning.get(name, "an argument of build()")))
+            means = meaning.get(name, "an argument of build()")
+            settings.append(Setting(name, value, _unit_said(means) if unit == ANY else unit, path.name, means))
     run = {"duration": ("s", own.get("DURATION", 0.0), "of the motion; 0: as long as the drive takes"),
            "rate": ("Hz", own.get("RATE", 60.0), "frames per second")}  # fmt: skip
     for name, (unit, value, what) in run.items():
@@ -318,6 +320,12 @@ def valued(default: Any) -> tuple[float | str | bool | None, str]:
             return default, ""
         return float(number), number.unit
     return None, ""
+
+
+def _unit_said(meaning: str) -> str:
+    """The SI unit in brackets that a meaning states of a number without one, "of the magnet [A m^2]"."""
+    said = spelled("".join(re.findall(r"\[([^\[\]]+)\]", meaning)[-1:]))
+    return said if any(said == next(iter(group)) for group in UNITS.values()) else ANY
 
 
 def _as(value: Any, default: Any, name: str, path: Path) -> Any:

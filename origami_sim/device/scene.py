@@ -268,7 +268,7 @@ def taken(own: Settings, given: Settings) -> tuple[list[str], list[str]]:
             allowed=f"{', '.join(own)}; Sheet.crease_law(FILE) in a device of yours",
         )
     for n in names:
-        if given[n].unit != own[n].unit and own[n].unit != ANY:
+        if given[n].unit != own[n].unit and ANY not in (given[n].unit, own[n].unit):
             allowed = own[n].unit
             raise InputError("wrong unit", file=given.file, field=f"{n}.unit", value=given[n].unit, allowed=allowed)
     tables = {re.sub(r"_\d\d$", "", n): None for n in given if n not in own and n != CALIBRATED}

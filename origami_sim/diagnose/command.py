@@ -37,6 +37,7 @@ from origami_sim.hypotheses.subject import alignments, divided, numbers, split, 
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
+from origami_sim.quantities import ANY
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page import geometry_of, write_report
@@ -459,7 +460,7 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
     shown = patched(d)
     for n in shown.numbers if shown is not None else []:
         bound = ", at its bound" if n.at_bound else ""
-        unit = "" if n.unit in ("-", "1") else f" {n.unit}"
+        unit = "" if n.unit in ("-", "1", ANY) else f" {n.unit}"
         lines.append(f"  {n.label} = {n.value:.4g}{unit}, 95 % interval {n.low:.4g} to {n.high:.4g}{bound}")
     lines += ["", f"{'rms error, held out':24s} {'noise':>10s} {'as given':>10s} {'refitted':>10s} {'explained':>10s}"]
     rows = zip(d.components, d.units, d.noise, d.error_before, d.error_refitted, d.error_after, strict=True)

@@ -7,6 +7,7 @@ import numpy as np
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.hypotheses.hypothesis import Free, Suspect
+from origami_sim.quantities import ANY
 from origami_sim.recording.units import quantity
 
 WHOLE = ("the measurement", "the drive", "the ground")
@@ -76,8 +77,8 @@ def elsewhere(f: Fit) -> str:
 
 
 def said(value: float, unit: str, digits: int = 3) -> str:
-    """A number with its unit; a plain factor has none."""
-    return f"{value:.{digits}g}" if unit in ("-", "1", "") else quantity(value, unit, digits=digits)
+    """A number with its unit; a plain factor has none, and what a device states without one."""
+    return f"{value:.{digits}g}" if unit in ("-", "1", "", ANY) else quantity(value, unit, digits=digits)
 
 
 def title(effect: str) -> str:

@@ -190,9 +190,9 @@ def compare(recording: Recording, predicted: Mapping[str, np.ndarray], *, thresh
     the threshold again later, as it changes sign.
 
     Three warnings. A simulation that starts from a measured rate drifts off by that rate's error within milliseconds:
-    fit the initial state before calling an early parting physics, as a device's `replicate` does. Noise that is correlated over more
-    than five frames parts sooner than stated. And a bias below the threshold never parts, however long it lasts:
-    compare the rms residual with the noise.
+    fit the initial state before calling an early parting physics, as a device's `replicate` does. Noise that is
+    correlated over more than five frames parts sooner than stated. And a bias below the threshold never parts, however
+    long it lasts: compare the rms residual with the noise.
 
     Args:
         recording: the recording.

@@ -107,6 +107,16 @@ def test_frames_a_second_are_whole_where_a_clock_rounds(rate, digits, frames):
     assert filmed(Recording("film", times, {}))[1] == pytest.approx(frames, rel=1e-6)
 
 
+def test_a_plain_number_has_the_unit_that_its_meaning_states(tmp_path):
+    said = "stiffness: of the hinge [N m/rad]. gap: between [mm]. rub: a share."
+    meaning = f'    """A flap.\n\n    Args:\n        {said}\n    """\n'
+    stated = FLAP.replace('stiffness="2 mN m/rad"):\n', "stiffness=2e-3, gap=1.0, rub=0.3):\n" + meaning)
+    (tmp_path / "flap.py").write_text(stated)
+    settings = scene_settings(device_module(str(tmp_path / "flap.py")))
+    assert [settings[n].unit for n in ("stiffness", "gap", "rub")] == ["N m/rad", "SI", "SI"]
+    assert settings.override(["stiffness=3 mN m/rad"]).stiffness == pytest.approx(3e-3)
+
+
 @pytest.mark.parametrize("motion", ["dynamic", "quasistatic"])
 def test_a_drive_that_was_recorded_as_nothing_is_none(flap, motion):
     """The device's own field would swing it; and what rests in the field of the first frame does not move in it."""

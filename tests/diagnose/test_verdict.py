@@ -45,6 +45,7 @@ def test_what_a_fit_explains_goes_to_the_parts_by_what_they_change():
 def test_words_are_those_of_a_physicist():
     assert joined(["a", "b", "c"]) == "a, b and c" and joined(["a"]) == "a"
     assert said(1.03, "-") == "1.03" and said(0.0123, "rad").endswith("rad")
+    assert said(0.391, "SI") == "0.391", "what a device states without a unit has none"
     assert title("air_drag")[0].islower() and "_" not in title("air_drag")
 
 

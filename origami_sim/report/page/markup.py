@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from origami_sim.quantities import ANY
 from origami_sim.recording.units import with_prefix
 
 MISSING = "–"
@@ -65,7 +66,7 @@ def scaled_unit(value: float, unit: str) -> tuple[float, str]:
 
 def pretty(unit: str) -> str:
     """A unit in print: m², s⁻¹; nothing for pure numbers."""
-    return "" if unit in ("1", "-") else raised(unit)
+    return "" if unit in ("1", "-", ANY) else raised(unit)
 
 
 def raised(text: str) -> str:
