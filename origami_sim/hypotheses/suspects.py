@@ -55,6 +55,8 @@ def suspects(
             sites += _edges(model)
         if effect.inertia is not None:  # what was added sits at a point, what was mistaken is a panel's
             at = [*_edges(model), *points(model)] if _in_kilograms(effect) else []
+            if _in_kilograms(effect):  # nodes that move, so that what is said is the mass of all of them
+                sites = [("the body", "body", tuple(np.flatnonzero(model.free.any(axis=1)).tolist()))]
             sites = at or [*sites, *_panels(model)]
         if effect.family == "measurement":
             sites = _channel_sites(recordings[0], effect.channels)

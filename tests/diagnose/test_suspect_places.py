@@ -33,6 +33,18 @@ def asked(model, parameters, drive, channels=1):
     return told_apart(every, channels)
 
 
+def test_a_mass_on_a_single_panel_is_that_of_all_nodes_that_move():
+    sheet = Sheet(strip([0.01, 0.03], 0.02), thickness="1 mm", panels="rigid").mass(1, "3 g")
+    model, parameters = sheet.crease(stiffness="2 mN m/rad").gravity().fix(panels=[0]).build()
+    mass = next(s for s in asked(model, parameters, Drive()) if s.effect == "added_mass")
+    assert mass.entities is not None and mass.free[0].entities == mass.entities
+    model = model.with_effects("added_mass")
+    parameters = parameters.for_model(model)
+    loaded = apply(parameters, Hypothesis((mass,)), [1e-4], model)
+    before, after = (node_mass(model, p).sum() for p in (parameters, loaded))
+    assert mass.site == "the body" and after - before == pytest.approx(1e-4 * len(mass.entities))
+
+
 def test_a_beam_is_suspected_in_quarters_and_thirds(scenes):
     model, *_ = scenes["mae_cantilever"]
     every = [s for s in asked(*scenes["mae_cantilever"]) if s.stretch]
