@@ -30,7 +30,7 @@ from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
-from origami_sim.hypotheses.subject import Source, subject_of
+from origami_sim.hypotheses.subject import Source, subject_of, untold
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.posterior import Posterior, marginals
@@ -156,9 +156,7 @@ def _diagnosed(
     how = {"given": given, "calm": calm, "going_on": going_on, "most": o.fits, "store": store}
     posterior = search(forward, base, signatures, weights, **how)
     lap("search")
-    lost = dict.fromkeys(s.suspect.label for s in posterior.signatures if s.status)
-    if lost:
-        noted.append(f"Not tested, because these recordings do not tell: {', '.join(lost)}.")
+    noted += untold(subject, [s.suspect for s in posterior.signatures if s.status])
     tell("verdict", 0.0)
     judged = judge(forward, given, base, posterior, compared)
     if (cause := wrong or loop) is not None:

@@ -1,7 +1,7 @@
 """What may be handed to `diagnose` as the model."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -11,7 +11,7 @@ from origami_sim.device.scene import Setting, Settings, _parse, scene_module, sc
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, DISTORTIONS, get
 from origami_sim.errors import InputError, nearest
-from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, factor
+from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, Suspect, factor
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
 
@@ -68,6 +68,31 @@ def subject_of(source: Source, priors: Mapping[str, float | str] | None = None) 
         value=type(source).__name__,
         allowed="a scene, (model, parameters), (model, parameters, drive), or a Subject",
     )
+
+
+def untold(subject: Subject, lost: Sequence[Suspect]) -> list[str]:
+    """Notes on suspects that recordings do not tell, or not from a number of the model that is fitted anyway."""
+    same = refitted_as(subject, lost)
+    other = [n for n in dict.fromkeys(s.label for s in lost) if n not in same]
+    said = [f"{label} (by {', '.join(names)})" for label, names in same.items()]
+    out = [f"Refitted as numbers of the model, and not tested beside them: {', '.join(said)}."] if said else []
+    return out + ([f"Not tested, because these recordings do not tell: {', '.join(other)}."] if other else [])
+
+
+def refitted_as(subject: Subject, some: Sequence[Suspect]) -> dict[str, list[str]]:
+    """Settings that a fit changes and that state the numbers of suspects at their places, by the suspects' labels."""
+    start = {f.name: f.start for f in subject.nominals}
+    out: dict[str, list[str]] = {}
+    _, own, *_ = subject.build(start)
+    for f in subject.nominals:
+        step = f.scale if f.start + f.scale <= f.upper else -f.scale
+        _, other, *_ = subject.build({**start, f.name: f.start + step})
+        for s in some:
+            key = s.effect, s.free[0].name
+            rows = np.flatnonzero(np.any(own[key] != other[key], axis=1)).tolist() if key in own else []
+            if rows and (s.entities is None or set(rows) <= set(s.entities)) and f.name not in out.get(s.label, ()):
+                out.setdefault(s.label, []).append(f.name)
+    return out
 
 
 def divided(priors: Mapping[str, float | str], model: Model) -> tuple[dict, dict]:

@@ -156,11 +156,9 @@ def _sites(model: Model, family: str):
     if family in DISTORTIONS:
         return [("the " + family, family, None)]
     if family in CONTACTS:
-        names = [model.name("contact", k) for k in range(len(model.contacts))]
-        feet = [(n, "ground", tuple(k)) for n, k in named(names).items() if len(k) > 1]
-        each = feet if len(feet) > 1 else []
+        each = _feet(model)
         every = tuple(sorted(k for _, _, mine in each for k in mine))
-        if every and len(every) < len(names):  # the belly may touch as well
+        if every and len(every) < len(model.contacts):  # the belly may touch as well
             each = [*each, ("all feet", "ground", every)]
         return [*each, ("the ground", "ground", None)]
     if family == "crease":
@@ -173,6 +171,25 @@ def _sites(model: Model, family: str):
         free = [e for e in each if np.any(model.free[np.unique(model.triangles[list(e[2])])])]
         return free if len(free) == 1 else [*free, ("all panels", "panel", None)]
     return [("the body", "body", None)]
+
+
+def _feet(model: Model):
+    """Sites of feet of several contact points: those that share a name, or else a panel; none if there is only one.
+
+    Where some contact points have a forward axis, which feet have, the others are the sheet's own.
+    """
+    forward = np.any(model.contact_axes, axis=1)
+    own = np.flatnonzero(forward if forward.any() else ~forward).tolist()
+    carried = zip(model.triangles.tolist(), model.triangle_panel, strict=True)
+    panels = {frozenset(t): model.name("panel", p) for t, p in carried}
+    for labels in (
+        [model.name("contact", k) for k in own],
+        [f"feet of {panels.get(frozenset(model.contacts[k].tolist()), 'the sheet')}" for k in own if forward[k]],
+    ):
+        feet = [(n, "ground", tuple(own[i] for i in at)) for n, at in named(labels).items() if len(at) > 1]
+        if len(feet) > 1:
+            return feet
+    return []
 
 
 def _edges(model: Model):

@@ -15,7 +15,8 @@ from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive
 from origami_sim.fit.held_out import predicted, refitted
 from origami_sim.fit.nominal import nominal_fits
-from origami_sim.hypotheses.hypothesis import Hypothesis, apply
+from origami_sim.hypotheses.hypothesis import Free, Hypothesis, apply
+from origami_sim.hypotheses.subject import untold
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.locate import locate, motion, motions_of, touching
@@ -235,6 +236,32 @@ def test_feet_are_suspected_together_but_without_the_belly():
     feet = [n for n in sites if n.startswith("foot at")]
     assert len(feet) == 2 and set(sites) == {*feet, "all feet", "the ground"} and sites["the ground"] is None
     assert sites["all feet"] == tuple(sorted(k for n in feet for k in sites[n])) and len(sites["all feet"]) == 4
+
+
+def test_feet_without_names_are_those_of_a_panel_and_never_the_belly():
+    """At the nodes of a crease the sheets of two panels touch: points of one name that are no foot."""
+    sheet = Sheet(strip([0.03, 0.04], 0.02), thickness="1 mm", panels="rigid").crease(stiffness="2 mN m/rad")
+    sheet.mass([0, 1], "2 g").feet([0, 1, 4, 5], height="4 mm", friction=0.3, backward=0.6)
+    model, parameters = sheet.gravity().ground(friction=0.25).build()
+    recording = walked(*walker(), noise=3e-4)
+    found = {s.site: s for s in suspects(model, [recording], Drive(), parameters) if s.effect == "coulomb"}
+    assert {n: s.entities for n, s in found.items()} == {
+        "feet of panel 0": (0, 1),
+        "feet of panel 1": (2, 3),
+        "all feet": (0, 1, 2, 3),
+    }
+
+    def build(values):
+        other = parameters.copy()
+        friction = other["coulomb", "friction_coefficient"].copy()
+        friction[:4] = values["friction"]
+        other.set("coulomb", "friction_coefficient", friction)
+        return model, other, Drive()
+
+    subject = Subject(build, (Free("", "friction", "1", 0.3, 0.02, 0.0, np.inf, 0.05),))
+    refitted, untested = untold(subject, list(found.values()))
+    assert "coulomb at all feet (by friction)" in refitted and "numbers of the model" in refitted
+    assert untested.endswith("do not tell: coulomb at feet of panel 0, coulomb at feet of panel 1.")
 
 
 @pytest.mark.parametrize("seed", range(4))
