@@ -50,6 +50,10 @@ from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import in_step, leads, shared, told
 
+ALONE = "One recording only: held-out data are stretches of the same recording, which share its errors."
+WHOLE = "One recording, which is predicted as a whole: nothing could be left out, and errors are of what was fitted."
+"""Notes on the errors of a single recording."""
+
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
 def diagnose(
@@ -115,8 +119,6 @@ def _diagnosed(
     unseen = unobserved(forward)
     if unseen is not None:
         noted.append(unseen)
-    if len(recordings) == 1:
-        noted.append("One recording only: held-out data are stretches of the same recording, which share its errors.")
     unclear = "Whether axes are mistaken could not be told"
     wrong = attempt(noted, unclear, lambda: mistaken(subject, recordings, o, forward), None)
     tell("nominal", 0.0)
@@ -127,6 +129,8 @@ def _diagnosed(
         if keep is not None:
             keep.follow(forward)
         given, base, weights = nominal_fits(forward)
+    if len(recordings) == 1:
+        noted.append(ALONE if len(forward.blocks) > 1 else WHOLE)
     base, rough = settled(forward, base)
     weights = level(forward, base) if rough else weights
     lap("nominal")

@@ -165,8 +165,8 @@ def without(f: Fit, parts: Sequence[Sequence[int]], hyper: Hyper = HYPER) -> Ite
     """Changes of the coordinates (P,) of a fit's numbers without each of some parts of its segments, by one step.
 
     With them, one over the deviations (P,) of the normal priors there. It is the mode of the normal model that the
-    evidence is of, within the bounds: what all other segments do not tell of a strength, its prior does. Nothing if the
-    fit left the numbers as they were.
+    evidence is of, within the bounds: what all other segments do not tell of a strength, its prior does. Nothing if a
+    part is all of the data: its errors are those of the fit.
     """
     line, own, numbers = f.linear, OwnColumns(f), f.coordinates
     assert line is not None
@@ -179,8 +179,8 @@ def without(f: Fit, parts: Sequence[Sequence[int]], hyper: Hyper = HYPER) -> Ite
     none = np.zeros(width)
     none[strong] = value[strong]
     for part in parts:
-        if not width:
-            yield np.zeros(0), np.zeros(0)
+        if not width or len(part) == len(cleared):  # without anything there is nothing to refit
+            yield np.zeros(width), known
             continue
         rows = np.concatenate([cleared[0][:0], *(cleared[n] for n in range(len(cleared)) if n not in part)])
         size = np.linalg.norm(rows[:, :-1], axis=0)

@@ -182,8 +182,9 @@ class Diagnosis:
         impulses: of contacts, if nothing holds the device. acting: what alone could be missing, best first.
         onset: when the refitted nominal first departs lastingly [s]; nan: never.
         traces, correlations: for plots. experiments: what to do next. baselines: beside ours.
-        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component;
-            estimates by one linear step as long as "held out" is unfinished. folds: the same by part of the data.
+        components, units, noise: of the channels. error_before, error_refitted, error_after: held-out rms by component
+            (see `left_out`); estimates by one linear step as long as "held out" is unfinished. folds: the same by part
+            of the data.
         notes: lint, warnings, limits. settings: what reproduces the run. seconds: by stage.
         patch: numbers to write into the calibration: label -> value. changed: effects of it that the model has
             already: their numbers are changes of what it has.
@@ -232,6 +233,11 @@ class Diagnosis:
     @property
     def exit_code(self) -> int:
         return EXIT[self.verdict]
+
+    @property
+    def left_out(self) -> bool:
+        """Whether errors are of data that were left out: of one recording that is predicted as a whole, nothing is."""
+        return len(self.recordings) != 1 or self.settings.get("segments") != 1
 
     @property
     def unfitted(self) -> float:

@@ -269,6 +269,16 @@ def test_page_is_complete_for_every_verdict(verdict, tmp_path):
     assert "$" not in re.sub(r"<script>.*</script>", "", outside, flags=re.S)  # nothing of the skeleton is left
 
 
+@pytest.mark.parametrize("segments", [1, 20])
+def test_a_page_says_whether_errors_are_of_what_was_left_out(segments):
+    d = example("PARAMETER")
+    d.recordings, d.settings = ["only"], {"segments": segments}
+    words = " ".join(Read(page(d, GEOMETRY)).words)
+    assert d.left_out == (segments > 1)
+    assert ("where left out" in words) == ("did not see" in words) == d.left_out
+    assert ("nothing could be left out" in words) != d.left_out and ("that were fitted" in words) != d.left_out
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_no_identifier_is_read_outside_of_the_calibration(verdict):
     d = example(verdict)

@@ -284,6 +284,16 @@ def test_baselines_are_left_out_where_nothing_is_left_to_learn_from():
     assert others and all(np.all(np.isnan(b.rms)) and "several segments" in b.note for b in others)
 
 
+def test_a_recording_that_is_one_segment_has_the_errors_of_its_fit():
+    """Without it there is nothing to refit to: numbers as they were given predict it worse by any measure."""
+    forward, _ = arranged(subject(3), [record(**SMALL)], Options(start="fit", segment=99.0))
+    _, base, weights = nominal_fits(forward)
+    moved = replace(base, theta=base.theta * 1.01)
+    assert len(forward.blocks) == 1 and refitted(forward, moved)[0].theta == pytest.approx(moved.theta, rel=1e-12)
+    for found in (estimated(forward, base, weights), predicted(forward, refitted(forward, base), weights)):
+        assert found.rms == pytest.approx(base.rms(), rel=0.02)
+
+
 def test_what_acts_at_a_crease_is_told_least_where_that_crease_is_clamped(rubbing, found):
     """Friction at the second crease against nothing missing: clamping that crease is no experiment for it."""
     forward, _, base, weights, _ = rubbing

@@ -21,10 +21,10 @@ def section(d: Diagnosis) -> list:
     unit = "noise" if has_noise(d) else "spread"
     head = ("Explanation", "Probability", "Log odds", "Numbers, 95 % interval", f"Error × {unit}", "Remarks")
     rows = [_candidate(head, c, d) for c in d.candidates]
+    of = "that are left out, estimated by one linear step from the fit to all" if d.left_out else "that were fitted"
     about = (
         "Probability: of exactly these effects there and no others. Log odds: natural logarithm of the posterior odds "
-        "over the first row. Error: root mean square over all channels, on data that are left out, "
-        "estimated by one linear step from the fit to all."
+        f"over the first row. Error: root mean square over all channels, on data {of}."
     )
     if round(d.unfitted, 2) > 0.0:
         about += f" Sets that were estimated and not fitted hold {d.unfitted:.2f}."

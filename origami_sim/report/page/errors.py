@@ -56,8 +56,9 @@ def section(d: Diagnosis) -> list:
             )
         )
     marks = ", ".join(f"{v:g}" for v in log_ticks(low, high))
+    seen = "did not see" if d.left_out else "saw, as nothing could be left out"
     note = (
-        "On data that the fit did not see. Dot: over all channels; ticks: one each; vertical line: the noise; "
+        f"On data that the fit {seen}. Dot: over all channels; ticks: one each; vertical line: the noise; "
         f"grey marks: {marks} times the noise, by its logarithm."
         if has_noise(d)
         else "The noise is not known: errors are multiples of the recorded standard deviation (NRMSE)."

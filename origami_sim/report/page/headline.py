@@ -58,7 +58,8 @@ def numbers(d: Diagnosis) -> Html:
         again = f"; {number(refitted)} by refitting alone" if np.isfinite(refitted) else ""
         parts = [v for f in d.folds if np.isfinite(v := multiples(d, f.after))]
         spread = f"; {number(min(parts))} to {number(max(parts))} by what is left out" if parts else ""
-        said = f"times the {unit} where left out, as given → now{again}{spread}"
+        where = "where left out" if d.left_out else "where fitted, as nothing could be left out"
+        said = f"times the {unit} {where}, as given → now{again}{spread}"
         out.append(("Error", f"{number(before)} → {number(after)}", said))
     else:
         out.append(("Error", "not measured", "nothing could be left out and predicted"))
