@@ -14,10 +14,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import read_bytes
+from .colours import letter_of
 from .crease_pattern import Pattern
 from .drawn import drawn_pattern
 from .svg import FLATNESS
-from .svg_drawing import MAX_CHORDS, letter_of
+from .svg_drawing import MAX_CHORDS
 
 LAYERS = (("mountain", "M"), ("valley", "V"), ("border", "B"), ("boundary", "B"), ("outline", "B"), ("cut", "C"),
           ("facet", "F"))  # fmt: skip

@@ -1,6 +1,5 @@
 """Straight coloured strokes of an SVG file: the tree and its styles by svgelements, curves cut into chords."""
 
-import colorsys
 import io
 import math
 import re
@@ -15,6 +14,7 @@ from xml.parsers import expat
 import numpy as np
 
 from ..errors import InputError
+from .colours import letter_of, parse_colour
 from .svg_traps import defuse
 
 SHAPES = ("line", "path", "rect", "polygon", "polyline", "circle", "ellipse")
@@ -23,17 +23,13 @@ UNSEEN = ("marker", "mask", "metadata", "foreignObject", "linearGradient", "radi
 PHYSICAL = re.compile(r"[-+.\deE\s]+(mm|cm|in|pt|pc|q)\s*$", re.IGNORECASE)
 METRES_PER_PIXEL = 0.0254 / 96.0
 """CSS: 96 pixels are an inch."""
+CURRENT = re.compile("currentcolor", re.IGNORECASE)
 UNKNOWN = "?"
 MAX_DEPTH = 100
 MAX_ELEMENTS = 200_000
 """Elements after <use> has been expanded; ten times the lines of the largest tessellations seen."""
 MAX_CHORDS = 500
 """Chords of one curve; a full circle of the drawing's size takes 70 at the default flatness."""
-BLACK, GREY = 0.25, 0.25
-"""Below this brightness a stroke is black, below this saturation it has no hue."""
-HUES = ((0, 20, "M"), (45, 75, "F"), (90, 165, "C"), (195, 265, "V"), (285, 335, "U"), (340, 360, "M"))
-"""Degrees of hue that count as red, yellow, green, blue, magenta: wide enough for the inks of drawing programs
-(#ED1C24, #FFF200, #00A651, #0072BC, #EC008C), while orange, cyan and violet stay unknown."""
 
 
 @dataclass
@@ -132,6 +128,7 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
             parent.remove(child)
     _refuse_explosion(root, file)
     defuse(root, file=file)
+    _keep_current_colour(root)
     drawing = Drawing()
     try:
         tree = svg.SVG.parse(io.BytesIO(ElementTree.tostring(root)), reify=True, ppi=96.0, on_error="raise")
@@ -168,6 +165,16 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
         if count:
             drawing.skipped[f"<{tag}>"] += count
     return drawing
+
+
+def _keep_current_colour(root) -> None:
+    """Spell currentColor so that the parser leaves it: a child inherits the word, not the colour of its group."""
+    for element in root.iter():
+        for name in ("stroke", "style"):
+            if name in element.attrib:
+                element.attrib[name] = CURRENT.sub("currentcolor", element.attrib[name])
+        if _tag(element) == "style" and element.text:
+            element.text = CURRENT.sub("currentcolor", element.text)
 
 
 def _refuse_explosion(root, file) -> None:
@@ -230,40 +237,12 @@ def _stroke(shape, drawing) -> tuple[str, float] | None:
     if text in ("none", "transparent", ""):
         drawing.skipped[f"<{tag}> without stroke"] += 1
         return None
-    colour = parse_colour(text)
+    colour = parse_colour(text, values.get("color"))
     letter = letter_of(colour[:3]) if colour else None
     if letter is None or colour is None:
         drawing.unknown[text[:40]] += 1
         return UNKNOWN, 1.0
     return letter, colour[3] * _fraction(values.get("stroke-opacity"))
-
-
-def parse_colour(text) -> tuple[int, int, int, float] | None:
-    """Return red, green and blue in 0 to 255 and the opacity of a CSS colour, or None if it is none."""
-    try:
-        colour = _svgelements().Color(text)
-        red, green, blue, opacity = colour.red, colour.green, colour.blue, colour.opacity
-    except (ValueError, TypeError, AttributeError):
-        return None
-    if None in (red, green, blue, opacity):
-        return None
-    named = re.fullmatch(r"[a-zA-Z\s]+", text) is not None
-    recognised = named or re.match(r"#[0-9a-fA-F]{3,8}$|(rgb|hsl)a?\s*\(", text.strip()) is not None
-    if not recognised or (named and (red, green, blue) == (0, 0, 0) and text.strip().lower() != "black"):
-        return None  # what svgelements does not know it makes black
-    return int(red), int(green), int(blue), float(opacity)
-
-
-def letter_of(colour) -> str | None:
-    """Return the assignment of a stroke colour (r, g, b), or None: Origami Simulator's six and what is near them."""
-    hue, saturation, value = colorsys.rgb_to_hsv(*(c / 255.0 for c in colour))
-    if value < BLACK:
-        return "B"
-    if saturation < GREY:
-        return None
-    hue *= 360.0
-    near = [letter for low, high, letter in HUES if low <= hue <= high]
-    return near[0] if near and value * saturation > GREY else None
 
 
 def _extent(paths) -> float:

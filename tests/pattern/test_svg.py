@@ -46,6 +46,46 @@ def test_colours(tmp_path, colour, letter):
     assert pattern.fold_angles[e] == 0.0 if letter == "F" else True
 
 
+@pytest.mark.parametrize(
+    ("colour", "letter", "share"),
+    [
+        ("rgb(255 0 0)", "M", 1.0),
+        ("rgb(255 0 0 / 50%)", "M", 0.5),
+        ("rgba(0, 0, 255, 0.25)", "V", 0.25),
+        ("rgb(100% 0% 0% / .5)", "M", 0.5),
+        ("RGB(0%, 0%, 100%)", "V", 1.0),
+        ("hsl(0 100% 50%)", "M", 1.0),
+        ("hsl(240deg 100% 50% / 25%)", "V", 0.25),
+        ("hsla(0.6667turn, 100%, 50%, 50%)", "V", 0.5),
+        ("hsl(0 0% 0%)", "B", None),
+        ("#00f8", "V", 136 / 255),
+        ("currentColor", "B", None),
+        ("rgb(255 0)", None, None),
+        ("rgb(255 0 0 50%)", None, None),
+        ("hsl(0% 100% 50%)", None, None),
+        ("lab(50% 40 59)", None, None),
+    ],
+)
+def test_colours_as_css_writes_them(tmp_path, colour, letter, share):
+    body = BORDER + f'<line x1="0" y1="0" x2="20" y2="10" stroke="{colour}"/>'
+    pattern = read_svg(svg(tmp_path, body))
+    if letter in ("M", "V"):
+        (e,) = pattern.edges_assigned(letter)
+        assert abs(pattern.fold_angles[e]) == pytest.approx(math.pi * share, rel=1e-6)
+    else:
+        assert not len(pattern.edges_assigned("MV"))
+        assert (f"1 shapes in the unknown colour {colour} were left out." in pattern.notes) == (letter is None)
+
+
+def test_current_colour_is_that_of_the_shape(tmp_path):
+    lines = '<g stroke="currentColor" color="red"><path d="M10 0v10"/><path d="M0 5h20" style="color: #00f"/></g>'
+    styled = "<style>g, .a {color: red; stroke: currentColor} .b {color: #00f}</style>"
+    of_class = '<g><path class="a" d="M10 0v10"/><path class="b" d="M0 5h20"/></g>'
+    for body in (lines, styled + of_class):
+        pattern = read_svg(svg(tmp_path, BORDER + body))
+        assert [pattern.assignments.count(letter) for letter in "BMV"] == [8, 2, 2]
+
+
 def test_style_sheet_classes_and_stroke_opacity(tmp_path):
     style = "<style>.a, .b {stroke: blue; stroke-opacity: 25%}</style>"
     pattern = read_svg(svg(tmp_path, style + BORDER + '<line class="b" x1="10" y1="0" x2="10" y2="10"/>'))
