@@ -5,10 +5,7 @@ prod turn(axis_i, theta_i) = 1 (Kawasaki 1989, belcastro and Hull 2002, doi:10.1
 that does not leaves a gap of D radians. Turning n creases by at most d each changes the product by at most n d, so that
 some crease stays off by D / n, whatever shape the sheet takes: a bound, not an estimate. Lines inside panels may bend,
 so vertices on which such lines end have no bound of their own; their gap with flat panels says how much must bend.
-
-Half a turn up and half a turn down are the same turn, so that this does not see mountains and valleys where all creases
-fold flat. Layers do: around a vertex that folds flat, mountains less valleys are +-2 (Maekawa's theorem; Hull 1994,
-Congressus Numerantium 100, 215), or the layers would have to pass through each other.
+Mountains and valleys of creases that fold flat are the matter of `layers`.
 """
 
 from dataclasses import dataclass
@@ -16,14 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .elastic import Elastic
+from .layers import STRAIGHT
 from .placement import rotations
 
-STRAIGHT = np.radians(2.0)
-"""Turn of a crease line at a vertex below which it is straight: curves cut into chords turn by 5 degrees and more.
-Half and double name the same curves in 20 public patterns."""
-FLAT = np.radians(179.0)
-"""Fold angle from which on a crease folds flat, of angles written to a degree. Half a degree less and two name the same
-vertices in 43 public patterns."""
 SHARP = np.radians(100.0)
 """Fold angle from which on the panels beside a curved crease bend much more than the crease: twice, 1/cos(theta/2).
 Half names the same curves in 20 public patterns; double is more than a crease can fold, and none would be named."""
@@ -37,7 +29,7 @@ class Vertex:
         node: its number in the mesh. gap: rotation by which the targets do not close, with flat panels [rad].
         creases: driven creases there. bends: hinges without a target there.
         curved: whether it is a bend of one crease line that is folded sharply.
-        excess: mountains less valleys, where all creases that fold fold flat; 2, as in a sound vertex, elsewhere.
+        ring: all hinges around it, in order.
     """
 
     node: int
@@ -45,12 +37,7 @@ class Vertex:
     creases: tuple[int, ...]
     bends: int
     curved: bool
-    excess: int = 2
-
-    @property
-    def unordered(self) -> bool:
-        """Whether it folds flat, and in no order of layers."""
-        return abs(self.excess) != 2
+    ring: tuple[int, ...]
 
     @property
     def bound(self) -> float:
@@ -84,16 +71,8 @@ def vertices(sheet: Elastic) -> list[Vertex]:
             product = product @ (turns[h] if outward else turns[h].T)
         gap = float(np.arccos(np.clip(0.5 * (np.trace(product) - 1.0), -1.0, 1.0)))
         driven = tuple(h for h in at if sheet.driven[h])
-        out.append(Vertex(v, gap, driven, len(at) - len(driven), _curved(sheet, v, driven), _excess(sheet, at)))
+        out.append(Vertex(v, gap, driven, len(at) - len(driven), _curved(sheet, v, driven), tuple(at)))
     return out
-
-
-def _excess(sheet: Elastic, at: list[int]) -> int:
-    """Return mountains less valleys around a vertex that folds flat out of a flat sheet, and 2 where none does."""
-    folded = [sheet.target[h] for h in at if sheet.driven[h] and sheet.target[h]]
-    if not folded or np.any(np.abs(sheet.start[at]) > STRAIGHT) or np.min(np.abs(folded)) < FLAT:
-        return 2
-    return -round(sum(np.sign(folded)))
 
 
 def _ring(following: dict[int, int]) -> list[int] | None:

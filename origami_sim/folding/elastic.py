@@ -20,6 +20,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulate
+from origami_sim.pattern.planar import FINEST
 from origami_sim.physics.materials import MEMBRANE_POISSON
 
 if TYPE_CHECKING:
@@ -94,6 +95,8 @@ class Elastic:
         reference: [N, 3] positions as given. bars, lengths: node pairs [B, 2] and their lengths [B].
         hinges: [H, 4] creases, then bends. driven: [H] whether there is a target. target, start: [H] angles [rad].
         weights: [H] stiffness of the hinges over softness. contact: of panels with each other, if they touch.
+        accuracy: by which a point of the drawing may be off, over the size; of files that do not show theirs, that
+            which a drawing has at best.
     """
 
     def __init__(self, pattern: Pattern, softness: float = 1e-3):
@@ -115,6 +118,8 @@ class Elastic:
         self.weights = factor * middle * self.axes * self._stated()
         self.sections = np.maximum(bar_sections(self.reference, mesh), SLIVER * self.lengths)
         self.inaccuracy = MERGED if np.isnan(pattern.accuracy) else pattern.accuracy / self.size
+        diagonal = float(np.linalg.norm(np.ptp(self.reference, axis=0)))
+        self.accuracy = FINEST * diagonal if np.isnan(pattern.accuracy) else pattern.accuracy / self.size
         self.softness = softness
         self.contact: Contact | None = None
         self._pattern_of_jacobian()

@@ -21,6 +21,7 @@ from origami_sim.pattern.intersections import crossing_pairs
 from .consistency import Vertex, vertices
 from .contact import Contact
 from .elastic import Elastic, Shape
+from .layers import FlatVertex, flat_vertex
 from .placement import Placement
 
 if TYPE_CHECKING:
@@ -126,9 +127,15 @@ class Folding:
         return sorted(found, key=lambda v: -v.bound)
 
     @property
-    def unordered(self) -> list[Vertex]:
+    def flat(self) -> list[FlatVertex]:
+        """Vertices all whose creases fold flat."""
+        found = (flat_vertex(self.sheet, v.node, v.ring, self.angles[-1], self.tolerance) for v in self.vertices)
+        return [v for v in found if v is not None]
+
+    @property
+    def unordered(self) -> list[FlatVertex]:
         """Vertices that close when they fold flat, but whose layers have no order: panels pass through each other."""
-        return [v for v in self.vertices if v.unordered and v.gap <= self.tolerance]
+        return [v for v in self.flat if v.unordered and v.gap <= len(v.signs) * self.tolerance]
 
     @property
     def curved(self) -> bool:

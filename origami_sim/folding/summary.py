@@ -6,7 +6,9 @@ import numpy as np
 
 from origami_sim.pattern.intersections import crossing_pairs
 
+from .elastic import Elastic
 from .fold import STRETCH, Folding
+from .layers import FlatVertex
 
 WORST = 8
 """Creases that a table of the worst lists."""
@@ -69,21 +71,44 @@ def summarise(folding: Folding, thickness: float) -> Summary:
             "A real sheet stops before these angles: its panels touch. Try: smaller angles for the creases around "
             "these panels (opacity in SVG, edges_foldAngle in FOLD)."
         )
-    if folding.reached and unordered:
+    if unordered:
         reason = reason or f"no order of layers at {_vertices(len(unordered))}"
-        x, y = 1e3 * sheet.mesh.vertices[unordered[0].node, :2]
-        said.append(
-            f"No order of layers at {_vertices(len(unordered))}, first at ({x:.1f}, {y:.1f}) mm: mountains less "
-            f"valleys are {unordered[0].excess} there, and 2 or -2 wherever sheets fold flat (Maekawa's theorem). Its "
-            "panels would pass through each other on the way. Try: a mountain in place of a valley there, or the other "
-            "way round; angles below 180 deg (opacity in SVG, edges_foldAngle in FOLD)."
-        )
+        said.append(_layers(sheet, unordered))
     if folding.snaps:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
         more = f" and {len(folding.snaps) - 6} more" if len(folding.snaps) > 6 else ""
         said.append(f"The sheet snaps to another shape on its way, at {at}{more} of the angles.")
     worst = {name: column[order] for name, column in creases.items()}
     return Summary(reached, said, reason, numbers, worst, creases)
+
+
+def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
+    """Return the sentence on vertices whose layers have no order."""
+    first = unordered[0]
+    x, y = 1e3 * sheet.mesh.vertices[first.node, :2]
+    count = _vertices(len(unordered))
+    if (caught := first.caught) is None:
+        why = f"mountains less valleys are {first.excess} there, and 2 or -2 wherever sheets fold flat"
+        why += " (Maekawa's theorem)"
+        other = "a mountain in place of a valley there, or the other way round"
+    else:
+        kind = "valleys" if caught.sign > 0 else "mountains"
+        size = f"{np.degrees(caught.size):.1f} deg"
+        before = f"once {caught.crimped} smaller one{'s are' if caught.crimped > 1 else ' is'} folded, "
+        why = (
+            f"{before if caught.crimped else ''}a sector of {size} lies between larger ones and between two {kind}, "
+            "where flat folds have one mountain and one valley (big-little-big lemma)"
+            if caught.count == 1
+            else f"{before if caught.crimped else ''}{caught.count} sectors of {size} lie side by side between larger "
+            f"ones, and their {caught.count + 1} creases are all {kind}, where flat folds have as many mountains as "
+            f"valleys{'' if caught.count % 2 else ', but for one'} (crimping; Hull 2002)"
+        )
+        other = f"exchange one of these {kind} and a {'mountain' if caught.sign > 0 else 'valley'} there"
+    return (
+        f"No order of layers at {count}, first at ({x:.1f}, {y:.1f}) mm: {why}. Its panels would "
+        f"pass through each other on the way. Try: {other}; angles below 180 deg (opacity in SVG, edges_foldAngle in "
+        "FOLD)."
+    )
 
 
 def _table(folding: Folding) -> dict[str, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-INK = {"B": "#000000", "M": "#ff0000", "V": "#0000ff", "F": "#ffff00", "C": "#00ff00"}
+INK = {"B": "#000000", "M": "#ff0000", "V": "#0000ff", "F": "#ffff00", "C": "#00ff00", "U": "#ff00ff"}
 
 
 def drawn(path: Path, lines, opacity: float = 1.0) -> Path:

@@ -88,7 +88,7 @@ def test_layers_of_what_does_not_fold_flat_are_not_asked_for(tmp_path):
     ends = [(1, 0), (2, 1), (1, 2), (0, 1)]
     lines = [*frame(2, 2), *(("M", 1, 1, *e, 0.5) for e in ends)]
     pattern = read(drawn(tmp_path / "square.svg", lines))
-    assert not any(v.unordered for v in vertices(Elastic(pattern)))
+    assert not fold(pattern).unordered
 
 
 def test_targets_that_contradict_each_other_are_said_to(tmp_path):
