@@ -49,7 +49,7 @@ EXACT = 2e-5
 """Distance of all angles from their targets [rad] below which no other shape is looked for: it saves time. Half
 and double change nothing."""
 TOLERANCE = np.radians(5.0)
-"""Distance from its target within which a crease has arrived [rad]."""
+"""Distance from its target within which a crease has arrived [rad]; less of small targets, see `elastic.SHARE`."""
 
 
 @dataclass(repr=False)
@@ -118,13 +118,30 @@ class Folding:
     @property
     def reached(self) -> bool:
         """Whether every driven crease has arrived, and the sheet is whole."""
-        return bool(self.errors.max(initial=0.0) <= self.tolerance) and not self.torn
+        return bool(np.all(self.errors <= self.allowed)) and not self.torn
+
+    @property
+    def allowed(self) -> np.ndarray:
+        """Distance from its target within which each driven crease has arrived [rad]."""
+        return self.sheet.allowed(self.tolerance)
+
+    def _allowed_at(self, vertex: Vertex) -> np.ndarray:
+        """The same of the creases at a vertex."""
+        allowed = np.full(len(self.sheet.hinges), self.tolerance)
+        allowed[self.sheet.driven] = self.allowed
+        return allowed[list(vertex.creases)]
 
     @property
     def contradictions(self) -> list[Vertex]:
-        """Vertices at which no shape has all creases within the tolerance, the worst first."""
-        found = [v for v in self.vertices if v.bound > self.tolerance]
+        """Vertices at which no shape has all creases within what is allowed, the worst first."""
+        found = [v for v in self.vertices if v.bound * len(v.creases) > self._allowed_at(v).sum()]
         return sorted(found, key=lambda v: -v.bound)
+
+    @property
+    def apart(self) -> list[Vertex]:
+        """Vertices whose flat panels leave a gap beyond what a crease there is allowed, the widest first."""
+        found = [v for v in self.vertices if v.gap > self._allowed_at(v).max(initial=0.0)]
+        return sorted(found, key=lambda v: -v.gap)
 
     @property
     def flat(self) -> list[FlatVertex]:
@@ -170,7 +187,8 @@ def fold(
     Args:
         pattern: with mountains and valleys, which fold flat where they have no angle.
         steps: in which the targets grow.
-        tolerance: distance from the target within which a crease has arrived [rad].
+        tolerance: distance from the target within which a crease has arrived [rad]; a tenth of the target where that is
+            less.
         thickness: of the sheet [m]: at which panels touch, and by which they may cross unnoticed.
         touch: whether panels keep each other off on the whole way. None: from the last frame on at which nothing
             touches, if they would end through each other.
@@ -230,7 +248,7 @@ class _Search:
             sheet.softness = softness
             path = _follow(sheet, self.placement, begin, self.steps, part)
             used = _stiffen(sheet, path, self.tolerance)
-            if sheet.errors(path.shapes[-1].angles).max() <= self.tolerance:
+            if sheet.arrived(path.shapes[-1].angles, self.tolerance):
                 used = _untangle(sheet, path, self.thickness / sheet.size)
             found = self._folding(path, used)
             if found.reached:
@@ -309,7 +327,7 @@ def _stiffen(sheet: Elastic, path: _Path, tolerance: float) -> float:
     for softness in reversed([s for s in SOFTNESS if s < used]):
         sheet.softness = softness
         firmer = sheet.relax(path.shapes[-1], sheet.target, LAST)
-        if sheet.errors(firmer.angles).max() > tolerance:
+        if not sheet.arrived(firmer.angles, tolerance):
             break
         path.shapes[-1], used = firmer, softness
     sheet.softness = used

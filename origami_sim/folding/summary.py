@@ -6,7 +6,7 @@ import numpy as np
 
 from origami_sim.pattern.intersections import crossing_pairs
 
-from .elastic import Elastic
+from .elastic import SHARE, Elastic
 from .fold import STRETCH, Folding
 from .layers import FlatVertex
 
@@ -36,7 +36,8 @@ class Summary:
 def summarise(folding: Folding, thickness: float) -> Summary:
     """Return what became of a pattern; triangles that cross by more than `thickness` [m] pass through each other."""
     sheet, errors = folding.sheet, folding.errors
-    missed = int(np.sum(errors > folding.tolerance))
+    late = errors > folding.allowed
+    missed = int(np.sum(late))
     pairs = crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness)
     crossing = len(pairs)
     unordered = folding.unordered
@@ -57,7 +58,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
     }
     creases = _table(folding)
     order = np.argsort(-creases["error_deg"], kind="stable")
-    order = order[creases["error_deg"][order] > np.degrees(folding.tolerance)][:WORST]
+    order = order[late[order]]
     reason, advice = _why(folding)
     said = [
         _verdict(folding, missed, order, creases),
@@ -78,7 +79,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
         more = f" and {len(folding.snaps) - 6} more" if len(folding.snaps) > 6 else ""
         said.append(f"The sheet snaps to another shape on its way, at {at}{more} of the angles.")
-    worst = {name: column[order] for name, column in creases.items()}
+    worst = {name: column[order[:WORST]] for name, column in creases.items()}
     return Summary(reached, said, reason, numbers, worst, creases)
 
 
@@ -129,6 +130,8 @@ def _table(folding: Folding) -> dict[str, np.ndarray]:
 
 def _verdict(folding: Folding, missed: int, order, creases) -> str:
     count, limit = len(folding.errors), f"{np.degrees(folding.tolerance):.3g} deg"
+    if np.any(folding.allowed[order] < folding.tolerance):
+        limit += f" or {SHARE:.0%} of the angle"
     if not missed:
         worst = np.degrees(folding.errors.max())
         whole = "" if not folding.torn else ", but only by tearing the sheet"
@@ -174,7 +177,7 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
             f"The targets strain the sheet by more than {STRETCH:.0%}: it would tear.",
             "Try: smaller angles; facets (yellow) across the strained panels; or vertices put where they belong.",
         ]
-    apart = sorted((v for v in folding.vertices if v.gap > folding.tolerance), key=lambda v: -v.gap)
+    apart = folding.apart
     if folding.touching and not apart:
         return "panels are in each other's way", [
             "Panels that touch keep the creases from their angles: these would push panels through each other, or the "
@@ -186,7 +189,7 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
         x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
         return f"targets do not fit together at {_vertices(len(apart))}", [
             f"At {_vertices(len(apart))} the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, "
-            f"where they miss by {np.degrees(apart[0].gap):.0f} deg: creases stay off or panels bend. What is "
+            f"where they miss by {np.degrees(apart[0].gap):.2g} deg: creases stay off or panels bend. What is "
             "shown is the compromise of least energy.",
             "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
             "that may take what it needs; facets (yellow) across the panels.",

@@ -50,6 +50,9 @@ PLANARITY_TOLERANCE = 1e-4
 ROUNDING = 1e-4
 """Degrees beyond half a turn that are rounding, of angles computed in single precision or written with few digits; no
 fold is meant to go there, so half and double change nothing else."""
+PI = 2e-3
+"""Distance from pi of a largest fold angle, in degrees, at which radians are suspected: pi written with two digits is
+off by 1.6e-3, and angles meant in degrees are whole or computed. Half misses those two digits; double is as good."""
 RADIANS_PER_DEGREE = np.pi / 180.0
 
 
@@ -240,12 +243,28 @@ def _keep_edges(keys, kept, count) -> None:
 
 
 def _note_angles(letters, fold_angles, notes) -> None:
-    if letters is None:
-        return
+    """Say of angles against their letters, and of angles that look like radians."""
+    letters = letters if letters is not None else [None] * len(() if fold_angles is None else fold_angles)
     angles = np.full(len(letters), np.nan) if fold_angles is None else fold_angles
-    for e, (letter, angle) in enumerate(zip(letters, angles, strict=True)):
-        if (letter == "M" and angle > 0) or (letter == "V" and angle < 0):
-            notes.append(f"edge {e} is '{letter}' but its fold angle is {np.degrees(angle):+g} deg: both kept.")
+    odd = [
+        e
+        for e, (letter, angle) in enumerate(zip(letters, angles, strict=True))
+        if (letter == "M" and angle > 0) or (letter == "V" and angle < 0)
+    ]
+    if odd:
+        shown = ", ".join(f"{e} ('{letters[e]}', {np.degrees(angles[e]):+.6g} deg)" for e in odd[:3])
+        more = f" and {len(odd) - 3} more" if len(odd) > 3 else ""
+        edges, are = ("edge", "is") if len(odd) == 1 else ("edges", "are")
+        notes.append(
+            f"{len(odd)} {edges} with a fold angle against the letter, where mountains are negative: {shown}{more}; "
+            f"both {are} kept, and the angle is what folds."
+        )
+    largest = float(np.degrees(np.abs(angles[~np.isnan(angles)]).max(initial=0.0)))
+    if abs(largest - np.pi) < PI:
+        notes.append(
+            f"the largest fold angle is {largest:.6g} deg, as pi: edges_foldAngle is in degrees; of radians write "
+            "180 / pi times as much."
+        )
 
 
 def _derived_faces(vertices, listed: _Edges, keys, notes, file):

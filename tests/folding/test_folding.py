@@ -136,6 +136,20 @@ def test_a_tolerance_decides_what_counts_as_reached():
     assert not fold(pattern, tolerance=np.radians(0.1)).reached
 
 
+def test_small_targets_are_reached_to_a_tenth():
+    """Equal small angles do not close a Miura vertex: what is within five degrees may still miss half the turn."""
+    pattern = miura(3, 3, 0.02, 0.02, np.radians(60), target_angle=1.0)
+    targets = np.isfinite(pattern.fold_angles) & (pattern.fold_angles != 0.0)
+    pattern.fold_angles[targets] = np.radians(3.0) * np.sign(pattern.fold_angles[targets])
+    folding = fold(pattern)
+    found = summarise(folding, 2e-4)
+    assert np.degrees(folding.errors.max()) < 2.0 and not folding.reached and not found.reached
+    assert found.numbers["missed"] == np.sum(folding.errors > np.radians(0.3)) > 10
+    assert "end more than 5 deg or 10% of the angle from their targets" in found.sentences[0]
+    small = miura(3, 3, 0.02, 0.02, np.radians(60), target_angle=np.radians(3.0))
+    assert fold(small).reached
+
+
 def test_a_shape_that_is_folded_already_stays_as_it_is():
     pattern = miura(2, 2, 0.02, 0.02, np.radians(60), fold_angle=np.radians(80))
     folding = fold(pattern)

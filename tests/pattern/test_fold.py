@@ -9,7 +9,7 @@ import pytest
 
 from origami_sim.errors import InputError
 from origami_sim.pattern import miura, read_fold, read_pattern, write_fold
-from origami_sim.pattern.fold import fold_pattern
+from origami_sim.pattern.fold import fold_pattern, pattern_fold
 
 SQUARE = {
     "file_spec": 1.2,
@@ -171,7 +171,26 @@ def test_odd_assignments_are_told():
     assert pattern.assignments[4] == "U"
     assert any("'B' between two faces" in note for note in pattern.notes)
     assert any("one face only" in note for note in pattern.notes)
-    assert any("but its fold angle" in note for note in fold_pattern(square(edges_assignment=list("BBBBM"))).notes)
+    (note,) = [n for n in fold_pattern(square(edges_assignment=list("BBBBM"))).notes if "against the letter" in n]
+    assert note.startswith("1 edge with a fold angle against the letter, where mountains are negative: 4 ('M', +")
+
+
+def test_angles_against_their_letters_are_one_sentence():
+    document = pattern_fold(miura(3, 3, 0.02, 0.02, 1.0, target_angle=1.5))
+    swap = {"M": "V", "V": "M"}
+    document["edges_assignment"] = [swap.get(letter, letter) for letter in document["edges_assignment"]]
+    (note,) = [n for n in fold_pattern(document).notes if "letter" in n]
+    count = sum(letter in "MV" for letter in document["edges_assignment"])
+    assert note.startswith(f"{count} edges with a fold angle against the letter") and f"and {count - 3} more;" in note
+
+
+@pytest.mark.parametrize(
+    ("angle", "said"), [(3.14, True), (3.14159265, True), (3.0, False), (3.15, False), (90, False)]
+)
+def test_angles_that_look_like_radians_are_said_to(angle, said):
+    pattern = fold_pattern(square(edges_foldAngle=[None] * 4 + [angle]))
+    assert any("as pi: edges_foldAngle is in degrees" in note for note in pattern.notes) == said
+    assert np.degrees(pattern.fold_angles[4]) == pytest.approx(angle)
 
 
 FRAMED = square() | {
