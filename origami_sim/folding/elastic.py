@@ -23,6 +23,8 @@ from origami_sim.pattern import Pattern, Triangulation, hinge_angles, triangulat
 from origami_sim.pattern.planar import FINEST
 from origami_sim.physics.materials import MEMBRANE_POISSON
 
+from .panels import Panels
+
 if TYPE_CHECKING:
     from .contact import Contact, Touching
 
@@ -97,6 +99,7 @@ class Elastic:
     Attributes:
         mesh: the triangulation. size: longest side of the pattern [m].
         reference: [N, 3] positions as given. bars, lengths: node pairs [B, 2] and their lengths [B].
+        spans: [B + P] these, then distances of the other corners of a panel from each other, along it.
         hinges: [H, 4] creases, then bends. driven: [H] whether there is a target. target, start: [H] angles [rad].
         weights: [H] stiffness of the hinges over softness. contact: of panels with each other, if they touch.
         accuracy: by which a point of the drawing may be off, over the size; of files that do not show theirs, that
@@ -110,6 +113,8 @@ class Elastic:
         self.reference = (mesh.vertices - mesh.vertices.mean(axis=0)) / self.size
         self.bars, self.hinges = mesh.bars, np.vstack([mesh.creases, mesh.bends])
         self.lengths = _lengths(self.reference, self.bars)
+        self.panels = Panels(mesh)
+        self.spans = self._spans_at(self.reference)
         self.axes = _lengths(self.reference, self.hinges[:, 1:3])
         given = np.concatenate([_targets(pattern)[mesh.crease_edge], np.full(len(mesh.bends), np.nan)])
         self.driven, self.target = ~np.isnan(given), np.nan_to_num(given)
@@ -154,13 +159,16 @@ class Elastic:
         return near(hinge_angles(x, self.hinges), previous)
 
     def strains(self, x) -> np.ndarray:
-        """Return the strain of every bar [B]."""
-        return _lengths(x, self.bars) / self.lengths - 1.0
+        """Return the strain of every bar, then of every other pair of corners of a panel [B + P]."""
+        return self._spans_at(x) / self.spans - 1.0
 
     def misfits(self, x) -> np.ndarray:
-        """Return what of the strain [B] is more than the inaccuracy of the drawing."""
-        change = np.abs(_lengths(x, self.bars) - self.lengths)
-        return np.maximum(change - self.inaccuracy, 0.0) / self.lengths
+        """Return what of the strains [B + P] is more than the inaccuracy of the drawing."""
+        change = np.abs(self._spans_at(x) - self.spans)
+        return np.maximum(change - self.inaccuracy, 0.0) / self.spans
+
+    def _spans_at(self, x) -> np.ndarray:
+        return np.concatenate([_lengths(x, self.bars), self.panels.distances(x)])
 
     def errors(self, angles) -> np.ndarray:
         """Return the distance of each driven crease from its target [rad]."""

@@ -101,7 +101,7 @@ class Folding:
 
     @property
     def stretch(self) -> float:
-        """Largest strain at the end."""
+        """Largest strain at the end, of edges and of all pairs of corners of a panel, along it."""
         return float(np.abs(self.sheet.strains(self.x[-1] / self.sheet.size)).max(initial=0.0))
 
     @property
@@ -148,6 +148,12 @@ class Folding:
         """Vertices all whose creases fold flat."""
         found = (flat_vertex(self.sheet, v.node, v.ring, self.angles[-1], self.tolerance) for v in self.vertices)
         return [v for v in found if v is not None]
+
+    @property
+    def uneven(self) -> list[FlatVertex]:
+        """Vertices that are to fold flat, and whose sectors forbid it by more than the drawing's accuracy."""
+        found = [v for v in self.flat if len(v.signs) % 2 == 0 and v.defect > v.accuracy]
+        return sorted(found, key=lambda v: -v.defect)
 
     @property
     def unordered(self) -> list[FlatVertex]:

@@ -75,6 +75,8 @@ def summarise(folding: Folding, thickness: float) -> Summary:
     if unordered:
         reason = reason or f"no order of layers at {_vertices(len(unordered))}"
         said.append(_layers(sheet, unordered))
+    if (uneven := folding.uneven) and not folding.curved:
+        said.append(_uneven(sheet, uneven))
     if folding.snaps:
         at = ", ".join(f"{folding.shares[n]:.0%}" for n in folding.snaps[:6])
         more = f" and {len(folding.snaps) - 6} more" if len(folding.snaps) > 6 else ""
@@ -109,6 +111,19 @@ def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
         f"No order of layers at {count}, first at ({x:.1f}, {y:.1f}) mm: {why}. Its panels would "
         f"pass through each other on the way. Try: {other}; angles below 180 deg (opacity in SVG, edges_foldAngle in "
         "FOLD)."
+    )
+
+
+def _uneven(sheet: Elastic, uneven: list[FlatVertex]) -> str:
+    """Return the sentence on vertices whose sectors do not let them fold flat."""
+    worst = uneven[0]
+    x, y = 1e3 * sheet.mesh.vertices[worst.node, :2]
+    one, other = sorted(np.degrees(worst.sums), reverse=True)
+    return (
+        f"The sectors around {_vertices(len(uneven))} forbid a flat fold, worst at ({x:.1f}, {y:.1f}) mm: every other "
+        f"one sums to {one:.1f} and {other:.1f} deg, and to 180 deg each wherever sheets fold flat (Kawasaki's "
+        f"theorem); the drawing is accurate to {np.degrees(worst.accuracy):.1f} deg there. The rest is strain and "
+        "bending. Try: vertices put where they belong."
     )
 
 
@@ -213,10 +228,12 @@ def _strain(folding: Folding, numbers) -> str:
         text += f", panels bend by up to {numbers['largest_bend_deg']:.0f} deg about a line"
     strained = np.abs(folding.sheet.strains(folding.x[-1] / folding.sheet.size))
     if numbers["largest_strain"] > STRETCH and not folding.torn:
-        bar = int(np.argmax(strained))
+        most, size = int(np.argmax(strained)), folding.sheet.size
+        what = "an edge" if most < len(folding.sheet.bars) else "a panel's diagonal"
+        left = float(folding.sheet.misfits(folding.x[-1] / size).max())
         text += (
-            f"; that is an edge of {1e3 * folding.sheet.lengths[bar] * folding.sheet.size:.2g} mm, where the drawing "
-            "is inexact"
+            f"; that is {what} of {1e3 * folding.sheet.spans[most] * size:.2g} mm. Without what the drawing may be off "
+            f"by, {1e3 * folding.sheet.inaccuracy * size:.2g} mm, {left:.2%} are left"
         )
     return text + "."
 

@@ -250,9 +250,46 @@ def test_what_a_drawing_misses_by_is_no_tear():
     wide = sheet.reference * [1.02, 1.0, 1.0]
     pattern.accuracy = 0.01 * sheet.size
     rough = Elastic(pattern)
-    change = np.abs(rough.strains(wide)) * rough.lengths
-    np.testing.assert_allclose(rough.misfits(wide), np.maximum(change - 0.01, 0) / rough.lengths, atol=1e-12)
+    change = np.abs(rough.strains(wide)) * rough.spans
+    np.testing.assert_allclose(rough.misfits(wide), np.maximum(change - 0.01, 0) / rough.spans, atol=1e-12)
     assert rough.misfits(wide).max() < sheet.misfits(wide).max()
+
+
+def test_strain_is_measured_between_all_corners_of_a_panel():
+    """A square of two triangles that is sheared along a side strains one diagonal, of which only the other is a bar."""
+    sheet = Elastic(strip([0.02, 0.02], 0.02, fold_angles=[1.0]))
+    bars, flat = len(sheet.bars), sheet.reference
+    long_ones = np.isclose(sheet.spans, np.sqrt(0.5))
+    assert len(sheet.spans) == bars + 2 and np.sum(long_ones) == 4
+    sheared = flat + 0.02 * flat[:, [1]] * [1.0, 0.0, 0.0]
+    change = np.abs(sheet.strains(sheared))[long_ones]
+    np.testing.assert_allclose(np.sort(change), [0.00995, 0.00995, 0.01005, 0.01005], rtol=0.01)
+    bent = flat.copy()
+    (j, k), apexes = sheet.hinges[-1, 1:3], sheet.hinges[-1, [0, 3]]
+    axis = (flat[k] - flat[j]) / np.linalg.norm(flat[k] - flat[j])
+    out = flat[apexes[0]] - flat[j]
+    foot = flat[j] + (out @ axis) * axis
+    bent[apexes[0]] = foot + np.linalg.norm(flat[apexes[0]] - foot) * np.array([0.0, 0.0, 1.0])
+    of_panel = np.isin(sheet.panels.pairs, apexes).all(axis=1)
+    np.testing.assert_allclose(sheet.strains(bent)[bars:][of_panel], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0, 6.0, 10.0])
+def test_sectors_that_forbid_a_flat_fold_are_said(tmp_path, off):
+    """Sectors of 40, 100, 140 + off and 80 - off degrees sum to 180 + off and 180 - off by turns (Kawasaki)."""
+    file = tmp_path / "vertex.fold"
+    rim = [7, 27, 47, 97, 147, 217 + off / 2, 287 + off, 327]
+    ends = [[0.0, 0.0], *([np.cos(t), np.sin(t)] for t in np.radians(rim))]
+    spokes = [[0, n] for n in (1, 3, 5, 7)]
+    around = [[n, n % 8 + 1] for n in range(1, 9)]
+    document = {"vertices_coords": ends, "edges_vertices": spokes + around, "edges_assignment": list("MVVV" + 8 * "B")}
+    file.write_text(json.dumps(document))
+    folding = fold(read(file))
+    (found,) = folding.flat
+    assert sorted(np.degrees(found.sums)) == pytest.approx([180 - off, 180 + off], abs=1e-6)
+    assert np.degrees(found.accuracy) < 0.3
+    said = " ".join(summarise(folding, 2e-4).sentences)
+    assert (f"sums to {180 + off:.1f} and {180 - off:.1f} deg" in said) == (off > 0)
 
 
 @pytest.mark.parametrize("letters", ["C", "CC"])
