@@ -62,7 +62,7 @@ def run(args, settings: Settings, progress) -> int:
         if e.file is None:
             raise InputError(f"{path}: {e}".removesuffix(".")) from None
         raise
-    found = summarise(folding, settings.thickness)
+    found = summarise(folding)
     model, parameters, drive = model_of(
         folding,
         thickness=settings.thickness,

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from origami_sim.pattern.intersections import crossing_pairs
-
+from .bends import MOST, bend_only
 from .elastic import SHARE, Elastic
-from .fold import STRETCH, Folding
+from .fold import DEPTH, STRETCH, Folding
 from .layers import FlatVertex
 
 WORST = 8
@@ -33,15 +32,23 @@ class Summary:
     creases: dict[str, np.ndarray]
 
 
-def summarise(folding: Folding, thickness: float) -> Summary:
-    """Return what became of a pattern; triangles that cross by more than `thickness` [m] pass through each other."""
+def summarise(folding: Folding, thickness: float | None = None) -> Summary:
+    """Return what became of a pattern.
+
+    Args:
+        folding: what folded.
+        thickness: of the sheet, as far as its panels leave room for bends [m]; None for that with which it folded.
+    """
+    thickness = folding.thickness if thickness is None else thickness
     sheet, errors = folding.sheet, folding.errors
     late = errors > folding.allowed
     missed = int(np.sum(late))
-    pairs = crossing_pairs(folding.x[-1], sheet.mesh.triangles, thickness)
+    pairs = folding.crossings
     crossing = len(pairs)
     unordered = folding.unordered
-    reached = folding.reached and not crossing and not unordered
+    narrow, share = bend_only(sheet, thickness)
+    thick = share > MOST
+    reached = folding.reached and not crossing and not unordered and not thick
     bends = np.abs(folding.angles[-1] - sheet.start)[len(sheet.mesh.creases) :]
     numbers = {
         "reached": float(reached),
@@ -64,7 +71,7 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         _verdict(folding, missed, order, creases),
         *advice,
         _strain(folding, numbers),
-        _crossings(folding, pairs, thickness),
+        _crossings(folding, pairs),
     ]
     if folding.reached and crossing:
         reason = "panels pass through each other"
@@ -72,6 +79,9 @@ def summarise(folding: Folding, thickness: float) -> Summary:
             "A real sheet stops before these angles: its panels touch. Try: smaller angles for the creases around "
             "these panels (opacity in SVG, edges_foldAngle in FOLD)."
         )
+    if narrow:
+        reason = reason or ("the sheet is too thick for its panels" if thick else "")
+        said.append(_narrow(folding, narrow, share, thickness))
     if unordered:
         reason = reason or f"no order of layers at {_vertices(len(unordered))}"
         said.append(_layers(sheet, unordered))
@@ -83,6 +93,18 @@ def summarise(folding: Folding, thickness: float) -> Summary:
         said.append(f"The sheet snaps to another shape on its way, at {at}{more} of the angles.")
     worst = {name: column[order[:WORST]] for name, column in creases.items()}
     return Summary(reached, said, reason, numbers, worst, creases)
+
+
+def _narrow(folding: Folding, narrow: list[int], share: float, thickness: float) -> str:
+    """Return the sentence on panels that are too narrow for the sheet's thickness."""
+    pattern = folding.sheet.pattern
+    x, y = 1e3 * pattern.vertices[list(pattern.faces[narrow[0]])].mean(axis=0)[:2]
+    panels = f"{len(narrow)} of {len(pattern.faces)} panels {'is' if len(narrow) == 1 else 'are'}"
+    return (
+        f"A sheet {1e3 * thickness:.3g} mm thick takes {1e3 * thickness * np.pi / 2:.3g} mm for a bend of 180 deg: "
+        f"{panels} too narrow for the bends beside them ({share:.1%} of the area), first at ({x:.1f}, {y:.1f}) mm. "
+        "Try: a thinner sheet (--set thickness=0.05mm) or a larger one (--set size=30cm)."
+    )
 
 
 def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
@@ -238,8 +260,8 @@ def _strain(folding: Folding, numbers) -> str:
     return text + "."
 
 
-def _crossings(folding: Folding, pairs: np.ndarray, thickness: float) -> str:
-    depth, sheet, where = f"the sheet's thickness ({1e3 * thickness:.3g} mm)", folding.sheet, ""
+def _crossings(folding: Folding, pairs: np.ndarray) -> str:
+    sheet, where = folding.sheet, ""
     if len(pairs):
         one, other = (1e3 * sheet.mesh.vertices[sheet.mesh.triangles[t]].mean(axis=0) for t in pairs[0])
         where = (
@@ -248,8 +270,10 @@ def _crossings(folding: Folding, pairs: np.ndarray, thickness: float) -> str:
     through = (
         f"{len(pairs)} pairs of triangles pass through each other" if len(pairs) else "No panel passes through another"
     )
+    deep = f"by more than folded sheets are accurate to, {1e3 * folding.depth:.2g} mm ({DEPTH:.1%} of the longest side)"
     if folding.clear_from is None:
-        return f"{through} by more than {depth}{where}."
+        return f"{through} {deep}{where}."
     whole = "on the whole way" if not folding.clear_from else f"from {folding.shares[folding.clear_from]:.0%} on"
     touch = f"{folding.touching} pairs of corners, edges and triangles touch" if folding.touching else "nothing touches"
-    return f"Panels keep each other off {whole}, at {depth}; at the end {touch}. {through}{where}."
+    thick = f"the sheet's thickness ({1e3 * folding.thickness:.3g} mm)"
+    return f"Panels keep each other off {whole}, at {thick}; at the end {touch}. {through}{where}."

@@ -103,9 +103,8 @@ def comparison_html(c: "Comparison") -> str:
 def folding_html(f: "Folding") -> str:
     """A folding as what the command line says of it, with the sheet on its way."""
     from origami_sim.folding import summarise
-    from origami_sim.folding.fold import THICKNESS
 
-    told = summarise(f, THICKNESS).sentences
+    told = summarise(f).sentences
     return card("Folding", {f"{k + 1}": s for k, s in enumerate(told)}, picture_of(f.plot()), "image/png")
 
 

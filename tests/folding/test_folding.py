@@ -211,6 +211,28 @@ def test_panels_that_touch_are_as_far_apart_as_they_are_thick():
     assert not len(crossing_pairs(x, sheet.mesh.triangles, 0.0))
 
 
+@pytest.mark.parametrize("thickness", [1e-6, 1e-3, 5e-3, 1e-2])
+def test_a_thicker_sheet_is_not_let_through_itself(thickness):
+    """What counts as passing follows from the size of the sheet, whose flap ends in its first panel."""
+    pattern = rolled(100.0)
+    free = fold(pattern, thickness=thickness, touch=False)
+    found = summarise(free)
+    assert free.depth == pytest.approx(1e-3 * 0.11) and found.numbers["crossing_pairs"] == 9 and not found.reached
+    folding = fold(pattern, thickness=thickness)
+    assert folding.clear_from is not None and not len(folding.crossings)
+
+
+@pytest.mark.parametrize(("thickness", "named"), [(5e-3, 0), (1.2e-2, 0), (1.4e-2, 1), (3e-2, 3)])
+def test_a_sheet_too_thick_for_its_panels_is_said_to_be(thickness, named):
+    """The middle panel of 20 mm has bends on both sides, of t pi / 4 each; the outer ones of 20 mm on one."""
+    folding = fold(strip([0.02, 0.02, 0.02], 0.05, fold_angles=[np.pi, -np.pi]), thickness=thickness, touch=False)
+    found = summarise(folding)
+    text = f"{named} of 3 panels {'is' if named == 1 else 'are'} too narrow for the bends beside them"
+    assert (text in " ".join(found.sentences)) == bool(named)
+    assert found.reached == (not named)
+    assert (found.reason == "the sheet is too thick for its panels") == bool(named)
+
+
 def test_what_fits_is_not_changed_by_contact():
     pattern = miura(3, 3, 0.02, 0.02, np.radians(60), target_angle=np.radians(150.0))
     one, other = fold(pattern, thickness=1e-4), fold(pattern, thickness=1e-4, touch=True)
