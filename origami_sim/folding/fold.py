@@ -16,7 +16,9 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern
+from origami_sim.pattern.checks import check_count, check_number
 from origami_sim.pattern.intersections import crossing_pairs
+from origami_sim.quantities import converted
 
 from .consistency import Vertex, vertices
 from .contact import Contact
@@ -200,8 +202,8 @@ def fold(
     pattern: Pattern,
     *,
     steps: int = STEPS,
-    tolerance: float = TOLERANCE,
-    thickness: float = THICKNESS,
+    tolerance: float | str = TOLERANCE,
+    thickness: float | str = THICKNESS,
     touch: bool | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Folding:
@@ -209,10 +211,10 @@ def fold(
 
     Args:
         pattern: with mountains and valleys, which fold flat where they have no angle.
-        steps: in which the targets grow.
-        tolerance: distance from the target within which a crease has arrived [rad]; a tenth of the target where that is
-            less.
-        thickness: of the sheet [m]: at which panels touch.
+        steps: in which the targets grow, 1 to 1000.
+        tolerance: distance from the target within which a crease has arrived [rad], or text as "2 deg"; a tenth
+            of the target where that is less.
+        thickness: of the sheet, at which panels touch [m], or text as "0.1 mm".
         touch: whether panels keep each other off on the whole way. None: from the last frame on at which nothing
             touches, if they would end through each other.
         progress: called with the fraction done.
@@ -221,10 +223,18 @@ def fold(
         The path of the first sheet in `SOFTNESS` that reaches its targets; else that of the least energy.
 
     Raises:
-        InputError: no crease, no target angle, faces that cannot be triangulated; panels that are to touch, and lie in
-            each other in the given shape.
+        InputError: no pattern, a number out of its range or of another unit; no crease, no target angle, faces that
+            cannot be triangulated; panels that are to touch, and lie in each other in the given shape.
     """
     began = clock.perf_counter()
+    if not isinstance(pattern, Pattern):
+        raise InputError(
+            "is no pattern",
+            field="pattern",
+            value=pattern if isinstance(pattern, str) else type(pattern).__name__,
+            allowed="a Pattern, as read('crane.svg') or miura(...) return",
+        )
+    steps, tolerance, thickness = _checked(steps, tolerance, thickness)
     sheet = Elastic(pattern)
     if not len(sheet.mesh.creases):
         unread = "".join(f"; {n.rstrip('.')}" for n in pattern.notes if "unknown colour" in n)
@@ -250,6 +260,20 @@ def fold(
     if progress:
         progress(1.0)
     return best
+
+
+def _checked(steps, tolerance, thickness) -> tuple[int, float, float]:
+    """Return the settings of `fold` as numbers in their ranges, those of `calibrations/pattern.toml`."""
+    ranges = (
+        ("tolerance", tolerance, "rad", 1e-6, 3.0, "1e-06 to 3 rad, as a number in rad or a text as '2 deg'"),
+        ("thickness", thickness, "m", 1e-6, 0.05, "1e-06 to 0.05 m, as a number in m or a text as '0.1 mm'"),
+    )
+    tolerance, thickness = (
+        check_number(name, converted(value, unit, name), low=low, high=high, allowed=allowed)
+        for name, value, unit, low, high, allowed in ranges
+    )
+    steps = check_count("steps", steps, 1)
+    return int(check_number("steps", steps, high=1000, allowed="1 to 1000")), tolerance, thickness
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.pattern import DRAWN, Pattern, read_pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
+from origami_sim.quantities import converted
 
 from .consistency import vertices
 from .elastic import Elastic
@@ -34,20 +35,30 @@ KEPT = 0.5
 and the crane ends otherwise."""
 
 
-def read(path, *, size: float | None = None, scale: float | None = None, merge: float | None = None) -> Pattern:
+def read(
+    path: str | Path,
+    *,
+    size: float | str | None = None,
+    scale: float | str | None = None,
+    merge: float | str | None = None,
+) -> Pattern:
     """Read a pattern from a file and mend what keeps its panels from closing; see `pattern.read_pattern`.
 
     Args:
         path: FOLD file or drawing.
-        size: longest side [m]. scale: length of one unit [m], instead of it.
-        merge: of drawings: points closer than this share of the diagonal are one; None finds it.
+        size: longest side [m], or text as "15 cm". scale: length of one unit [m], likewise, instead of it.
+        merge: of drawings: points closer than this share of the diagonal are one, or text as "0.2 %"; None finds it.
 
     Returns:
         The pattern, with a note if points were merged.
 
     Raises:
-        InputError: as `read_pattern`; `merge` for a file that is no drawing; panels of a flat pattern that overlap.
+        InputError: as `read_pattern`; a number of another unit; `merge` for a file that is no drawing; panels of a flat
+            pattern that overlap.
     """
+    if not isinstance(path, str | Path):
+        raise InputError("is no file", field="path", value=type(path).__name__, allowed="the path of a pattern")
+    merge = None if merge is None else converted(merge, "1", "merge")
     drawing = DRAWN.get(Path(path).suffix.lower())
     if merge is not None:
         if drawing is None:

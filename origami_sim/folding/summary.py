@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from origami_sim.pattern.checks import check_positive
+from origami_sim.quantities import converted
+
 from .bends import MOST, bend_only
 from .elastic import SHARE, Elastic
 from .fold import DEPTH, STRETCH, Folding
@@ -32,14 +35,19 @@ class Summary:
     creases: dict[str, np.ndarray]
 
 
-def summarise(folding: Folding, thickness: float | None = None) -> Summary:
+def summarise(folding: Folding, thickness: float | str | None = None) -> Summary:
     """Return what became of a pattern.
 
     Args:
         folding: what folded.
-        thickness: of the sheet, as far as its panels leave room for bends [m]; None for that with which it folded.
+        thickness: of the sheet, as far as its panels leave room for bends [m], or text as "0.1 mm"; None for that with
+            which it folded.
+
+    Raises:
+        InputError: a thickness that is no length above 0.
     """
-    thickness = folding.thickness if thickness is None else thickness
+    stated = folding.thickness if thickness is None else converted(thickness, "m", "thickness")
+    thickness = check_positive("thickness", stated)
     sheet, errors = folding.sheet, folding.errors
     late = errors > folding.allowed
     missed = int(np.sum(late))

@@ -150,6 +150,35 @@ def test_small_targets_are_reached_to_a_tenth():
     assert fold(small).reached
 
 
+def test_quantities_are_taken_with_their_units(tmp_path):
+    path = drawn(tmp_path / "one.svg", [*frame(40, 10), ("V", 20, 0, 20, 10, 0.5)])
+    for given, size in (({"size": "15 cm"}, 0.15), ({"scale": "1 mm"}, 0.04), ({"merge": "0.1 %"}, 0.2)):
+        assert np.ptp(read(path, **given).vertices[:, 0]) == pytest.approx(size)
+    folding = fold(read(path, size="15 cm"), thickness="0.3 mm", tolerance="2 deg")
+    assert folding.thickness == pytest.approx(3e-4) and np.degrees(folding.tolerance) == pytest.approx(2.0)
+    assert summarise(folding, "0.1 mm").reached and summarise(folding).reached
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (lambda p: fold("x.dxf"), r"is no pattern \(field 'pattern', value 'x.dxf'\); allowed: a Pattern, as read"),
+        (lambda p: fold(p, thickness="2 deg"), r"wrong unit \(field 'thickness', value 'deg'\); allowed: m, cm, mm"),
+        (lambda p: fold(p, thickness=-1), r"number out of range \(field 'thickness', value -1\); allowed: 1e-06 to"),
+        (lambda p: fold(p, thickness=None), r"not a finite number \(field 'thickness'\)"),
+        (lambda p: fold(p, tolerance=5), r"out of range \(field 'tolerance', value 5\); allowed: 1e-06 to 3 rad"),
+        (lambda p: fold(p, tolerance="five"), r"not a number \(field 'tolerance', value 'five'\)"),
+        (lambda p: fold(p, steps="20"), r"bad count \(field 'steps', value '20'\)"),
+        (lambda p: fold(p, steps=5000), r"out of range \(field 'steps', value 5000\); allowed: 1 to 1000"),
+        (lambda p: read("x.svg", merge="2 mm"), r"wrong unit \(field 'merge', value 'mm'\)"),
+        (lambda p: read(p), r"is no file \(field 'path', value 'Pattern'\)"),
+    ],
+)
+def test_misuse_is_one_sentence(asked, words):
+    with pytest.raises(InputError, match=words):
+        asked(strip([0.02, 0.02], 0.02, fold_angles=[1.0]))
+
+
 def test_a_shape_that_is_folded_already_stays_as_it_is():
     pattern = miura(2, 2, 0.02, 0.02, np.radians(60), fold_angle=np.radians(80))
     folding = fold(pattern)
