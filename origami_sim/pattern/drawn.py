@@ -10,7 +10,7 @@ from .assemble import assemble
 from .checks import COORDINATE_LIMIT, check_number
 from .crease_pattern import Pattern
 from .holes import cut_noted, facets_of_holes, holes_noted
-from .planar import drop_holes, merge_distance, planar_faces, split_segments
+from .planar import SAME, drop_holes, merge_distance, moved_points, planar_faces, split_segments
 from .sizing import metres_of
 from .topology import edge_key, face_sides
 
@@ -19,6 +19,8 @@ PRIORITY = "BCMVFU"
 FIRST = "the first of border, cut, mountain, valley, flat and unassigned is kept"
 """The same in words."""
 MAX_SEGMENTS = 20_000
+NAMED = 3
+"""Places that a sentence names; half or double of them are as good."""
 
 
 def listed_pattern(lines, *, allowed, size=None, scale=None, merge_tolerance=None, file=None) -> Pattern:
@@ -47,7 +49,7 @@ def listed_pattern(lines, *, allowed, size=None, scale=None, merge_tolerance=Non
 
 
 def drawn_pattern(
-    segments, strokes, *, size=None, scale=None, stated=None, merge_tolerance=None, notes, file=None
+    segments, strokes, *, size=None, scale=None, stated=None, merge_tolerance=None, notes, own=None, file=None
 ) -> Pattern:
     """Return the flat pattern, y upwards, of the lines of a drawing.
 
@@ -57,7 +59,9 @@ def drawn_pattern(
         size: longest side of the pattern [m]. scale: length of one unit [m], instead of `size`. stated: the same by
             the file, or None.
         merge_tolerance: points closer than this share of the diagonal are one; None reads it off the drawing.
-        notes: list that takes what was defaulted or left out. file: named in errors.
+        notes: list that takes what was defaulted, joined or left out.
+        own: turns points [N, 2] in units of the drawing, y downwards, into the coordinates of the file, in which
+            places are named; None where they are the same. file: named in errors.
 
     Raises:
         InputError: no usable size, too many lines, or lines that enclose no face.
@@ -86,9 +90,19 @@ def drawn_pattern(
     strokes = [stroke for stroke, keep in zip(strokes, long_enough, strict=True) if keep]
     if not strokes:
         raise InputError("all lines are shorter than the merge tolerance", file=file, value=tolerance)
-    points, pieces = split_segments(starts[long_enough], ends[long_enough], tolerance, file=file)
 
-    points, chosen = _slit(points, _edges(pieces, strokes, notes))
+    def places(at) -> str:
+        drawn = np.asarray(at).reshape(-1, 2) * [1.0, -1.0] / metres
+        return _named(drawn if own is None else own(drawn), extent)
+
+    if not long_enough.all():
+        short = 0.5 * (starts + ends)[~long_enough]
+        lines = "1 line" if len(short) == 1 else f"{len(short)} lines"
+        notes.append(f"{lines} shorter than {tolerance / metres:.2g} left out, {places(short)}.")
+    starts, ends = starts[long_enough], ends[long_enough]
+    points, pieces = split_segments(starts, ends, tolerance, file=file)
+    _note_joined(moved_points(starts, ends, points, pieces), points, metres, everything, places, notes)
+    points, chosen = _slit(points, _edges(points, pieces, strokes, places, notes))
     facets, holed = facets_of_holes(points, np.array(list(chosen)))
     if holed:
         chosen |= {key: ("F", 1.0) for key in facets}
@@ -102,7 +116,9 @@ def drawn_pattern(
     beside = Counter(edge_key(*side) for face in faces for side in face_sides(face))
     edges = [key for key in chosen if beside[key]]
     if len(edges) < len(chosen):
-        notes.append(_loose([chosen[key][0] for key in chosen if not beside[key]], chosen.values()))
+        loose = [key for key in chosen if not beside[key]]
+        middles = [points[list(key)].mean(axis=0) for key in loose]
+        notes.append(_loose([chosen[key][0] for key in loose], chosen.values(), places(middles)))
     outer = [key for key in edges if beside[key] == 1 and chosen[key][0] not in "BC"]
     if outer:
         notes.append(f"{len(outer)} coloured edges on the outside of the sheet were taken as border.")
@@ -145,40 +161,66 @@ def _slit(points, chosen):
     return np.vstack([points, *(points[list(key)].mean(axis=0) for key in halves)]), parted
 
 
-def _loose(letters, chosen) -> str:
+def _named(points, extent: float) -> str:
+    """Return the first of some places in words, in the coordinates of the file."""
+    digits = max(0, 4 - math.ceil(math.log10(extent)))  # a thousandth of the drawing and better
+    rounded = np.round(points[:NAMED], digits) + 0.0  # no zero with a sign
+    shown = ", ".join(f"({x:.{digits}f}, {y:.{digits}f})" for x, y in rounded.tolist())
+    return f"at {shown}" + (f" and {len(points) - NAMED} more" if len(points) > NAMED else "")
+
+
+def _note_joined(moved, points, metres: float, everything, places, notes) -> None:
+    """Say where lines that miss each other were joined."""
+    diagonal = float(np.linalg.norm(np.ptp(everything, axis=0)))
+    joined = np.flatnonzero(moved > SAME * diagonal)
+    if len(joined):
+        joined = joined[np.argsort(-moved[joined], kind="stable")]
+        where = "a point" if len(joined) == 1 else f"{len(joined)} points"
+        by = "" if len(joined) == 1 else "up to "
+        notes.append(
+            f"lines that miss each other were joined in {where}, by {by}{moved[joined[0]] / metres:.2g} of the "
+            f"drawing's units, {places(points[joined])} (merge=)."
+        )
+
+
+def _loose(letters, chosen, where: str) -> str:
     """Return the sentence about line pieces of these letters, which enclose nothing."""
     folds = sum(letter in "MV" for letter in letters)
-    said = f"{len(letters)} line pieces that enclose nothing were left out"
+    pieces = "1 line piece that encloses nothing was" if len(letters) == 1 else (
+        f"{len(letters)} line pieces that enclose nothing were"
+    )
+    said = f"{pieces} left out, {where}"
     if folds:
-        said += f", {folds} of them mountains or valleys"
+        said += "; mountains or valleys are " + ("all" if folds == len(letters) else f"{folds} of them")
     if folds and not any(letter == "B" for letter, _ in chosen):
         said += ": no border is drawn, within which they would fold"
     return f"{said}."
 
 
-def _edges(pieces, strokes, notes) -> dict[tuple[int, int], tuple[str, float]]:
+def _edges(points, pieces, strokes, places, notes) -> dict[tuple[int, int], tuple[str, float]]:
     """Return (letter, opacity) by edge key, one for each, the higher `PRIORITY` where lines coincide."""
     drawn = [strokes[s] for *_, s in pieces]
     stays, conflicts = foremost([piece[:2] for piece in pieces], drawn, lambda n: PRIORITY.index(drawn[n][0]))
     if conflicts:
-        edges = "1 edge is" if conflicts == 1 else f"{conflicts} edges are"
-        notes.append(f"{edges} drawn twice in different colours or opacities; {FIRST}.")
+        edges = "1 edge is" if len(conflicts) == 1 else f"{len(conflicts)} edges are"
+        where = places([points[list(key)].mean(axis=0) for key in conflicts])
+        notes.append(f"{edges} drawn twice in different colours or opacities, {where}; {FIRST}.")
     return {key: drawn[n] for key, n in stays.items()}
 
 
-def foremost(pairs, marks, rank) -> tuple[dict[tuple[int, int], int], int]:
-    """Return which of the edges that join the same two vertices stays, and for how many others are marked otherwise.
+def foremost(pairs, marks, rank) -> tuple[dict[tuple[int, int], int], list[tuple[int, int]]]:
+    """Return which of the edges that join the same two vertices stays, and for which others are marked otherwise.
 
     Args:
         pairs: vertices of each edge. marks: what each is marked with. rank: the number of an edge to its rank.
 
     Returns:
-        The number of the edge of least rank, of equal ones the first, by edge key.
+        The number of the edge of least rank, of equal ones the first, by edge key; and such keys.
     """
     stays: dict[tuple[int, int], int] = {}
     for n, pair in enumerate(pairs):
         key = edge_key(*pair)
         if (other := stays.setdefault(key, n)) != n:
             stays[key] = min(other, n, key=rank)
-    differ = {key for n, pair in enumerate(pairs) if marks[n] != marks[stays[key := edge_key(*pair)]]}
-    return stays, len(differ)
+    differ = [key for n, pair in enumerate(pairs) if marks[n] != marks[stays[key := edge_key(*pair)]]]
+    return stays, list(dict.fromkeys(differ))

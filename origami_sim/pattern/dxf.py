@@ -92,6 +92,7 @@ def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         stated=metres,
         merge_tolerance=merge_tolerance,
         notes=notes,
+        own=lambda points: points * [1.0, -1.0],
         file=path,
     )
 

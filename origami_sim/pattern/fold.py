@@ -226,7 +226,7 @@ def _distinct(listed: _Edges, notes) -> list[int]:
     """Return which edges stay, in order, if of those between the same two vertices one does."""
     stays, differ = foremost(listed.pairs, listed.letters or "U" * len(listed.pairs), listed.rank)
     if len(stays) < len(listed.pairs):
-        contrary = f", {differ} of them with different letters; {FIRST}" if differ else ""
+        contrary = f", {len(differ)} of them with different letters; {FIRST}" if differ else ""
         more = len(listed.pairs) - len(stays)
         edges = "1 edge was listed twice and is" if more == 1 else f"{more} edges were listed more than once and are"
         notes.append(f"{edges} one{contrary}.")

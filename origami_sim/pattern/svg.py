@@ -61,6 +61,7 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         stated=drawing.metres,
         merge_tolerance=merge_tolerance,
         notes=notes,
+        own=lambda points: points - drawing.origin,
         file=path,
     )
 

@@ -39,6 +39,7 @@ class Drawing:
     Attributes:
         segments: [S, 2, 2] start and end of each straight piece.
         strokes: S pairs (assignment letter, opacity).
+        origin: [2] of user coordinates, which a viewBox moves, in these units.
         metres: length of a user unit if the file states a physical size, else None.
         others: [O, 2, 2] the same of strokes in colours that are no crease colour.
         unknown: those colours. skipped: elements left out. curves: how many were cut into chords.
@@ -47,6 +48,7 @@ class Drawing:
     segments: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
     strokes: list[tuple[str, float]] = field(default_factory=list)
     others: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(2))
     metres: float | None = None
     unknown: Counter = field(default_factory=Counter)
     skipped: Counter = field(default_factory=Counter)
@@ -158,6 +160,7 @@ def read_drawing(data: bytes, flatness: float, *, file=None) -> Drawing:
         raise InputError(f"cannot read the drawing ({detail})", file=file, allowed="well-formed SVG shapes") from None
     drawing.segments = np.array(segments, dtype=np.float64).reshape(-1, 2, 2) / pixels
     drawing.others = np.array(others, dtype=np.float64).reshape(-1, 2, 2) / pixels
+    drawing.origin = np.array([matrix.e, matrix.f]) / pixels
     if any(PHYSICAL.fullmatch(root.attrib.get(name, "")) for name in ("width", "height")):
         drawing.metres = METRES_PER_PIXEL * pixels
     for tag in ("text", "image"):

@@ -221,6 +221,38 @@ def test_near_ends_merge(tmp_path):
         read_svg(svg(tmp_path, body), merge_tolerance=1.0)
 
 
+HUB = [(0, 0), (80, 80), (80, 0), (0, 80), (0, 40), (80, 40)]
+
+
+@pytest.mark.parametrize("missing", range(6))
+def test_joined_ends_are_said_and_are_where_most_lines_end(tmp_path, missing):
+    """Of six lines to the middle one ends 0.13 short of it, whichever is drawn first."""
+    lines = []
+    for n, (x, y) in enumerate(HUB):
+        away = math.hypot(x - 40, y - 40)
+        end = (40 + 0.13 * (x - 40) / away, 40 + 0.13 * (y - 40) / away) if n == missing else (40, 40)
+        lines.append(f'<path d="M{x + 10} {y + 20}L{end[0] + 10} {end[1] + 20}" stroke="{"red" if n > 3 else "blue"}"/>')
+    border = '<rect x="10" y="20" width="80" height="80" stroke="#000"/>'
+    head = 'viewBox="10 20 80 80" width="80mm" height="80mm"'
+    pattern = read_svg(svg(tmp_path, border + "".join(lines), head))
+    (note,) = [n for n in pattern.notes if "joined" in n]
+    assert "joined in a point, by 0.13 of the drawing's units, at (50.00, 60.00)" in note
+    middle = pattern.vertices[:, :2].min(axis=0) + 0.04
+    assert np.linalg.norm(pattern.vertices[:, :2] - middle, axis=1).min() < 1e-7
+
+
+def test_what_is_drawn_twice_and_loose_is_said_with_its_place(tmp_path):
+    body = BORDER + '<path d="M10 0v10" stroke="red"/><path d="M10 0v5" stroke="blue"/><path d="M12 4h2" stroke="red"/>'
+    notes = " ".join(read_svg(svg(tmp_path, body)).notes)
+    assert "1 edge is drawn twice in different colours or opacities, at (10.00, 2.50); the first of" in notes
+    assert "1 line piece that encloses nothing was left out, at (13.00, 4.00); mountains or valleys are all." in notes
+
+
+def test_lines_too_short_to_be_are_said(tmp_path):
+    body = BORDER + '<path d="M10 0v10" stroke="red"/><path d="M4 4l0.0005 0" stroke="red"/>'
+    assert any("1 line shorter than 0.00" in n and "at (4.00, 4.00)" in n for n in read_svg(svg(tmp_path, body)).notes)
+
+
 def test_what_is_left_out_is_told(tmp_path):
     body = BORDER + (
         '<line x1="1" y1="1" x2="2" y2="2" stroke="red"/><line x1="0" y1="0" x2="9" y2="9" stroke="orange"/>'
@@ -230,7 +262,7 @@ def test_what_is_left_out_is_told(tmp_path):
     pattern = read_svg(svg(tmp_path, body))
     text = " ".join(pattern.notes)
     assert all(
-        words in text for words in ("orange", "enclose nothing", "<text>", "without stroke", "1 edge is drawn twice")
+        words in text for words in ("orange", "encloses nothing", "<text>", "without stroke", "1 edge is drawn twice")
     )
     assert "the first of border, cut, mountain, valley" in text
     assert pattern.face_count == 1
@@ -338,5 +370,7 @@ def test_folds_without_a_border_around_them_are_told(tmp_path):
     file.write_text('<svg><path d="M0 0H2V2H0Z M2 0H4 M2 2H4" stroke="red"/></svg>')
     notes = read_svg(file).notes
     assert any(
-        "2 line pieces that enclose nothing were left out, 2 of them mountains or valleys: no b" in n for n in notes
+        "2 line pieces that enclose nothing were left out, at (3.000, 0.000), (3.000, 2.000); mountains or valleys "
+        "are all: no border is drawn" in n
+        for n in notes
     )
