@@ -17,6 +17,7 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern
 from origami_sim.pattern.checks import check_count, check_number
+from origami_sim.pattern.drawn import NO_FOLD
 from origami_sim.pattern.intersections import crossing_pairs
 from origami_sim.quantities import converted
 
@@ -236,15 +237,13 @@ def fold(
         )
     steps, tolerance, thickness = _checked(steps, tolerance, thickness)
     sheet = Elastic(pattern)
-    if not len(sheet.mesh.creases):
-        unread = "".join(f"; {n.rstrip('.')}" for n in pattern.notes if "unknown colour" in n)
-        raise InputError(
-            f"the pattern has no crease to fold{unread}", field="edges_assignment", allowed="M and V edges"
-        )
-    if not np.any(sheet.target):
-        raise InputError(
-            "the pattern gives no target angle", field="edges_foldAngle", allowed="M and V edges, or degrees"
-        )
+    if not len(sheet.mesh.creases) or not np.any(sheet.target):
+        what = "gives no target angle" if len(sheet.mesh.creases) else "has no crease to fold"
+        why = "".join(f"; {n.rstrip('.')}" for n in pattern.notes if n.startswith(NO_FOLD))
+        field = "edges_foldAngle" if len(sheet.mesh.creases) else "edges_assignment"
+        if np.isnan(pattern.accuracy):
+            raise InputError(f"the pattern {what}", field=field, allowed="M and V edges, or degrees")
+        raise InputError(f"the pattern {what}{why}", allowed="mountains and valleys by colour (red, blue) or layer")
     search = _Search(sheet, Placement(sheet), vertices(sheet), steps, tolerance, thickness)
     if touch:
         sheet.contact = Contact(sheet, thickness)

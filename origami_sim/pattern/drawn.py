@@ -18,9 +18,32 @@ PRIORITY = "BCMVFU"
 """Which assignment an edge keeps where lines lie on each other."""
 FIRST = "the first of border, cut, mountain, valley, flat and unassigned is kept"
 """The same in words."""
+NO_FOLD = "no line was read as a mountain or valley"
+"""How the note begins that says so; who has nothing to fold repeats it."""
+READ = {"B": "border", "C": "cut", "M": "mountain", "V": "valley", "F": "facet", "U": "crease without a target"}
+"""Assignments in words."""
+KINDS = 8
+"""Kinds of lines that such a note names."""
 MAX_SEGMENTS = 20_000
 NAMED = 3
 """Places that a sentence names; half or double of them are as good."""
+
+
+def note_without_folds(read: Counter, notes: list[str]) -> None:
+    """Say how the lines of a drawing were read, if none of them folds.
+
+    Args:
+        read: how many lines by what they look like and their assignment, None for those left out.
+        notes: list that takes the sentence.
+    """
+    if any(letter in ("M", "V") for _, letter in read):
+        return
+    kinds = [
+        f"{count} of {look} {'left out' if letter is None else 'as ' + READ[letter]}"
+        for (look, letter), count in read.most_common(KINDS)
+    ]
+    more = f", and {len(read) - KINDS} other kinds" if len(read) > KINDS else ""
+    notes.append(f"{NO_FOLD}: {', '.join(kinds)}{more}.")
 
 
 def listed_pattern(lines, *, allowed, size=None, scale=None, merge_tolerance=None, file=None) -> Pattern:
@@ -186,8 +209,10 @@ def _note_joined(moved, points, metres: float, everything, places, notes) -> Non
 def _loose(letters, chosen, where: str) -> str:
     """Return the sentence about line pieces of these letters, which enclose nothing."""
     folds = sum(letter in "MV" for letter in letters)
-    pieces = "1 line piece that encloses nothing was" if len(letters) == 1 else (
-        f"{len(letters)} line pieces that enclose nothing were"
+    pieces = (
+        "1 line piece that encloses nothing was"
+        if len(letters) == 1
+        else (f"{len(letters)} line pieces that enclose nothing were")
     )
     said = f"{pieces} left out, {where}"
     if folds:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..files import read_bytes
 from .colours import letter_of
 from .crease_pattern import Pattern
-from .drawn import drawn_pattern
+from .drawn import drawn_pattern, note_without_folds
 from .svg import FLATNESS
 from .svg_drawing import MAX_CHORDS
 
@@ -46,7 +46,7 @@ def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
     """
     pairs = _pairs(read_bytes(path), path)
     metres, colours = _header(pairs)
-    curves, skipped, unknown = [], Counter(), Counter()
+    curves, skipped, read = [], Counter(), Counter()
     for entity in _entities(pairs, path):
         kind = entity["kind"]
         shape = SHAPES.get(kind)
@@ -54,14 +54,14 @@ def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
             skipped[kind] += 1
             continue
         letter, shown = _letter(entity, colours)
+        read[shown, letter] += 1
         if letter is None:
-            unknown[shown] += 1
             continue
         corners, bulges = shape(entity)
         if corners:
             curves.append((letter, (corners, bulges)))
     ends = np.array([p for _, (corners, _) in curves for p in corners]).reshape(-1, 2)
-    notes = [f"{count} lines of {shown} were left out." for shown, count in unknown.items()]
+    notes = [f"{count} lines of {shown} were left out." for (shown, letter), count in read.items() if letter is None]
     notes += [f"{count} {kind} left out." for kind, count in skipped.items()]
     if not len(ends):
         raise InputError(
@@ -84,7 +84,7 @@ def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
     if not segments:
         raise InputError("all lines are of no length", file=path)
     upright = np.array(segments) * [1.0, -1.0]  # drawings have y downwards
-    return drawn_pattern(
+    pattern = drawn_pattern(
         upright,
         strokes,
         size=size,
@@ -95,6 +95,8 @@ def read_dxf(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         own=lambda points: points * [1.0, -1.0],
         file=path,
     )
+    note_without_folds(read, pattern.notes)
+    return pattern
 
 
 def _pairs(data: bytes, path) -> list[tuple[int, str]]:
@@ -177,17 +179,16 @@ def _number(text, kind, path) -> float:
 
 
 def _letter(entity, colours) -> tuple[str | None, str]:
-    """Return the assignment of an entity by its layer or colour, and how to call it where there is none."""
+    """Return the assignment of an entity by its layer or colour, None where there is none, and how to call it."""
     name = entity["layer"].lower()
-    named = [letter for word, letter in LAYERS if word in name]
-    if named:
-        return named[0], ""
     if "true" in entity:
         rgb = tuple((entity["true"] >> shift) & 255 for shift in (16, 8, 0))
     else:
         index = entity["colour"] if entity["colour"] != BY_LAYER else colours.get(entity["layer"], 7)
         rgb = _rgb(index)
-    return letter_of(rgb), f"layer '{entity['layer'][:40]}' in colour {rgb[0]},{rgb[1]},{rgb[2]}"
+    named = [letter for word, letter in LAYERS if word in name]
+    shown = f"layer '{entity['layer'][:40]}' in colour {rgb[0]},{rgb[1]},{rgb[2]}"
+    return named[0] if named else letter_of(rgb), shown
 
 
 def _rgb(index: int) -> tuple[int, int, int]:

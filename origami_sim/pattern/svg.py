@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..files import read_bytes
 from .checks import check_number
 from .crease_pattern import Pattern
-from .drawn import drawn_pattern
+from .drawn import drawn_pattern, note_without_folds
 from .planar import APART, crossing_points
 from .svg_drawing import read_drawing
 
@@ -53,7 +53,7 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         notes.append(f"no border in black: the outline in {', '.join(drawing.unknown)} was taken as border.")
         drawing.unknown.clear()
     _note_leftovers(drawing, notes)
-    return drawn_pattern(
+    pattern = drawn_pattern(
         np.concatenate([drawing.segments, border]),
         [*drawing.strokes, *[("B", 1.0)] * len(border)],
         size=size,
@@ -64,6 +64,8 @@ def read_svg(path, *, size=None, scale=None, merge_tolerance=None, flatness=FLAT
         own=lambda points: points - drawing.origin,
         file=path,
     )
+    note_without_folds(drawing.read, pattern.notes)
+    return pattern
 
 
 def _outline(drawing) -> np.ndarray:

@@ -42,7 +42,8 @@ class Drawing:
         origin: [2] of user coordinates, which a viewBox moves, in these units.
         metres: length of a user unit if the file states a physical size, else None.
         others: [O, 2, 2] the same of strokes in colours that are no crease colour.
-        unknown: those colours. skipped: elements left out. curves: how many were cut into chords.
+        unknown: those colours. read: how many shapes by how their strokes look and what they were read as.
+        skipped: elements left out. curves: how many were cut into chords.
     """
 
     segments: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -51,6 +52,7 @@ class Drawing:
     origin: np.ndarray = field(default_factory=lambda: np.zeros(2))
     metres: float | None = None
     unknown: Counter = field(default_factory=Counter)
+    read: Counter = field(default_factory=Counter)
     skipped: Counter = field(default_factory=Counter)
     curves: int = 0
 
@@ -242,6 +244,8 @@ def _stroke(shape, drawing) -> tuple[str, float] | None:
         return None
     colour = parse_colour(text, values.get("color"))
     letter = letter_of(colour[:3]) if colour else None
+    dashes = values.get("stroke-dasharray") or "none"
+    drawing.read[f"stroke {text[:40]}" + (f" dashed {dashes[:20]}" if dashes != "none" else ""), letter] += 1
     if letter is None or colour is None:
         drawing.unknown[text[:40]] += 1
         return UNKNOWN, 1.0

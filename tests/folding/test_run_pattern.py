@@ -63,6 +63,31 @@ def test_panels_that_pass_through_each_other(call, tmp_path):
     assert "A real sheet stops before these angles" in out and "mm of the flat pattern" in out
 
 
+def test_a_shape_that_is_folded_already_is_said_to_be(call, tmp_path):
+    write_fold(miura(2, 2, 0.02, 0.02, 60 * DEGREES, fold_angle=80 * DEGREES), tmp_path / "folded.fold")
+    code, out, _ = call("run", "folded.fold")
+    assert code == 0 and "fold to within" not in out
+    assert re.search(r"The given shape is folded already: all 24 creases are within 0\.01 deg of their targets", out)
+
+
+def test_of_fold_no_distance_of_merging_is_advised(call, tmp_path):
+    """A crease that ends beside its vertex: the advice names both, and not a setting that is refused."""
+    file = tmp_path / "open.fold"
+    write_fold(miura(3, 3, 0.02, 0.02, 60 * DEGREES, target_angle=180 * DEGREES), file)
+    document = json.loads(file.read_text())
+    del document["faces_vertices"]
+    at = np.array(document["vertices_coords"])[:, :2]
+    hub = int(np.argmin(np.linalg.norm(at - at.mean(axis=0), axis=1)))
+    edge = [e for e, pair in enumerate(document["edges_vertices"]) if hub in pair][2]
+    other = [v for v in document["edges_vertices"][edge] if v != hub]
+    document["vertices_coords"].append((at[hub] - [1.5e-3, 1e-3]).tolist())
+    document["edges_vertices"][edge] = [*other, len(at)]
+    file.write_text(json.dumps(document))
+    code, out, _ = call("run", file, "--no-touch")
+    assert code == 1 and "merge" not in out
+    assert re.search(r"one vertex instead of it and the nearest, [0-9.]+ mm off at \([-0-9.]+, [-0-9.]+\) mm", out)
+
+
 def test_as_json(call, three):
     code, out, _ = call("run", three, "--json")
     assert code == 1
@@ -94,12 +119,20 @@ def test_size_and_scale_from_the_command_line(call, tmp_path):
         (["box", "--touch"], r"only a pattern leaves this open.*--touch"),
         (["bomb.fold", "--panels", "rigid"], r"no such option.*--panels"),
         (["bomb.fold", "--set", "steps=0"], r"out of its range.*steps"),
+        (
+            ["dashed.svg"],
+            r"dashed\.svg: the pattern gives no target angle; no line was read as a mountain or valley: "
+            r"4 of stroke #000000 as border, 1 of stroke black dashed 4 2 as border; allowed: mountains and valleys by",
+        ),
         (["flat.fold"], r"flat\.fold: .*no target angle"),
         (["sheet.obj"], r"sheet\.obj: a mesh has a shape, but no fold to go to"),
     ],
 )
 def test_what_is_refused(call, bomb, tmp_path, arguments, words):
     write_fold(grid(2, 1, 0.02, 0.02), tmp_path / "flat.fold")
+    dashed = '<path d="M0 0L40 -10" stroke="black" stroke-dasharray="4 2"/></svg>'
+    file = drawn(tmp_path / "dashed.svg", frame(40, 10))
+    file.write_text(file.read_text().replace("</svg>", dashed))
     shape = miura(1, 1, 0.02, 0.02, 1.0)
     write_mesh(shape.vertices, triangulate(shape).triangles, tmp_path / "sheet.obj")
     code, _, err = call("run", *arguments)

@@ -48,6 +48,15 @@ def test_layers_by_name_and_by_their_colour(tmp_path):
     assert pattern.assignments.count("V") == 2 and pattern.assignments.count("M") == 2
 
 
+def test_layers_that_say_nothing_are_listed_as_they_were_read(tmp_path):
+    lines = [line((0, 0), (4, 4), layer="Tal"), line((0, 4), (4, 0), layer="Tal"), line((0, 2), (4, 2), layer="Berg")]
+    with pytest.raises(InputError) as refused:
+        fold(read(saved(tmp_path, SQUARE, *lines)))
+    words = "no line was read as a mountain or valley: 2 of layer 'Tal' in colour 0,0,0 as border, 1 of layer '0' in"
+    assert words in str(refused.value) and "1 of layer 'Berg' in colour 0,0,0 as border" in str(refused.value)
+    assert not any("no line was read" in n for n in read(saved(tmp_path, SQUARE, *FOLDS)).notes)
+
+
 def test_units_of_the_header_and_y_upwards(tmp_path):
     header = "  0\nSECTION\n  2\nHEADER\n  9\n$INSUNITS\n 70\n4\n  0\nENDSEC\n"
     pattern = read_pattern(saved(tmp_path, SQUARE, line((0, 1), (4, 1), colour=1), header=header))

@@ -231,7 +231,8 @@ def test_joined_ends_are_said_and_are_where_most_lines_end(tmp_path, missing):
     for n, (x, y) in enumerate(HUB):
         away = math.hypot(x - 40, y - 40)
         end = (40 + 0.13 * (x - 40) / away, 40 + 0.13 * (y - 40) / away) if n == missing else (40, 40)
-        lines.append(f'<path d="M{x + 10} {y + 20}L{end[0] + 10} {end[1] + 20}" stroke="{"red" if n > 3 else "blue"}"/>')
+        colour = "red" if n > 3 else "blue"
+        lines.append(f'<path d="M{x + 10} {y + 20}L{end[0] + 10} {end[1] + 20}" stroke="{colour}"/>')
     border = '<rect x="10" y="20" width="80" height="80" stroke="#000"/>'
     head = 'viewBox="10 20 80 80" width="80mm" height="80mm"'
     pattern = read_svg(svg(tmp_path, border + "".join(lines), head))
