@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from origami_sim.diagnose.prepare import FRAMES, thinned
+from origami_sim.diagnose.prepare import FRAMES
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Subject
@@ -14,6 +14,7 @@ from origami_sim.hypotheses.weight import weighed
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.channels import stacked
+from origami_sim.observation.thinning import thinned
 from origami_sim.predict.drives import drive_of
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch

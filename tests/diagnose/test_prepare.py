@@ -8,10 +8,11 @@ from scipy.optimize import brentq
 
 from origami_sim.diagnose import Options, diagnose
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.prepare import among, prepared, thinned
+from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.errors import InputError
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.observation.thinning import thinned
 from origami_sim.predict.shots import by_length
 from origami_sim.recording import Channel, DriveChannel, NoiseReport, Recording
 from tests.diagnose.strips import hanging, record, subject
@@ -68,7 +69,8 @@ def test_means_across_the_end_of_a_ramp_are_what_the_mean_drive_gives():
     levels = np.interp(t, [0, 20, 22, 50, 52, 90, 92, 121], [0, 0, 0.02, 0.02, -0.01, -0.01, 0.005, 0.005])
 
     def angle(b: np.ndarray) -> np.ndarray:
-        return np.array([brentq(lambda a: 2e-3 * a - 0.05 * v * np.cos(a), -1.5, 1.5, xtol=1e-12) for v in b])
+        moment = lambda a, v: 2e-3 * a - 0.05 * v * np.cos(a)  # noqa: E731
+        return np.array([brentq(moment, -1.5, 1.5, args=(v,), xtol=1e-12) for v in b])
 
     channel = Channel("fold", "crease_angle", angle(levels), "rad", 1.5e-3, {"crease": 0})
     field = DriveChannel("field_z", levels, "T", False)
