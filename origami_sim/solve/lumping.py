@@ -25,6 +25,9 @@ def lumped_masses(model: Model, parameters: Parameters) -> list[str]:
     if model.panels == "rigid" or ("body", "mass") not in parameters or not len(model.creases):
         return []
     sides = _sides(model)
+    lines = np.sort(np.concatenate([model.creases, model.bends])[:, 1:3], axis=1).tolist()
+    if any(len(sides.get((j, k), ())) != 2 for j, k in lines):  # a hinge between bars alone
+        return []
     count, of = connected_components(_graph(_between(sides, model.bends), model.panel_count), directed=False)
     joints = {tuple(pair): c for c, pair in enumerate(of[_between(sides, model.creases)].tolist())}
     joints |= {(b, a): c for (a, b), c in joints.items()}

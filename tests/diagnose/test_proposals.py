@@ -119,13 +119,25 @@ def test_how_far_a_set_may_come_is_told_by_those_before_it():
 
 @pytest.mark.parametrize(("value", "worth"), [(0.0, False), (0.5, True)])
 def test_what_physics_would_hold_at_nothing_is_not_fitted(value, worth):
-    """A lag beside the best set, of which the recordings would have less than none."""
-    lag = BEST | {DRAG}
-    out = posterior({BEST: 0.0}, {lag: -2.0})
-    node = cast(Any, out.nodes[BEST])
+    """A lag beside a rival of the best set, of which the recordings would have less than none."""
+    rival = frozenset({RUB, LOSS, ZERO})
+    lag = rival | {DRAG}
+    out = posterior({BEST: 0.0, rival: -1.0}, {lag: -2.0})
+    node = cast(Any, out.nodes[rival])
     node.groups = [SimpleNamespace(columns=(n,), strengths=1) for n in range(len(lag))]
-    out.estimates[lag] = cast(Any, SimpleNamespace(parent=BEST, groups=(0, 1, 2, 3), values=np.array([3, 3, 3, value])))
+    values = np.array([3, 3, 3, value])
+    out.estimates[lag] = cast(Any, SimpleNamespace(parent=rival, groups=(0, 1, 2, 3), values=values))
     assert proposed(out, 0) == (lag if worth else None)
+
+
+@pytest.mark.parametrize(("promise", "worth"), [(-0.1, False), (0.1, True)])
+def test_what_only_adds_to_the_best_is_fitted_if_it_promises_the_lead(promise, worth):
+    more = BEST | {DRAG}
+    assert proposed(posterior({BEST: 0.0}, {more: promise}), 0) == (more if worth else None)
+    drag = frozenset({DRAG})
+    none = posterior({frozenset(): 0.0, BEST: -9.0}, {drag: promise})  # beside nothing, all that is said depends on it
+    none.estimates[drag] = cast(Any, SimpleNamespace(parent=frozenset(), groups=(), values=np.zeros(0)))
+    assert proposed(none, 0) == drag
 
 
 def test_a_set_is_fitted_from_other_shapes_only_if_it_promises_more():
