@@ -47,7 +47,7 @@ def lumped_masses(model: Model, parameters: Parameters) -> list[str]:
         for body in order[:0:-1].tolist():
             crease = joints[int(parent[body]), body]
             if moves[body]:
-                found.append((*(_about(model, crease, m[body]) for m in (true, lumped)), crease))
+                found.append((_about(model, crease, true[body]), _about(model, crease, lumped[body]), crease))
             for beyond in (true, lumped, moves):
                 beyond[parent[body]] += beyond[body]
     if sum(made for _, made, _ in found) <= (1.0 + LUMPED) * sum(own for own, *_ in found):
