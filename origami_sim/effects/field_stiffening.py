@@ -39,7 +39,7 @@ EFFECT = Effect(
         Parameter("stiffness", "K", "N m/rad", 0.0, (0.0, math.inf), "that of the crease without field"),
         Parameter("rest_angle", "theta0", "rad", 0.0, (-math.pi, math.pi), "that of the crease"),
         Parameter(
-            "field_gain", "g", "-", 0.0, (-0.9, 10.0), "relative change of stiffness in a strong field", typical=0.2
+            "field_gain", "g", "-", 0.0, (-0.9, 10.0), "relative change of stiffness in a strong field", typical=1.0
         ),
         Parameter("half_field", "Bh", "T", 0.2, (1e-6, 5.0), "field at which half of the change is reached"),
     ),
@@ -47,7 +47,8 @@ EFFECT = Effect(
     stiffness=lambda p: p["stiffness"] * np.abs(p["field_gain"]),
     formula="M = -K g B^2 / (B^2 + Bh^2) (theta - theta0)",
     source="magnetorheological effect, Jolly, Carlson & Munoz 1996: quadratic in B, then saturated",
-    matters="0 to 5 % for remanent particles at 0.2 T, tens of percent for iron; even in B",
+    matters="0 to 5 % for remanent particles at 0.2 T, for iron tens of percent in rubber and several times in soft "
+    "silicone (Kramarenko, Stepanov & Khokhlov 2019, INEOS OPEN 2, 178); even in B",
     confused_with="compliant dipoles, misaligned field, mountain-valley asymmetry",
     separated_by="natural frequency against a field along the magnetisation",
 )
