@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
+from scipy.stats import chi2
 
 from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
@@ -299,11 +300,13 @@ def _to_the_end(forward: Predictor, f: Fit) -> Fit:
 
 
 def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None:
-    """Fits a set with shorter spectra as well, where its fit leaves branches of a Prony series at nothing."""
+    """Fits a set with shorter spectra as well, where branches of a Prony series may be nothing by a Wald test."""
     f, place, every = out.nodes[key].fit, len(forward.subject.nominals), [s.suspect for s in out.signatures]
     suspects, theta = [], [f.theta[:place]]
+    unseen = np.square(f.theta / f.deviations()) < chi2.ppf(CREDIBLE, 1)
     for s in f.hypothesis.suspects:
-        shorter, kept = without_idle(s, f.theta[place : place + len(s.free)], every)
+        mine, strong = slice(place, place + len(s.free)), [n in s.strengths for n in s.free]
+        shorter, kept = without_idle(s, np.where(unseen[mine] & strong, 0.0, f.theta[mine]), every)
         suspects.append(shorter)
         theta.append(kept)
         place += len(s.free)
