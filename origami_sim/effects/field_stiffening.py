@@ -47,8 +47,8 @@ EFFECT = Effect(
     stiffness=lambda p: p["stiffness"] * np.abs(p["field_gain"]),
     formula="M = -K g B^2 / (B^2 + Bh^2) (theta - theta0)",
     source="magnetorheological effect, Jolly, Carlson & Munoz 1996: quadratic in B, then saturated",
-    matters="0 to 5 % for remanent particles at 0.2 T, for iron tens of percent in rubber and several times in soft "
-    "silicone (Kramarenko, Stepanov & Khokhlov 2019, INEOS OPEN 2, 178); even in B",
+    matters="0 to 5 % for remanent particles at 0.2 T, for iron tens of percent in rubber, up to three times in "
+    "soft elastomers (a mean-field model, arXiv:2501.09353); even in B",
     confused_with="compliant dipoles, misaligned field, mountain-valley asymmetry",
     separated_by="natural frequency against a field along the magnetisation",
 )

@@ -106,14 +106,19 @@ def summarise(folding: Folding, thickness: float | str | None = None) -> Summary
     return Summary(reached, said, reason, numbers, worst, creases)
 
 
+def _place(point: np.ndarray) -> str:
+    """Return where a point is on the sheet, in words [m]."""
+    return f"({1e3 * point[0]:.1f}, {1e3 * point[1]:.1f}) mm"
+
+
 def _narrow(folding: Folding, narrow: list[int], share: float, thickness: float) -> str:
     """Return the sentence on panels that are too narrow for the sheet's thickness."""
     pattern = folding.sheet.pattern
-    x, y = 1e3 * pattern.vertices[list(pattern.faces[narrow[0]])].mean(axis=0)[:2]
+    at = _place(pattern.vertices[list(pattern.faces[narrow[0]])].mean(axis=0))
     panels = f"{len(narrow)} of {len(pattern.faces)} panels {'is' if len(narrow) == 1 else 'are'}"
     return (
         f"A sheet {1e3 * thickness:.3g} mm thick takes {1e3 * thickness * np.pi / 2:.3g} mm for a bend of 180 deg: "
-        f"{panels} too narrow for the bends beside them ({share:.1%} of the area), first at ({x:.1f}, {y:.1f}) mm. "
+        f"{panels} too narrow for the bends beside them ({share:.1%} of the area), first at {at}. "
         "Try: a thinner sheet (--set thickness=0.05mm) or a larger one (--set size=30cm)."
     )
 
@@ -121,7 +126,7 @@ def _narrow(folding: Folding, narrow: list[int], share: float, thickness: float)
 def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
     """Return the sentence on vertices whose layers have no order."""
     first = unordered[0]
-    x, y = 1e3 * sheet.mesh.vertices[first.node, :2]
+    at = _place(sheet.mesh.vertices[first.node])
     count = _vertices(len(unordered))
     if (caught := first.caught) is None:
         why = f"mountains less valleys are {first.excess} there, and 2 or -2 wherever sheets fold flat"
@@ -141,7 +146,7 @@ def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
         )
         other = f"exchange one of these {kind} and a {'mountain' if caught.sign > 0 else 'valley'} there"
     return (
-        f"No order of layers at {count}, first at ({x:.1f}, {y:.1f}) mm: {why}. Its panels would "
+        f"No order of layers at {count}, first at {at}: {why}. Its panels would "
         f"pass through each other on the way. Try: {other}; angles below 180 deg (opacity in SVG, edges_foldAngle in "
         "FOLD)."
     )
@@ -150,10 +155,10 @@ def _layers(sheet: Elastic, unordered: list[FlatVertex]) -> str:
 def _uneven(sheet: Elastic, uneven: list[FlatVertex]) -> str:
     """Return the sentence on vertices whose sectors do not let them fold flat."""
     worst = uneven[0]
-    x, y = 1e3 * sheet.mesh.vertices[worst.node, :2]
+    at = _place(sheet.mesh.vertices[worst.node])
     one, other = sorted(np.degrees(worst.sums), reverse=True)
     return (
-        f"The sectors around {_vertices(len(uneven))} forbid a flat fold, worst at ({x:.1f}, {y:.1f}) mm: every other "
+        f"The sectors around {_vertices(len(uneven))} forbid a flat fold, worst at {at}: every other "
         f"one sums to {one:.1f} and {other:.1f} deg, and to 180 deg each wherever sheets fold flat (Kawasaki's "
         f"theorem); the drawing is accurate to {np.degrees(worst.accuracy):.1f} deg there. The rest is strain and "
         "bending. Try: vertices put where they belong."
@@ -210,10 +215,10 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
     against, sheet = folding.contradictions, folding.sheet
     if against:
         worst = against[0]
-        x, y = 1e3 * sheet.mesh.vertices[worst.node, :2]
+        at = _place(sheet.mesh.vertices[worst.node])
         return f"targets contradict each other at {_vertices(len(against))}", [
-            f"No shape has all these angles: at {_vertices(len(against))} the panels do not close, worst at ({x:.1f}, "
-            f"{y:.1f}) mm, where they miss by {np.degrees(worst.gap):.0f} deg and one of the {len(worst.creases)} "
+            f"No shape has all these angles: at {_vertices(len(against))} the panels do not close, worst at {at}, "
+            f"where they miss by {np.degrees(worst.gap):.0f} deg and one of the {len(worst.creases)} "
             f"creases stays off by at least {np.degrees(worst.bound):.0f} deg. What is shown is the compromise of "
             "least energy.",
             "Try: other angles for the creases there (opacity in SVG, edges_foldAngle in FOLD); a facet (yellow) "
@@ -241,9 +246,9 @@ def _why(folding: Folding) -> tuple[str, list[str]]:
             "sheet (--set thickness=0.05mm); some of the angles first; --no-touch shows where panels would pass.",
         ]
     if apart:
-        x, y = 1e3 * sheet.mesh.vertices[apart[0].node, :2]
+        at = _place(sheet.mesh.vertices[apart[0].node])
         return f"targets do not fit together at {_vertices(len(apart))}", [
-            f"At {_vertices(len(apart))} the panels do not close at these angles, worst at ({x:.1f}, {y:.1f}) mm, "
+            f"At {_vertices(len(apart))} the panels do not close at these angles, worst at {at}, "
             f"where they miss by {np.degrees(apart[0].gap):.2g} deg: creases stay off or panels bend. What is "
             "shown is the compromise of least energy.",
             "Try: other angles there (opacity in SVG, edges_foldAngle in FOLD); a crease without a target (magenta) "
@@ -265,9 +270,9 @@ def _made_one(sheet: Elastic, node: int) -> str:
     nearest = int(np.argmin(away))
     if away[nearest] > NEAR * float(np.median(sheet.lengths)) * sheet.size:
         return "vertices put where they belong (vertices_coords)"
-    x, y = 1e3 * sheet.mesh.vertices[nearest, :2]
+    at = _place(sheet.mesh.vertices[nearest])
     return (
-        f"one vertex instead of it and the nearest, {1e3 * away[nearest]:.3g} mm off at ({x:.1f}, {y:.1f}) mm, if an "
+        f"one vertex instead of it and the nearest, {1e3 * away[nearest]:.3g} mm off at {at}, if an "
         "edge ends beside where it should (vertices_coords, edges_vertices)"
     )
 

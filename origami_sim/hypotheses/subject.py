@@ -83,6 +83,8 @@ def refitted_as(subject: Subject, some: Sequence[Suspect]) -> dict[str, list[str
     """Settings that a fit changes and that state the numbers of suspects at their places, by the suspects' labels."""
     start = {f.name: f.start for f in subject.nominals}
     out: dict[str, list[str]] = {}
+    if not some:  # a model takes its time to be built
+        return out
     _, own, *_ = subject.build(start)
     for f in subject.nominals:
         step = f.scale if f.start + f.scale <= f.upper else -f.scale

@@ -13,7 +13,7 @@ LUMPED = 0.1
 """Part by which moments of inertia may be too large, summed over creases, before a note says so.
 
 Masses at its corners make that of a rectangle 0.5 too large, those of chains of two, three and four panels 0.17, 0.08
-and 0.05. Half notes chains of four, double lets those of two pass, which swing 6 and 22 % too slowly.
+and 0.05. Half notes chains of three, double lets those of two pass, which swing 6 and 22 % too slowly.
 """
 
 

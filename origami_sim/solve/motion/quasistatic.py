@@ -54,7 +54,7 @@ SUDDEN = 0.9
 """Part of a large move that one half of a step may make; half is even, 3/4 a parabola from rest, 1 a jump."""
 
 FALLS = 8
-"""Shortest steps in a row, from each of which a world falls, after which it is given up: a snap takes one or two.
+"""Shortest steps in a row, from each of which a world falls, after which it is given up.
 
 A flap that is wound up by more than a turn falls at every step, at a tenth of a second each.
 """
