@@ -23,7 +23,7 @@ def build(gap="2 mm", field="50 mT", lean="15 deg", patch="3 mm"):
         patch: its thickness.
     """
     gap, field, lean = si(gap), si(field), si(lean)
-    sheet = Sheet(strip([0.01, gap / 2 + LENGTH], WIDTH), thickness="1 mm", triangulation="center")
+    sheet = Sheet(strip([0.01, gap / 2 + LENGTH], WIDTH), thickness="1 mm")
     centre = (0.01 + gap / 2 + LENGTH / 2, 0, 0)
     sheet.patch(1, thickness=patch, size=(LENGTH, WIDTH), centre=centre, poling=(1, 0, 0))
     sheet.crease(stiffness=bridge_stiffness(1.5e6, WIDTH, 1e-3, gap), loss_time="3 ms").name("crease", ["hinge"])

@@ -45,7 +45,7 @@ def build(length=0.012, thickness=0.002, centre=0.015, tilt=0.0, field=0.05):
         length, thickness: of each patch, as wide as the arm. centre: its distance from the hinge. tilt: of its poling,
         from along the arm towards its lower side. field: vertical.
     """
-    sheet = Sheet(pattern(), thickness="0.8 mm", triangulation="center")
+    sheet = Sheet(pattern(), thickness="0.8 mm")
     sheet.crease(stiffness="0.15 mN m/rad", rest_angle=0.0).panel(range(1, 7), rigidity=0.01).gravity()
     for k, (out, _) in enumerate(zip(*arms(), strict=True)):
         arm = np.cos(UP) * out + np.array([0, 0, np.sin(UP)])

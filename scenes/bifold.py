@@ -189,6 +189,7 @@ def build(s: Settings, *, stepped: bool | None = None) -> tuple[Model, Parameter
         thickness=total,
         modulus=s.underlayer_modulus,
         density=s.underlayer_density,
+        triangulation="diagonal",
         membrane_damping=0.05,
     )
     pitch = np.diff(x)

@@ -126,6 +126,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         thickness=s.thickness,
         modulus=s.modulus,
         density=s.density,
+        triangulation="diagonal",
         membrane=s.membrane,
         membrane_damping=s.membrane_damping,
     )

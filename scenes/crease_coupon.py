@@ -23,7 +23,9 @@ CALIBRATION = "crease_coupon"
 
 def build(s: Settings) -> tuple[Model, Parameters, Drive]:
     """A held panel, a crease, and a panel that is rigid beside it."""
-    sheet = Sheet(strip([s.length, s.length], s.width), thickness=s.thickness, density=s.density)
+    sheet = Sheet(
+        strip([s.length, s.length], s.width), thickness=s.thickness, density=s.density, triangulation="diagonal"
+    )
     # rigid beside the crease's order of magnitude, so that a fit of its stiffness leaves the panels alone
     sheet.fix(panels=[0]).panel([0, 1], rigidity=1e3 * 10 ** np.floor(np.log10(s.stiffness)))
     sheet.crease(stiffness=s.stiffness, rest_angle=s.rest_angle, loss_time=s.loss_time).name("crease", ["hinge"])

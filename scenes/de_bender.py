@@ -83,6 +83,7 @@ def chain(s: Settings, segments: Sequence[Segment]) -> tuple[Model, Parameters, 
         thickness=mean,
         modulus=s.membrane_stiffness / mean,
         density=s.density,
+        triangulation="diagonal",
         membrane_damping=s.membrane_damping,
     )
     sheet.density[:] = mass / mean

@@ -40,7 +40,10 @@ def load(s: Settings) -> Pattern:
 def build(s: Settings) -> tuple[Model, Parameters, Drive, np.ndarray]:
     """Model, parameters, drive and the target angle of each crease [rad]."""
     pattern = load(s)
-    sheet = Sheet(pattern, thickness=s.thickness, material=s.material, membrane=s.membrane, membrane_damping=0.1)
+    sheet = Sheet(
+        pattern, thickness=s.thickness, material=s.material, triangulation="diagonal", membrane=s.membrane,
+        membrane_damping=0.1,
+    )  # fmt: skip
     if not len(sheet.mesh.creases):
         raise InputError("the pattern has no crease to fold", file=s.pattern, field="edges_assignment")
     stiffness = np.where(np.isnan(sheet._crease_stiffness), s.crease_stiffness, sheet._crease_stiffness)

@@ -54,6 +54,7 @@ def build(s: Settings) -> tuple[Model, Parameters, Drive]:
         thickness=s.thickness,
         modulus=s.modulus,
         density=s.density,
+        triangulation="diagonal",
         membrane_damping=s.membrane_damping,
     )
     sheet.fix(panels=[0]).fix(nodes=range(2 * (cells + 2)), axes="y")

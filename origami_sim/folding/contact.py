@@ -84,7 +84,9 @@ class Contact:
 
     def __init__(self, sheet: Elastic, thickness: float):
         self.size, self.triangles = sheet.size, sheet.mesh.triangles
-        self.model, self.parameters = Sheet(sheet.pattern, thickness=thickness).touch(friction=0.0).build()
+        self.model, self.parameters = (
+            Sheet(sheet.pattern, thickness=thickness, triangulation="diagonal").touch(friction=0.0).build()
+        )
         self.reach = REACH * float(np.median(sheet.lengths))
         self.finest = FINEST * float(self.parameters["touch", "thickness"].min())
         self.longest = 0.5 * self.reach / np.sqrt(3.0)

@@ -26,7 +26,10 @@ def model_of(
     elastic = folding.sheet
     mesh, creases = elastic.mesh, len(elastic.mesh.creases)
     # folded without contact, a shape that is given may lie in itself
-    sheet = Sheet(elastic.pattern, thickness=thickness, material=material, membrane_damping=0.0, overlapping=True)
+    sheet = Sheet(
+        elastic.pattern, thickness=thickness, material=material, triangulation="diagonal", membrane_damping=0.0,
+        overlapping=True,
+    )  # fmt: skip
     membrane = crease_stiffness / (folding.softness * np.median(elastic.lengths) * elastic.size)  # E t [N/m]
     stiffness = folding.softness * elastic.weights * membrane * elastic.size**2
     way = np.where(elastic.driven, elastic.target - elastic.start, 0.0)

@@ -12,7 +12,7 @@ from origami_sim.effects import get
 from origami_sim.model import Model, Parameters
 from origami_sim.model.bodies import rigid
 from origami_sim.model.entities import tune
-from origami_sim.model.places import across
+from origami_sim.model.places import across, along
 
 SEPARATOR = " + "
 """Between the effects of one explanation in its label."""
@@ -287,6 +287,9 @@ ANCHORS = ("anchor_x", "anchor_y", "anchor_z")
 ACROSS = ("across_x", "across_y", "across_z")
 """Parameters that stand for the direction across the plane in which the device folds."""
 
+ALONG = "along"
+"""Parameter of a crease that stands for its place along a beam, from -1/2 to 1/2."""
+
 
 def apply(
     parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float] | np.ndarray, model: Model
@@ -312,6 +315,11 @@ def apply(
                 continue
             if p.name in ACROSS:
                 out.set(s.effect, p.name, across(model)[ACROSS.index(p.name)])
+                continue
+            if p.name == ALONG:
+                middle = model.position[model.creases[:, 1:3]].mean(axis=1)
+                at = along(model, middle)
+                out.set(s.effect, p.name, np.zeros(len(middle)) if at is None else at - 0.5)
                 continue
             donor = next(
                 (

@@ -9,7 +9,7 @@ from scipy.special import boxcox
 from origami_sim.drive import Drive
 from origami_sim.effects import CATALOGUE, CONTACTS, DISTORTIONS, get
 from origami_sim.effects._effect import Effect
-from origami_sim.hypotheses.hypothesis import ACROSS, ANCHORS, PLAUSIBLE, Free, Suspect
+from origami_sim.hypotheses.hypothesis import ACROSS, ALONG, ANCHORS, PLAUSIBLE, Free, Suspect
 from origami_sim.model import Model, Parameters, magnets
 from origami_sim.model.places import points, stretches
 from origami_sim.recording import Recording
@@ -51,6 +51,8 @@ def suspects(
         if effect.interacts or any(p.name in ACROSS for p in effect.parameters):
             # magnets act on each other, and the field's form is one for all of them
             sites = [("all panels", "panel", None)]
+        if any(p.name == ALONG for p in effect.parameters):  # along what has stretches
+            sites = [("all creases", "crease", None)] if stretches(model, "crease") else []
         if any(p.name in ANCHORS for p in effect.parameters):
             sites += _edges(model)
         if effect.inertia is not None:  # what was added sits at a point, what was mistaken is a panel's

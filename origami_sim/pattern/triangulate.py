@@ -52,12 +52,13 @@ def triangulate(pattern: Pattern, method="diagonal", *, planarity_tolerance=1e-3
     Args:
         pattern: the crease pattern; 'C' edges separate the sheet.
         method: 'diagonal' adds no nodes: triangles by ear clipping, the shorter diagonal in quads (a tie goes to the
-            one through the lowest vertex). 'center' adds a node at the centroid of each face of 4 or more corners.
+            one through the lowest vertex). 'center' adds a node at the centroid of each face of 4 or more corners, if
+            all of it is seen from there.
         planarity_tolerance: largest distance of a face's corners from its mean plane, relative to the face's size.
 
     Raises:
-        InputError: unknown method; a vertex without a face; a face that is not planar, intersects itself, or (for
-            'center') is not seen whole from its centroid; faces that do not run the same way round.
+        InputError: unknown method; a vertex without a face; a face that is not planar or intersects itself; faces that
+            do not run the same way round.
     """
     if method not in METHODS:
         raise InputError("unknown triangulation", field="method", value=method, allowed=", ".join(METHODS))
@@ -107,18 +108,16 @@ def _split_face(f, face, pattern, method, next_node, tolerance):
         )
     if self_intersects(corners):
         raise InputError("face intersects itself", field=field, value=list(face), allowed="simple polygons")
-    if method == "diagonal":
-        pieces = clip_ears(corners, face)
-        if pieces is None:
-            raise InputError("face cannot be triangulated", field=field, value=list(face), allowed="simple polygons")
-        return [tuple(face[n] for n in piece) for piece in pieces], []
     middle = centroid(corners)
     spokes = corners - middle
     ahead = np.roll(spokes, -1, axis=0)
-    if np.min(spokes[:, 0] * ahead[:, 1] - spokes[:, 1] * ahead[:, 0]) <= 1e-9 * size**2:
-        allowed = "faces seen whole from their centroid, or method 'diagonal'"
-        raise InputError("face cannot be split from its centroid", field=field, value=list(face), allowed=allowed)
-    return [(a, b, next_node) for a, b in face_sides(face)], [origin + middle @ axes]
+    seen = np.min(spokes[:, 0] * ahead[:, 1] - spokes[:, 1] * ahead[:, 0]) > 1e-9 * size**2
+    if method == "center" and seen:
+        return [(a, b, next_node) for a, b in face_sides(face)], [origin + middle @ axes]
+    pieces = clip_ears(corners, face)
+    if pieces is None:
+        raise InputError("face cannot be triangulated", field=field, value=list(face), allowed="simple polygons")
+    return [tuple(face[n] for n in piece) for piece in pieces], []
 
 
 def _apexes(triangles) -> dict[tuple[int, int], tuple[int, int]]:

@@ -33,8 +33,8 @@ class Beam:
         compliance: of the dipoles [1/T]. stiffening: relative, in a strong field. tilt: of the field [rad].
         stray: field (x, z) without command [T]. loop: half width of the field's hysteresis [T].
         saturation: of the field [1/T]. taper: relative difference of stiffness from root to tip. clamp: turn of the
-            root per moment [rad/(N m)]. zero: voltage without command [V]. threshold: voltage that does nothing [V].
-        scale: relative error of lengths.
+            root per moment [rad/(N m)]. play: of the root, to either side [rad]. zero: voltage without command [V].
+            threshold: voltage that does nothing [V]. scale: relative error of lengths.
     """
 
     cubic: float = 0.0
@@ -47,6 +47,7 @@ class Beam:
     saturation: float = 0.0
     taper: float = 0.0
     clamp: float = 0.0
+    play: float = 0.0
     zero: float = 0.0
     threshold: float = 0.0
     scale: float = 0.0
@@ -62,6 +63,7 @@ BOTH: dict[str, Concealed] = {
 INSIDE: dict[str, dict[str, Concealed]] = {
     "mae_cantilever": {
         **BOTH,
+        "taper": Concealed(Law, ("crease_taper",), "all creases", 0.2, False, True, 1.5, number="taper"),
         "misalignment": Concealed(Law, ("field_misalignment",), "", 0.05, False, True, 0.7),
         "field_offset": Concealed(Law, ("field_offset",), "", 1e-3, False, False, 0.1),
         "field_hysteresis": Concealed(
@@ -84,7 +86,7 @@ INSIDE: dict[str, dict[str, Concealed]] = {
 OUTSIDE: dict[str, dict[str, Concealed]] = {
     "mae_cantilever": {
         "saturation": Concealed(Law, (), "", 2.0, False),
-        "taper": Concealed(Law, (), "", 0.2, False, True, 1.5),
+        "clamp_play": Concealed(Law, (), "", 0.01, False, False, 0.3),
     },
     "de_bender": {"threshold": Concealed(Law, (), "", 200.0, False, False, 2e3)},
 }
@@ -244,6 +246,7 @@ FIELDS = {
     "saturation": "saturation",
     "taper": "taper",
     "clamp": "clamp",
+    "clamp_play": "play",
     "voltage_offset": "zero",
     "threshold": "threshold",
     "length_scale": "scale",
@@ -278,6 +281,9 @@ def reaching(levels: np.ndarray, beam: Beam) -> np.ndarray:
     return np.stack([b * math.sin(beam.tilt) + beam.stray[0], b * math.cos(beam.tilt) + beam.stray[1]], axis=1)
 
 
+LOOSE = 0.01
+"""Moment that turns a loose clamp over, as a part of that which turns the beam by one radian."""
+
 NODES = 16
 """Gauss-Legendre points along the beam."""
 
@@ -306,6 +312,7 @@ def cantilever(s: dict, levels: np.ndarray, beam: Beam, cell: float) -> np.ndarr
     fields, back = np.unique(reaching(levels, beam), axis=0, return_inverse=True)
     length, stiff = s["length"], s["modulus"] * s["width"] * s["thickness"] ** 3 / 12
     magnet = length * s["remanence"] / MU0 * s["width"] * s["thickness"]  # moment of the whole beam [A m2]
+    bent = float(stiff) / length  # moment by which it turns by one [N m]
     square = (fields**2).sum(axis=1, keepdims=True)
     stiff = stiff * (1 + beam.stiffening * square / (square + BEND_HALF**2)) * (1 + beam.taper * (at - 0.5))
     cubic = beam.cubic * cell**3
@@ -317,9 +324,12 @@ def cantilever(s: dict, levels: np.ndarray, beam: Beam, cell: float) -> np.ndarr
             couple = magnet * across * (1 - beam.compliance * along)
             turned = -magnet * (along * (1 - beam.compliance * along) + beam.compliance * across**2)
             k = curvature(couple @ beyond.T + part * beam.offset, stiff, cubic)
-            gap = angle - beam.clamp * (couple @ share)[:, None] - length * k @ before.T
+            held = (couple @ share)[:, None]
+            turned_over = np.tanh(held / (LOOSE * bent))  # the clamp has turned as far as it goes, either way
+            gap = angle - beam.clamp * held - beam.play * turned_over - length * k @ before.T
             softness = 1 / (stiff + 3 * cubic * k**2)
-            by = beam.clamp * share + length * before @ (softness[:, :, None] * beyond)
+            gives = beam.clamp + beam.play * (1 - turned_over**2) / (LOOSE * bent)
+            by = gives[:, :, None] * share + length * before @ (softness[:, :, None] * beyond)
             step = np.linalg.solve(np.eye(NODES) - by * turned[:, None, :], gap[:, :, None])[:, :, 0]
             angle = angle - np.clip(step, -0.5, 0.5)
             if np.abs(step).max() < 1e-10:

@@ -63,6 +63,21 @@ def test_a_beam_is_suspected_in_quarters_and_thirds(scenes):
     assert abs(first.mean() - held) < abs(last.mean() - held), "counted from the clamp"
 
 
+def test_a_beam_is_suspected_of_a_taper_from_its_clamp_on(scenes):
+    model, parameters, drive = scenes["mae_cantilever"]
+    (taper,) = (s for s in asked(model, parameters, drive) if s.effect == "crease_taper")
+    assert taper.site == "all creases" and [f.name for f in taper.free] == ["taper"]
+    richer = model.with_effects("crease_taper")
+    put = apply(parameters, Hypothesis((taper,)), [0.3], richer)
+    own = parameters["crease", "stiffness"][:, 0]
+    assert put["crease_taper", "stiffness"][:, 0] == pytest.approx(own)
+    x = model.position[model.creases[:, 1], 0]  # the root of its beam is at zero
+    expected = (x - model.position[:, 0].min()) / np.ptp(model.position[:, 0]) - 0.5
+    assert put["crease_taper", "along"][:, 0] == pytest.approx(expected, abs=1e-12)
+    for name in ("pendulum_chain", "box"):
+        assert not [s for s in asked(*scenes[name]) if s.effect == "crease_taper"]
+
+
 def test_all_creases_of_a_beam_are_no_sum_of_stretches_that_overlap(scenes):
     model, *_ = scenes["mae_cantilever"]
     every = asked(*scenes["mae_cantilever"])

@@ -205,6 +205,14 @@ def test_asymmetry_softness_and_offset():
     assert moments(["crease", "crease_offset"], shifted, [0.4])[0] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_a_taper_is_a_stiffness_that_changes_along_a_beam():
+    for along, stiffness in ((-0.5, 0.35), (0.0, 0.7), (0.25, 0.875)):
+        tapered = {**under("crease", stiffness=0.7, rest_angle=0.3)}
+        tapered |= under("crease_taper", taper=1.0, stiffness=0.7, rest_angle=0.3, along=along)
+        m = moments(["crease", "crease_taper"], tapered, ANGLES)
+        assert m == pytest.approx(-stiffness * (ANGLES - 0.3), abs=1e-13)
+
+
 def test_panel_softness_is_a_change_of_panel_bending():
     model = hinge(creases=(), bends=[(0, 1, 2, 3)])
     values = {**under("panel_bending", stiffness=0.7, rest_angle=0.3)}

@@ -150,13 +150,18 @@ def test_box_net():
         ([(0, 0, 0), (1, 0, 0), (1, 1, 0.2), (0, 1, 0)], "diagonal", "not planar"),
         ([(0, 0), (4, 4), (4, 0), (1, 3)], "diagonal", "intersects itself"),
         ([(0, 0), (4, 0), (2, 0), (2, 3)], "diagonal", "intersects itself"),
-        ([(0, 0), (3, 0), (3, 3), (2.9, 3), (2.9, 0.1), (0, 0.1)], "center", "from its centroid"),
         ([(0, 0), (1, 0), (1, 1), (0, 1)], "middle", "unknown triangulation.*diagonal, center"),
     ],
 )
 def test_bad_faces(points, method, words):
     with pytest.raises(InputError, match=words):
         triangulate(polygon(points), method)
+
+
+def test_a_face_not_seen_whole_from_its_centroid_gets_no_centre():
+    angled = polygon([(0, 0), (3, 0), (3, 3), (2.9, 3), (2.9, 0.1), (0, 0.1)])
+    split, plain = triangulate(angled, "center"), triangulate(angled, "diagonal")
+    assert len(split.vertices) == 6 and np.array_equal(split.triangles, plain.triangles)
 
 
 def test_unused_vertex_and_inconsistent_faces():
