@@ -29,11 +29,12 @@ class Sheet(Grounds, Electrodes, Thick, Calibrated):
     Args:
         pattern: crease pattern; its own thickness, materials, stiffness and rest angles are used where given.
         thickness: of all panels [m]. material: name in `MATERIALS`. modulus, density: override it [Pa], [kg/m^3].
-        triangulation: "center" (a node in the middle of each polygon of four or more corners, if all of it is seen from
-            there; gives rectangles and parallelograms exactly the mass, centre of mass and inertia of the panel, with
-            a patch the inertia to some per cent) or "diagonal" (fewer nodes; the masses of a panel sit at its corners,
-            which is right for finely divided sheets). Triangles have their mass at their corners: exact mass and
-            centre, too large an inertia.
+        triangulation: "auto", "center" (a node in the middle of each polygon of four or more corners, if all of it is
+            seen from there; gives rectangles and parallelograms exactly the mass, centre of mass and inertia of the
+            panel, with a patch the inertia to some per cent) or "diagonal" (fewer nodes; the masses of a panel sit at
+            its corners, which is right for finely divided sheets). "auto" is "center" for panels and "diagonal" for
+            cells of one, which flat lines join. Triangles have their mass at their corners: exact mass and centre, too
+            large an inertia.
         membrane: factor on the membrane stiffness; below 1 it buys a longer time step (keep strains under a percent).
         membrane_damping: dashpots in the bars, as a ratio of critical.
         panels: "elastic" (bars and bending lines) or "rigid" (bodies on hinges, in reduced coordinates: a step that
@@ -53,7 +54,7 @@ class Sheet(Grounds, Electrodes, Thick, Calibrated):
         material: str = "pdms",
         modulus: float | str | None = None,
         density: float | str | None = None,
-        triangulation: str = "center",
+        triangulation: str = "auto",
         membrane: float = 1.0,
         membrane_damping: float = 0.02,
         panels: str = "elastic",

@@ -15,7 +15,7 @@ from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
-from origami_sim.infer.words import pooled
+from origami_sim.infer.budget import pooled
 from origami_sim.predict.at_rest import starting
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.prescribed import curves

@@ -36,8 +36,6 @@ from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.posterior import Posterior, marginals
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.search import search
-from origami_sim.infer.stored import Stored
-from origami_sim.infer.verdict import judge
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
 from origami_sim.locate.meeting import meetings
@@ -49,6 +47,8 @@ from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import in_step, leads, shared, told
+from origami_sim.verdict.sentences import judge
+from origami_sim.verdict.stored import Stored
 
 ALONE = "One recording only: held-out data are stretches of the same recording, which share its errors."
 WHOLE = "One recording, which is predicted as a whole: nothing could be left out, and errors are of what was fitted."

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.infer.stored import Stored
 from origami_sim.predict.cache import Cache
 from origami_sim.predict.worlds import Worlds
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import leads
+from origami_sim.verdict.stored import Stored
 
 
 class Keep:

@@ -9,9 +9,10 @@ from origami_sim.infer.intervals import widened
 from origami_sim.infer.posterior import Key, Posterior
 from origami_sim.infer.screen import Signature
 from origami_sim.infer.unlisted import UNLISTED
-from origami_sim.infer.verdict import Judgement, log_odds
 from origami_sim.observation.channels import units_of
 from origami_sim.report.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
+from origami_sim.verdict.decide import log_odds
+from origami_sim.verdict.sentences import Judgement
 
 
 def table(

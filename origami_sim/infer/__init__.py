@@ -1,1 +1,1 @@
-"""Inference: the posterior over sets of effects, from a refitted model and signatures to a verdict and a budget."""
+"""Inference: the posterior over sets of effects, from a refitted model and signatures."""

@@ -13,7 +13,6 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
 from origami_sim.infer.unlisted import UNLISTED
-from origami_sim.infer.words import pooled
 
 FAR = 2.0
 """Error over the noise of the recorder from which something real is left, whatever is more probable.
@@ -112,6 +111,11 @@ def budget(forward: Predictor, given: Fit, base: Fit, best: Fit, recorder: Weigh
     named = not any(s.effect == UNLISTED for s in best.hypothesis.suspects)
     beyond = max(second - last, 0.0) / total if named else 0.0
     return Budget([Share(s.name, s.kind, float(s.share)) for s in out], over, now.probability, beyond=beyond)
+
+
+def pooled(errors: np.ndarray) -> float:
+    """Root mean square of what components miss, in multiples of their noise (D,)."""
+    return float(np.sqrt(np.nanmean(np.square(errors))))
 
 
 def over_noise(forward: Predictor, f: Fit) -> float:

@@ -14,7 +14,7 @@ from .crease_pattern import Pattern
 from .polygon import centroid, clip_ears, project, self_intersects
 from .topology import face_sides, open_cuts
 
-METHODS = ("diagonal", "center")
+METHODS = ("auto", "diagonal", "center")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,8 @@ def triangulate(pattern: Pattern, method="diagonal", *, planarity_tolerance=1e-3
         pattern: the crease pattern; 'C' edges separate the sheet.
         method: 'diagonal' adds no nodes: triangles by ear clipping, the shorter diagonal in quads (a tie goes to the
             one through the lowest vertex). 'center' adds a node at the centroid of each face of 4 or more corners, if
-            all of it is seen from there.
+            all of it is seen from there. 'auto' does so where a face is a panel of its own, and takes diagonals where
+            flat or joined edges ('F', 'J') make it a cell of a larger one.
         planarity_tolerance: largest distance of a face's corners from its mean plane, relative to the face's size.
 
     Raises:
@@ -69,8 +70,10 @@ def triangulate(pattern: Pattern, method="diagonal", *, planarity_tolerance=1e-3
     centres: list[np.ndarray] = []
     triangles: list[tuple[int, ...]] = []
     triangle_face: list[int] = []
+    cells = _cells(opened) if method == "auto" else set()
     for f, face in enumerate(opened.faces):
-        pieces, centre = _split_face(f, face, opened, method, opened.vertex_count + len(centres), planarity_tolerance)
+        own = "diagonal" if f in cells else method
+        pieces, centre = _split_face(f, face, opened, own, opened.vertex_count + len(centres), planarity_tolerance)
         centres += centre
         triangles += pieces
         triangle_face += [f] * len(pieces)
@@ -85,6 +88,16 @@ def triangulate(pattern: Pattern, method="diagonal", *, planarity_tolerance=1e-3
         bars=_integers(bars, 2),
         **hinges,
     )
+
+
+def _cells(pattern: Pattern) -> set[int]:
+    """Faces that share a flat or joined edge with another: cells of a larger panel."""
+    inside = {frozenset(e) for e, a in zip(pattern.edges.tolist(), pattern.assignments, strict=True) if a in "FJ"}
+    at: dict[frozenset[int], list[int]] = {}
+    for f, face in enumerate(pattern.faces):
+        for side in face_sides(face):
+            at.setdefault(frozenset(side), []).append(f)
+    return {f for side in inside for f in (at.get(side, []) if len(at.get(side, [])) > 1 else [])}
 
 
 def _integers(rows, width) -> np.ndarray:
@@ -112,7 +125,7 @@ def _split_face(f, face, pattern, method, next_node, tolerance):
     spokes = corners - middle
     ahead = np.roll(spokes, -1, axis=0)
     seen = np.min(spokes[:, 0] * ahead[:, 1] - spokes[:, 1] * ahead[:, 0]) > 1e-9 * size**2
-    if method == "center" and seen:
+    if method != "diagonal" and seen:
         return [(a, b, next_node) for a, b in face_sides(face)], [origin + middle @ axes]
     pieces = clip_ears(corners, face)
     if pieces is None:

@@ -1,7 +1,7 @@
 """Opened cases judged anew from what they stored, with any hyperparameters: what half and double of each do.
 
 No simulation and no fit is made: each case keeps the linearisations of its search (`stored.npz`, see
-`origami_sim.infer.stored`), so that hundreds are judged in minutes.
+`origami_sim.verdict.stored`), so that hundreds are judged in minutes.
 """
 
 import json
@@ -19,8 +19,8 @@ from origami_proof.score import BOARD, calibration_error, judge, wilson
 from origami_sim.errors import InputError
 from origami_sim.fit.hyper import HYPER, Hyper
 from origami_sim.infer.discrepancy import laws
-from origami_sim.infer.stored import Stored
-from origami_sim.infer.verdict import by_effects, real_rest
+from origami_sim.verdict.decide import by_effects, real_rest
+from origami_sim.verdict.stored import Stored
 
 REJUDGED = "rejudged.json"
 """What comes out, in the folder of the run."""

@@ -70,7 +70,7 @@ def test_a_sealed_run_goes_on_with_the_diagnosis_that_it_began_with(tmp_path):
     assert freeze.freeze(tmp_path, truth, sealed=True) == first
     held = first["thresholds"]
     assert held["options"]["rate"] > 0 and 0 < held["hyperparameters"]["effects"] < 1
-    assert held["infer.verdict"] and len(held["fit.least_squares"]["STEPS"]) > 1  # several numbers of one name
+    assert held["verdict.decide"] and len(held["fit.least_squares"]["STEPS"]) > 1  # several numbers of one name
     stored = tmp_path / freeze.FROZEN
     stored.write_text(json.dumps({**first, "diagnosis": "0" * 64}))
     assert freeze.freeze(tmp_path, truth, sealed=False)["diagnosis"] == "0" * 64

@@ -13,7 +13,7 @@ from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.linear import Linearisation, Rows
 from origami_sim.hypotheses.hypothesis import Free, Suspect
 from origami_sim.infer.budget import Budget, Share
-from origami_sim.infer.stored import Reduced, Stored
+from origami_sim.verdict.stored import Reduced, Stored
 
 EFFECTS = ("crease_friction", "air_drag", "crease_stiffening", "angle_scale")
 

@@ -273,7 +273,7 @@ def test_contact_points_lie_where_they_were_put(triangulation):
 
 
 def test_supports_and_names():
-    sheet = Sheet(strip([0.01, 0.02], 0.01), thickness=1e-3).crease(stiffness=1e-3)
+    sheet = Sheet(strip([0.01, 0.02], 0.01), thickness=1e-3, triangulation="diagonal").crease(stiffness=1e-3)
     sheet.fix(panels=[0], axes="xz").fix(nodes=[5]).name("panel", ["base", "flap"]).name("crease", ["hinge"])
     model, _ = sheet.build()
     np.testing.assert_array_equal(model.free[:4], np.tile([0.0, 1.0, 0.0], (4, 1)))
@@ -312,7 +312,7 @@ def sheet(**options) -> Sheet:
         (lambda: sheet(membrane=0.0), r"must be positive.*membrane"),
         (lambda: sheet(membrane_damping=-0.1), r"cannot be negative.*membrane_damping"),
         (lambda: sheet(material="steel"), r"unknown material.*panel 0.*steel.*pdms, mae"),
-        (lambda: sheet(triangulation="fan"), r"unknown triangulation.*fan.*diagonal, center"),
+        (lambda: sheet(triangulation="fan"), r"unknown triangulation.*fan.*auto, diagonal, center"),
         (lambda: sheet().crease().build(), r"a crease has no stiffness.*crease 0.*stiffness="),
         (lambda: sheet().crease(stiffness=-1.0), r"crease stiffness cannot be negative.*-1\.0"),
         (lambda: sheet().crease(stiffness=float("nan")), r"crease stiffness cannot be negative"),
@@ -355,7 +355,7 @@ def sheet(**options) -> Sheet:
         (lambda: sheet().point_mass(1, 1e-3, (0.5, 0, 0)), r"outside its panel.*panel 1.*rigid"),
         (lambda: sheet().point_mass(1, -1e-3, (0.01, 0, 0)), r"point mass is positive.*panel 1"),
         (lambda: sheet().mass(0, -1.0), r"mass cannot be negative"),
-        (lambda: sheet().mass(99, 1.0), r"no such node.*99.*0 to 5"),
+        (lambda: sheet().mass(99, 1.0), r"no such node.*99.*0 to 7"),
         (lambda: sheet().fix(nodes=[77]), r"no such node.*77"),
         (lambda: sheet().fix(panels=[7]), r"no such panel.*7"),
         (lambda: sheet().fix(panels=[0], axes="q"), r"no such axis.*q.*x, y, z"),

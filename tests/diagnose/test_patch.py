@@ -11,9 +11,9 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Hypothesis, apply
 from origami_sim.hypotheses.suspects import suspects
-from origami_sim.infer.words import say
 from origami_sim.model.entities import located
 from origami_sim.report.patch import additions, read_additions, switched_on, write_patch
+from origami_sim.verdict.words import say
 from tests.diagnose.strips import hanging, record
 
 VISCOSITY = ("crease_viscosity", "viscosity")

@@ -9,7 +9,7 @@ from test_unlisted import SMALL, searched
 
 from origami_sim.diagnose import diagnose
 from origami_sim.infer.remainder import mismatch
-from origami_sim.infer.verdict import decide
+from origami_sim.verdict.decide import decide
 from tests.diagnose.strips import record
 
 NOISE = 2e-3

@@ -19,8 +19,8 @@ from origami_sim.infer.placement import enter, log_priors, place
 from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
-from origami_sim.infer.stored import Reduced, Stored
-from origami_sim.infer.verdict import judge
+from origami_sim.verdict.sentences import judge
+from origami_sim.verdict.stored import Reduced, Stored
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}

@@ -18,10 +18,11 @@ from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.budget import budget
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
-from origami_sim.infer.stored import Stored
 from origami_sim.infer.unlisted import UNLISTED, anywhere, beside, motion, usual_moment
-from origami_sim.infer.verdict import decide, judge
 from origami_sim.locate.describe import unnamed
+from origami_sim.verdict.decide import decide
+from origami_sim.verdict.sentences import judge
+from origami_sim.verdict.stored import Stored
 from tests.diagnose.strips import record, subject
 
 SMALL = {"duration": 4.0, "panels": 3, "rate": 100}

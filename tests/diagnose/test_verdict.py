@@ -15,10 +15,11 @@ from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share, shapley
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import credible, decide, explains, in_all, undecided
-from origami_sim.infer.words import joined, said, say, title
 from origami_sim.locate.describe import described
 from origami_sim.locate.places import Acting, Curve, Place
+from origami_sim.verdict.decide import credible, decide, shared_out
+from origami_sim.verdict.sentences import explains, in_all, undecided
+from origami_sim.verdict.words import joined, said, say, title
 
 
 def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():
@@ -214,6 +215,30 @@ def test_what_only_priors_tell_apart_is_a_tie(apart, owed, log, tie):
     decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
     assert decided.word == ("TIE" if tie else "SEVERAL")
     assert decided.credible[:2] == [frozenset(e) for e in two] if tie else decided.lead == set(two[0])
+
+
+def test_a_rival_counts_only_where_it_acts_in_place_of_what_predicts_the_same():
+    """An offset that is probable only beside the scale is no alternative to it."""
+    two, both = ("crease_friction", "length_scale"), ("crease_friction", "length_scale", "marker_offset")
+    rival = ("crease_friction", "marker_offset")
+    p = posterior({two: 0.0, both: -1.8, rival: -20.0, (): -99.0})
+    predicted(p, {two: 0.0, rival: 0.3})
+    decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
+    assert decided.lead == set(two) and not decided.tie
+
+
+def test_what_explanations_share_is_counted_once():
+    a, b = frozenset({"x", "a"}), frozenset({"x", "b"})
+    out = shared_out({a: 0.5, b: 0.2, a | b: 0.2, frozenset({"x"}): 0.1}, [a, b])
+    assert out == pytest.approx({a: 0.6, b: 0.3})
+
+
+def test_a_search_that_ended_before_its_best_set_was_fitted_has_not_decided():
+    p = posterior({("crease_friction",): 0.0, (): -50.0})
+    del p.nodes[frozenset({0})]
+    for ended, word in ((True, "TIE"), (False, "UNKNOWN")):
+        p.ended = ended
+        assert decide(p, lambda key: Budget([Share("not named", "rest", 1.0)], 9.0)).word == word
 
 
 def predicted(p: Posterior, at: dict[tuple[str, ...], float], owed: float = 0.0) -> None:

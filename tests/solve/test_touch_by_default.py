@@ -23,7 +23,8 @@ MM = 1e-3
 
 def roll(rest=100.0, panels="rigid"):
     """Four panels that turn by so many degrees each: with 100 the last one through the first."""
-    s = Sheet(strip([10 * MM] * 4, 20 * MM), thickness=0.5 * MM, panels=panels).fix(panels=[0])
+    s = Sheet(strip([10 * MM] * 4, 20 * MM), thickness=0.5 * MM, panels=panels, triangulation="diagonal")
+    s.fix(panels=[0])
     return s.crease(stiffness=0.2e-3, rest_angle=math.radians(rest), loss_time=20e-3)
 
 
@@ -179,7 +180,8 @@ def test_a_diagnosis_says_where_panels_came_near_each_other_in_a_recording():
 
 def test_a_path_keeps_panels_apart_from_where_they_meet():
     """Bars: two panels that are turned shut, in proportion to the load, and further."""
-    s = Sheet(strip([10 * MM] * 2, 20 * MM), thickness=0.5 * MM).fix(panels=[0]).crease(stiffness=0.2e-3)
+    s = Sheet(strip([10 * MM] * 2, 20 * MM), thickness=0.5 * MM, triangulation="diagonal")
+    s.fix(panels=[0]).crease(stiffness=0.2e-3)
     s.set("crease_drive", drive_stiffness=0.2e-3, target_angle=3.1)
     shut = math.pi - 2 * math.asin(0.5 / 20)  # the far corners are a thickness apart
 

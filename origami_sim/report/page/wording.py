@@ -5,8 +5,8 @@ from functools import cache
 
 from origami_sim.effects import CATALOGUE, get
 from origami_sim.hypotheses.hypothesis import SEPARATOR
-from origami_sim.infer.words import WHOLE, title
 from origami_sim.report.page.markup import raised
+from origami_sim.verdict.words import WHOLE, title
 
 _NUMBER = re.compile(r"\b([a-z_0-9]+)\.([a-z_0-9]+)\b(?:\[([^\]]+)\])?")
 _PLAIN_OWNERS = ("inertia", "setting")

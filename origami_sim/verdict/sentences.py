@@ -1,6 +1,5 @@
-"""The verdict: sums over the posterior, put into words."""
+"""The verdict in words."""
 
-from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,20 +10,21 @@ from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.hypotheses.hypothesis import NOMINAL
 from origami_sim.infer.budget import FAR, Budget, Share, over_noise
-from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.intervals import widened
-from origami_sim.infer.posterior import CREDIBLE, Key, Node, Posterior
+from origami_sim.infer.posterior import CREDIBLE, Key, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.unlisted import UNLISTED, crease_of_the_rest, usual_moment
-from origami_sim.infer.words import distinct, joined, said, say, title
-
-ALONE = 0.8
-"""Probability from which one explanation is named alone: to name a wrong one is four times as bad as a tie."""
-
-LISTED = 3
-"""Explanations of which one has to be chosen that are listed at most; of more, none is worth a reader's time.
-
-Those that predict the same are one."""
+from origami_sim.verdict.decide import (
+    ALONE,
+    LISTED,
+    Decision,
+    best_of,
+    decide,
+    ended_early,
+    of_each,
+    shared_out,
+)  # fmt: skip
+from origami_sim.verdict.words import distinct, joined, said, say, title
 
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
@@ -53,89 +53,6 @@ class Judgement:
     budget: list[Share] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     chance: dict[Key, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What a posterior says, before it is put into words.
-
-    Attributes:
-        word: of the verdict; "" where nothing is named. best: the set to show. lead: effects that are named.
-        credible: explanations that may be, besides. tie: whether nothing decides between them. probability: of what is
-            named, or of them. chance: posterior of the sets that may be named, see `considered`. classes: the same of
-            their effects, without those that are not told from nothing. foreign: that a law which the catalogue lacks
-            is imitated by them.
-    """
-
-    word: str
-    best: Key
-    lead: frozenset[str]
-    credible: list[frozenset[str]]
-    tie: bool
-    probability: float
-    chance: dict[Key, float]
-    classes: dict[frozenset[str], float]
-    foreign: float
-
-
-def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
-    """The verdict on a posterior over sets of effects.
-
-    Args:
-        budgets: the budget of a fitted set.
-    """
-    chance = considered(p)
-    classes = by_effects(p, chance)
-    top = max(classes, key=lambda c: classes[c])
-    lead, beside = surely(p, classes)
-    if not any(p.effects(k) >= lead for k in p.nodes):  # of what was never fitted no number could be said
-        lead, beside = frozenset(), []
-    best = best_of(p, chance, top if beside else lead or top)
-    may_be, total = credible(classes)
-    if beside:
-        may_be, total = beside, sum(v for c, v in classes.items() if any(c >= b for b in beside))
-    left = budgets(best)
-    named = [c for c in classes if c >= lead] if lead else may_be if top else [top]
-    rest = real_rest(p, best, left)
-    foreign = p.hyper.foreign(laws(beside[0] if beside else lead), rest) if lead else imitated(p, chance, named, rest)
-
-    def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
-        return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, classes, foreign)
-
-    if all(s.status for s in p.signatures):
-        return as_("UNTESTABLE", 1.0)
-    real = UNLISTED in lead or left.over > FAR or missing(p, best, left) > ALONE
-    if left.rest > left.beyond and real:
-        return as_("UNKNOWN", np.nan)
-    if not top:
-        return as_("", classes[top])
-    if not lead or beside:
-        return as_("MEASUREMENT" if all(map(_of_recorder, may_be)) else "TIE", total, tie=True)
-    several = sum(p.suspect(n).effect in lead for n in best) > 1
-    word = "MEASUREMENT" if _of_recorder(lead) else "SEVERAL" if several else "MECHANISM"
-    return as_(word, sum(classes[c] for c in named))
-
-
-def missing(p: Posterior, key: Key, left: Budget) -> float:
-    """Probability that a set leaves something real."""
-    return max(left.pushed, left.real, float(np.sum(p.cells(key)[~p.hyper.clean])))
-
-
-def real_rest(p: Posterior, key: Key, left: Budget) -> float:
-    """What a set leaves and is real, over what its effects explain."""
-    return missing(p, key, left) * left.rest / max(left.beyond, left.rest, 1e-300)
-
-
-def considered(p: Posterior) -> dict[Key, float]:
-    """Posterior of the sets that may be named.
-
-    So many laws that they rather imitate one which the catalogue lacks are not: then it is asked which of fewer explain
-    most, of the fitted sets, and what those leave is real and not named.
-    """
-    chance = p.probabilities()
-    if not p.imitates(max(chance, key=lambda k: chance[k])):
-        return chance
-    return p.probabilities(among=[k for k in p.nodes if not p.imitates(k)])
 
 
 def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
@@ -186,8 +103,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         text += MORE_LAWS if more_laws else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
-    if d.tie and p.ended and max(chance, key=lambda k: (chance[k], k in p.nodes)) not in p.nodes:
-        likely = [c for c in d.credible if classes[c] > 1.0 - CREDIBLE][:LISTED]
+    if d.tie and ended_early(p, chance):
+        likely = ([c for c in d.credible if classes[c] > 1.0 - CREDIBLE] or d.credible)[:LISTED]
         text = "Not decided yet. Estimated to be most probable, and not fitted: "
         text += f"{joined([f'{_name(c)} (p = {classes[c]:.2f})' for c in likely])}. Of what was fitted the best is "
         text += f"{say(shown)}, which {explained}." if suspects else "the model without any effect."
@@ -196,7 +113,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []
         )
-        chances = {c: holding(classes, c) if c > d.lead else classes[c] for c in d.credible}
+        chances = shared_out(classes, d.credible)
         sure = in_all(d.lead, d.credible)
         text = undecided(sure, d.credible, chances, say(shown, only=sure) if sure else "")
         more = p.effects(d.best) - sure
@@ -306,142 +223,11 @@ def odds_of_numbers(given: Fit, base: Fit) -> float:
     return float(0.5 * (given.misfit - base.cost) - np.sum(np.log(size / prior)))
 
 
-def by_effects(p: Posterior, chance: dict[Key, float]) -> dict[frozenset[str], float]:
-    """Posterior of each set of effects, wherever they act, without those that are not told from nothing.
-
-    With such an effect and without it is one explanation, which counts once, as the more probable of the two.
-    """
-    out: dict[frozenset[str], float] = {}
-    with_idle: dict[frozenset[str], float] = {}
-    for key, value in chance.items():
-        c = p.told(key)
-        if c == p.effects(key):
-            out[c] = out.get(c, 0.0) + value
-        else:
-            with_idle[c] = max(with_idle.get(c, 0.0), value)
-    for c, value in with_idle.items():
-        out[c] = max(out.get(c, 0.0), value)
-    total = sum(out.values()) / sum(chance.values())
-    return {c: value / total for c, value in out.items()}
-
-
-def imitated(p: Posterior, chance: dict[Key, float], classes: Collection[frozenset[str]], left: float) -> float:
-    """Probability that a law which the catalogue lacks is imitated by effects, of which these sets act.
-
-    Args:
-        left: see `Hyper.foreign`.
-    """
-    mine = [(value, c) for key, value in chance.items() if (c := p.told(key)) in classes]
-    total = sum(value for value, _ in mine)
-    return sum(value * p.hyper.foreign(laws(c), left) for value, c in mine) / total if total else 0.0
-
-
-def of_each(classes: dict[frozenset[str], float]) -> dict[str, float]:
-    """Posterior of each effect, whatever acts besides."""
-    out: dict[str, float] = {}
-    for c, value in classes.items():
-        for effect in c:
-            out[effect] = out.get(effect, 0.0) + value
-    return out
-
-
-def surely(p: Posterior, classes: dict[frozenset[str], float]) -> tuple[frozenset[str], list[frozenset[str]]]:
-    """Effects that act together with at least `ALONE`; and with what else, if one of a few surely acts besides.
-
-    What is added is listed where `LISTED` effects or fewer hold `ALONE`, whatever small ones act with them. Those of
-    which fits predict the same are one here, and an effect that has such likes is one of them.
-    """
-    fitted = {p.effects(k): p.nodes[k] for k in sorted(p.nodes, key=lambda k: p.total[k])}  # the best of each
-    marginal = of_each(classes)
-    lead: frozenset[str] = frozenset()
-    for effect in sorted(marginal, key=lambda e: (-marginal[e], e)):
-        larger = lead | {effect}
-        if sum(v for c, v in classes.items() if c >= larger) < ALONE:
-            break
-        lead = larger
-    more = {c - lead: v for c, v in classes.items() if c >= lead}
-    chance = of_each(more)
-    groups = indistinct(fitted, lead, sorted(chance, key=lambda e: (-chance[e], e))) if lead else []
-    for n in range(1, min(LISTED, len(groups)) + 1):
-        likely = [e for group in groups[:n] for e in group]
-        if len(likely) > 1 and sum(v for c, v in more.items() if c & set(likely)) >= ALONE:
-            return lead, [lead | {e} for e in likely]
-    return with_likes(fitted, classes, lead)
-
-
-def indistinct(fitted: dict[frozenset[str], Node], lead: frozenset[str], effects: Sequence[str]) -> list[list[str]]:
-    """Groups of effects that recordings do not tell apart beside others: their fits predict the same."""
-    groups: list[list[str]] = []
-    for effect in effects:
-        one = fitted.get(lead | {effect})
-        same = (group for group in groups if predict_the_same(one, fitted.get(lead | {group[0]})))
-        if (group := next(same, None)) is not None:
-            group.append(effect)
-        else:
-            groups.append([effect])
-    return groups
-
-
-def with_likes(
-    fitted: dict[frozenset[str], Node], classes: dict[frozenset[str], float], lead: frozenset[str]
-) -> tuple[frozenset[str], list[frozenset[str]]]:
-    """Effects that surely act, without one in whose place another predicts the same, and sets with either.
-
-    Of two that data cannot tell apart only priors, and how far their fits went, decide which is more probable. A drag
-    on a single arm and a loss of its hinge are the same.
-    """
-    for effect in sorted(lead):
-        others = [c for c in fitted if len(c) == len(lead) and lead - c == {effect}]
-        likely = [c for c in others if holding(classes, c) > 1.0 - CREDIBLE]
-        if alike := [c for c in likely if predict_the_same(fitted[c], fitted.get(lead))]:
-            return lead - {effect}, [lead, *alike]
-    return lead, []
-
-
-def predict_the_same(one: Node | None, other: Node | None) -> bool:
-    """Whether all data together see the predictions of two fits differ by less than one standard deviation.
-
-    Either may be off its best by what derivatives still promise it. Of what was not fitted, or of a search that was
-    stored, predictions are not known.
-    """
-    if one is None or other is None or one.fit.weights is None:
-        return False
-    gaps = [(a - b) / one.fit.weights.deviation for a, b in zip(one.fit.residuals, other.fit.residuals, strict=True)]
-    return float(sum(np.nansum(np.square(g)) for g in gaps)) < 1.0 + one.owed + other.owed
-
-
-def holding(classes: dict[frozenset[str], float], effects: frozenset[str]) -> float:
-    """Posterior of effects, whatever acts besides; of none, that nothing does."""
-    return sum(v for c, v in classes.items() if c >= effects) if effects else classes.get(effects, 0.0)
-
-
 def _besides(classes: dict[frozenset[str], float], lead: frozenset[str]) -> list[tuple[str, float]]:
     """The most probable effects that act beside others, with their probabilities."""
     chance = of_each({c - lead: value for c, value in classes.items() if c >= lead})
     likely = sorted(chance.items(), key=lambda item: (-item[1], item[0]))[:LISTED]
     return [(e, v) for e, v in likely if v > 1.0 - CREDIBLE]
-
-
-def best_of(p: Posterior, chance: dict[Key, float], effects: frozenset[str]) -> Key:
-    """The most probable fitted set of these effects; or else of these and others, or else of any."""
-    if not effects:
-        return frozenset()
-    classes = {k: p.effects(k) for k in p.nodes}
-    mine = [k for k, c in classes.items() if c == effects]
-    mine = mine or [k for k, c in classes.items() if c >= effects] or list(p.nodes)
-    return max(mine, key=lambda k: (chance.get(k, 0.0), p.total[k]))
-
-
-def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]], float]:
-    """The smallest set of explanations that holds 95 %; what only adds to another one is left out."""
-    total, out = 0.0, []
-    for c in sorted(classes, key=lambda c: -classes[c]):
-        if total >= CREDIBLE:
-            break
-        total += classes[c]
-        if not any(c > d for d in out if d):
-            out.append(c)
-    return out, min(total, 1.0)
 
 
 def explains(b: Budget, left: str, f: Fit) -> str:
@@ -476,26 +262,38 @@ def _unlisted(d: Decision) -> str:
 
 
 def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:
-    """Where else the same effects may act, in words."""
+    """How probable it is that named effects act where it is said, and where else they may, in words."""
     where: dict[str, float] = {}
+    fitted: dict[str, Key] = {}
     for key, value in chance.items():
         if p.effects(key) >= lead:
-            name = joined(sorted({p.suspect(n).label for n in key if p.suspect(n).effect in lead}))
-            where[name] = where.get(name, 0.0) + value
-    least = (1.0 - CREDIBLE) * sum(where.values())
-    where.pop(joined(sorted({p.suspect(n).label for n in best if p.suspect(n).effect in lead})), None)
-    likely = sorted(n for n, v in where.items() if v > least)
-    return f" (or {joined(likely[:3])})" if likely else ""
+            place = _place(p, key, lead)
+            where[place] = where.get(place, 0.0) + value
+            if key in p.nodes and value >= chance.get(fitted.get(place, key), 0.0):
+                fitted[place] = key
+    total = sum(where.values())
+    here = where.pop(_place(p, best, lead))
+    likely = [w for w in sorted(where, key=lambda w: -where[w]) if where[w] > (1.0 - CREDIBLE) * total][:LISTED]
+    each = []
+    for w in likely:
+        turned = len(lead) == 1 and w in fitted and _sign(p, fitted[w], lead) * _sign(p, best, lead) < 0.0
+        each.append(f"{'with the opposite sign ' if turned else ''}{w} (p = {where[w] / total:.2f})")
+    return f" there with p = {here / total:.2f}, or {joined(each)}" if each else ""
+
+
+def _place(p: Posterior, key: Key, lead: frozenset[str]) -> str:
+    """Where named effects act in a set, in words."""
+    mine = sorted({(s.effect, s.site) for s in map(p.suspect, key) if s.effect in lead})
+    return joined([f"at {site}" if len(lead) == 1 else f"{title(effect)} at {site}" for effect, site in mine])
+
+
+def _sign(p: Posterior, key: Key, lead: frozenset[str]) -> float:
+    """Which way a named effect acts in a fitted set."""
+    f = p.nodes[key].fit
+    value = dict(zip((id(n) for n in f.free), f.theta, strict=True))
+    (first, *_) = (s.free[0] for s in f.hypothesis.suspects if s.effect in lead)
+    return float(np.sign(value[id(first)] - first.start))
 
 
 def _name(effects: frozenset[str]) -> str:
     return " with ".join(sorted(title(e) for e in effects)) or "nothing missing"
-
-
-def _of_recorder(effects: frozenset[str]) -> bool:
-    return bool(effects) and all(map(of_recorder, effects))
-
-
-def log_odds(p: Posterior, key: Key) -> float:
-    """Log posterior odds of a set over the model without an effect."""
-    return p.total[key] - p.total[frozenset()]

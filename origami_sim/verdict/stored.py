@@ -30,7 +30,8 @@ from origami_sim.infer.placement import enter, log_priors, place
 from origami_sim.infer.posterior import Key, Node, Posterior
 from origami_sim.infer.remainder import mismatch
 from origami_sim.infer.screen import Signature
-from origami_sim.infer.verdict import COMPARED, best_of, decide, unnamed_verdict
+from origami_sim.verdict.decide import best_of, decide
+from origami_sim.verdict.sentences import COMPARED, unnamed_verdict
 
 NULL = 1e-9
 """Part of the largest eigenvalue of the discrepancy's columns below which an axis is nothing but rounding."""

@@ -17,11 +17,6 @@ PEOPLE = ("Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
 """Names with which titles of effects begin; they keep their capital."""
 
 
-def pooled(errors: np.ndarray) -> float:
-    """Root mean square of what components miss, in multiples of their noise (D,)."""
-    return float(np.sqrt(np.nanmean(np.square(errors))))
-
-
 def distinct(fits: Sequence[Fit]) -> list[str]:
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 
