@@ -91,8 +91,9 @@ def _distrust(f: Fit) -> str:
 
 
 def numbers(f: Fit) -> list[Number]:
-    """Fitted numbers with 95 % intervals, without the coefficients of a moment that no law gives."""
-    return [
+    """Numbers that suspects fix, then fitted ones with 95 % intervals; no coefficients of a moment without a law."""
+    given = [Number(f"{s.effect}.{n}", "-", v, v, v, v, 0.0, False) for s in f.hypothesis.suspects for n, v in s.fixed]
+    return given + [
         Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away))
         for n, t, low, high, away, b in zip(f.free, f.theta, *f.intervals(), f.strain, f.at_bound, strict=True)
         if n.owner != UNLISTED
@@ -221,6 +222,9 @@ def _correlation(f: Fit, d: int, other: list[np.ndarray] | None, lags: int) -> n
 def patch(best: Fit) -> dict[str, float]:
     """Numbers of the best explanation, by "effect.parameter@entities" or the setting's name."""
     out = {}
+    for s in best.hypothesis.suspects:
+        where = "" if s.entities is None else "@" + ",".join(map(str, s.entities))
+        out |= {f"{s.effect}.{name}{where}": value for name, value in s.fixed}
     for n, t in zip(best.free, best.theta, strict=True):
         if n.recording is not None:
             continue

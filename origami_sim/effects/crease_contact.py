@@ -1,4 +1,4 @@
-"""Contact of patches: on one side of a crease, when it has folded far enough."""
+"""Contact of patches, or a stop: on one side of a crease, when it has folded far enough."""
 
 import math
 
@@ -8,9 +8,12 @@ from origami_sim.effects._effect import Effect, Parameter, scalar
 
 
 @wp.func
-def overlap(angle: scalar, contact_angle: scalar):
+def overlap(angle: scalar, contact_angle: scalar, contact_side: scalar):
+    side = contact_side
+    if side == scalar(0.0):
+        side = contact_angle
     over = angle - contact_angle
-    if contact_angle < scalar(0.0):
+    if side < scalar(0.0):
         over = wp.min(over, scalar(0.0))
     else:
         over = wp.max(over, scalar(0.0))
@@ -18,13 +21,13 @@ def overlap(angle: scalar, contact_angle: scalar):
 
 
 @wp.func
-def moment(angle: scalar, contact_stiffness: scalar, contact_angle: scalar):
-    return -contact_stiffness * overlap(angle, contact_angle)
+def moment(angle: scalar, contact_stiffness: scalar, contact_angle: scalar, contact_side: scalar):
+    return -contact_stiffness * overlap(angle, contact_angle, contact_side)
 
 
 @wp.func
-def energy(angle: scalar, contact_stiffness: scalar, contact_angle: scalar):
-    over = overlap(angle, contact_angle)
+def energy(angle: scalar, contact_stiffness: scalar, contact_angle: scalar, contact_side: scalar):
+    over = overlap(angle, contact_angle, contact_side)
     return scalar(0.5) * contact_stiffness * over * over
 
 
@@ -39,13 +42,17 @@ EFFECT = Effect(
             "contact_stiffness", "kc", "N m/rad", 0.0, (0.0, math.inf), "stiffness of what touches", typical=5e-3
         ),
         Parameter(
-            "contact_angle", "theta_c", "rad", 1.0, (-math.pi, math.pi), "fold where they touch; its sign is the side",
-            typical=1.0, threshold="fold",
+            "contact_angle", "theta_c", "rad", 1.0, (-math.pi, math.pi), "fold where they touch",
+            typical=1.0, threshold="fold", side="contact_side",
+        ),
+        Parameter(
+            "contact_side", "side", "-", 0.0, (-1.0, 1.0),
+            "which folds press: 1 larger ones, -1 smaller ones, 0 those farther from flat",
         ),
     ),
     fitted=("contact_stiffness", "contact_angle"),
     stiffness=lambda p: p["contact_stiffness"],
-    formula="M = -kc (theta - theta_c) beyond theta_c, on its side only",
+    formula="M = -kc (theta - theta_c) beyond theta_c, on one side only",
     source="penalty contact of patch edges: tan(theta_c / 2) = gap / (2 height) for patches flush with the crease",
     matters="a kink in the fold against the drive; rattling; folds that stop early on one side",
     confused_with="stiffening (no kink), asymmetry (kink at rest)",

@@ -65,6 +65,7 @@ class Suspect:
             one.
         more: whether the model has the effect, and more or less of it is suspected.
         stretch: whether the site is a stretch of a beam, not one crease or panel.
+        fixed: parameters that it gives a value, besides.
     """
 
     effect: str
@@ -75,6 +76,7 @@ class Suspect:
     sites: int = 1
     more: bool = False
     stretch: bool = False
+    fixed: tuple[tuple[str, float], ...] = ()
 
     @property
     def label(self) -> str:
@@ -83,7 +85,7 @@ class Suspect:
     @property
     def form(self) -> tuple:
         """What tells it from other suspects of the search: where it is, and where its numbers begin."""
-        return self.label, tuple((f.name, f.start) for f in self.free)
+        return self.label, (*((f.name, f.start) for f in self.free), *self.fixed)
 
     @property
     def strengths(self) -> tuple[Free, ...]:
@@ -336,6 +338,8 @@ def apply(
                 out.set(s.effect, p.name, p.typical)
     index = 0
     for s in hypothesis.suspects:
+        for name, value in s.fixed:
+            out.set(s.effect, name, value, None if s.entities is None else np.array(s.entities))
         for f in s.free:
             bounds = get(s.effect).parameter(f.name).bounds
             if s.more:  # or less, of what the model has

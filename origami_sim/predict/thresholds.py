@@ -14,7 +14,7 @@ from origami_sim.predict.track import recorded_folds
 from origami_sim.predict.worlds import Worlds
 
 REACHED = (0.6, 0.9)
-"""Parts of the largest recorded value at which thresholds begin: what acts for long, and what acts at the ends alone.
+"""Parts of the way to the largest recorded value at which thresholds begin: what acts for long, what at the ends alone.
 
 A fit moves the threshold from there: half of both, and one of 0.75 alone, lead to the same verdict on a strip that
 meets a stop, and to its angle within 3 mrad.
@@ -22,26 +22,30 @@ meets a stop, and to its angle within 3 mrad.
 
 
 def within_reach(forward: Worlds, every: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects, those with a threshold as often as it may begin; of a signed one, on either side.
+    """The suspects, those with a threshold as often as it may begin; of a law on one side of it, on either side.
 
-    What is known of a threshold beforehand is that it lies about as far as the recordings go.
+    What is known of a threshold beforehand is that it lies about as far as the recordings go. A side that they do not
+    reach from zero, as of a lid that cannot close, they reach from their other end.
     """
     folds, out = recorded_folds(forward), []
     for s in every:
-        place, quantity = next(
-            ((n, p.threshold) for n, f in enumerate(s.free) if (p := get(s.effect).parameter(f.name)).threshold),
-            (0, ""),
+        place, p = next(
+            ((n, p) for n, f in enumerate(s.free) if (p := get(s.effect).parameter(f.name)).threshold), (0, None)
         )
-        seen = recorded(forward, s, quantity, folds)
-        f = s.free[place]
-        sides = (1.0, -1.0) if f.lower < 0.0 else (1.0,)
-        reach = [float(np.max(side * seen if len(sides) > 1 else np.abs(seen), initial=0.0)) for side in sides]
-        starts = [side * part * most for side, most in zip(sides, reach, strict=True) if most > 0.0 for part in REACHED]
-        for start in starts:
-            known = {"start": float(np.clip(start, f.lower, f.upper)), "scale": 0.1 * max(reach), "spread": max(reach)}
-            out.append(replace(s, free=tuple(replace(g, **known) if n == place else g for n, g in enumerate(s.free))))
-        if not starts:  # it has none, or recordings do not tell
+        seen = recorded(forward, s, p.threshold if p is not None else "", folds)
+        most = float(np.max(np.abs(seen), initial=0.0))
+        if p is None or not most:  # it has none, or recordings do not tell
             out.append(s)
+            continue
+        high, low = float(np.max(seen)), float(np.min(seen))
+        above, below = (1.0, 0.0 if high > 0.0 else low, high), (-1.0, 0.0 if low < 0.0 else high, low)
+        ways = (above, below) if p.side else ((1.0, 0.0, most),)
+        for side, begin, end in ways:
+            for part in REACHED:
+                start = float(np.clip(begin + part * (end - begin), s.free[place].lower, s.free[place].upper))
+                known = replace(s.free[place], start=start, scale=0.1 * most, spread=most)
+                free = tuple(known if n == place else g for n, g in enumerate(s.free))
+                out.append(replace(s, free=free, fixed=((p.side, side),) if p.side else ()))
     return out
 
 

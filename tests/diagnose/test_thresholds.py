@@ -35,6 +35,8 @@ def test_stops_and_contacts_begin_within_the_recorded_angles(stopped):
     assert starts["crease_stop"] == pytest.approx([0.6 * most, 0.9 * most], rel=0.02)
     sides = [0.6 * angles.max(), 0.9 * angles.max(), 0.6 * angles.min(), 0.9 * angles.min()]
     assert starts["crease_contact"] == pytest.approx(sides, rel=0.02)
+    fixed = [s.fixed for s in every if s.effect == "crease_contact"]
+    assert fixed == [(("contact_side", side),) for side in (1.0, 1.0, -1.0, -1.0)]
     (hysteresis, *_) = (s for s in every if s.effect == "crease_hysteresis")
     assert hysteresis.free[1].start == CATALOGUE["crease_hysteresis"].parameter("yield_angle").typical
 
@@ -45,6 +47,18 @@ def test_a_contact_that_a_swing_meets_is_named_with_its_angle(stopped):
     assert found.verdict == "MECHANISM" and found.chosen == ["crease_contact at crease 0"], found.sentence
     numbers = {n.label: n for n in found.candidates[0].numbers}
     assert numbers["crease_contact.contact_angle"].value == pytest.approx(-STOP, abs=0.02)
+
+
+def test_a_stop_short_of_flat_is_named_wherever_flat_is():
+    """A lid that cannot close: it is stopped from below, at a fold that is still open."""
+    stop = {"contact_stiffness": (2e-3, None), "contact_angle": (0.1, None), "contact_side": (-1.0, None)}
+    few = ["crease_contact", "crease_stop", "crease_stiffening", "crease_asymmetry", "air_drag"]
+    found = diagnose(subject(2), record({"crease_contact": stop}, **SWING), Options(threads=1), catalogue=few)
+    assert found.verdict == "MECHANISM" and found.chosen == ["crease_contact at crease 0"], found.sentence
+    numbers = {n.label: n for n in found.candidates[0].numbers}
+    assert numbers["crease_contact.contact_side"].value == -1.0
+    assert numbers["crease_contact.contact_angle"].value == pytest.approx(0.1, abs=0.01)
+    assert any(label.startswith("crease_contact.contact_side") for label in found.patch)
 
 
 def test_a_stiff_stop_is_found_from_a_soft_one_that_acts_earlier(stopped):
@@ -94,7 +108,7 @@ def test_a_hard_stop_is_found_with_loose_ties_from_where_a_fit_is_stuck(bounced)
     assert forward is not None
     _, base, _ = nominal_fits(forward)
     every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive, forward.parameters))
-    contact = [s for s in every if s.effect == "crease_contact" and s.free[1].start < 0.0][1]
+    contact = [s for s in every if s.effect == "crease_contact" and s.fixed[0][1] < 0.0][1]
     by = level(forward, base)
     begin = scanned(forward, Hypothesis((contact,)), by, base.local, None)
     stuck = fit(forward, Hypothesis((contact,)), by, theta=begin, local=base.local)

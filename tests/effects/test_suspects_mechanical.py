@@ -256,6 +256,9 @@ def test_stiffening_is_cubic_and_slows_a_swing_as_duffing_says():
 def test_contact_acts_on_its_side_only(side):
     m = moments(["crease_contact"], under("crease_contact", contact_stiffness=0.6, contact_angle=side * 1.1), ANGLES)
     assert m == pytest.approx(-side * 0.6 * (side * ANGLES - 1.1).clip(min=0), abs=1e-13)
+    stop = under("crease_contact", contact_stiffness=0.6, contact_angle=0.2 * side, contact_side=-side)
+    m = moments(["crease_contact"], stop, ANGLES)  # keeps from closing
+    assert m == pytest.approx(side * 0.6 * (0.2 - side * ANGLES).clip(min=0), abs=1e-13)
 
 
 def test_quadratic_damping_decays_as_one_over_time():
