@@ -16,6 +16,7 @@ from origami_sim.predict.track import PATH
 from origami_sim.recording import Channel, Recording, by_component
 from origami_sim.recording.drives import UNITS, switches
 from origami_sim.recording.units import quantity
+from origami_sim.verdict.words import joined
 
 BENT = 0.3
 """Fold [rad] of a second pose that is asked: flat creases may lie where a channel has an extremum."""
@@ -64,9 +65,9 @@ def unobserved(forward: Predictor) -> str | None:
     mixed = np.flatnonzero(~blind)[np.linalg.norm(unseen, axis=0) > 1e-3]
     parts = []
     if np.any(blind):
-        parts.append(f"no channel shows {_join([names[k] for k in np.flatnonzero(blind)])}")
+        parts.append(f"no channel shows {in_ranges([names[k] for k in np.flatnonzero(blind)])}")
     if len(mixed):
-        parts.append(f"the channels show {_join([names[k] for k in mixed])} only together")
+        parts.append(f"the channels show {in_ranges([names[k] for k in mixed])} only together")
     if not parts:
         return None
     text = "; ".join(parts)
@@ -161,8 +162,18 @@ def channel_tangents(forward: Predictor) -> np.ndarray:
     return np.concatenate(rows)
 
 
-def _join(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+def in_ranges(names: Sequence[str]) -> str:
+    """Names in a row; of four and more that are numbered one after the other, the first and the last."""
+    runs: list[list[str]] = []
+    for name in names:
+        word, _, number = name.rpartition(" ")
+        last = runs[-1][-1].rpartition(" ") if runs else ("", "", "")
+        follows = number.isdigit() and last[2].isdigit() and last[0] == word and int(number) == int(last[2]) + 1
+        if follows:
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return joined([n for r in runs for n in ([f"{r[0]} to {r[-1]}"] if len(r) > 3 else r)])
 
 
 def assumed(recording: Recording, drive: Drive) -> list[str]:

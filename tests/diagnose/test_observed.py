@@ -7,7 +7,7 @@ import pytest
 
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
-from origami_sim.diagnose.observed import channel_tangents, check_recording, unobserved
+from origami_sim.diagnose.observed import channel_tangents, check_recording, in_ranges, unobserved
 from origami_sim.errors import InputError
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.curves import Static
@@ -120,3 +120,10 @@ def test_recordings_of_few_values_are_refused_and_slow_ones_noted():
     (note,) = check_recording(slow, MODEL, 5e-5)
     assert "lasts 10 s, 2e+05 steps" in note and note.endswith("motion = 'quasistatic' in the sidecar.")
     assert check_recording(SWING, MODEL, 5e-5) == []
+
+
+def test_many_numbered_names_are_said_as_a_range():
+    stations = [f"station {k}" for k in range(1, 25)]
+    assert in_ranges(stations) == "station 1 to station 24"
+    assert in_ranges(["base", *stations[2:7], "station 9"]) == "base, station 3 to station 7 and station 9"
+    assert in_ranges(stations[:3]) == "station 1, station 2 and station 3"
