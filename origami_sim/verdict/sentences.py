@@ -128,7 +128,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if d.word == "MEASUREMENT":
         text = f"The measurement, not the device, explains the mismatch: {say(shown, only=d.lead)}"
     else:
-        text = f"Found: {say(shown, only=d.lead)}{_elsewhere(p, chance, d.lead, d.best)}"
+        text = f"Found: {say(shown, only=d.lead)}{places(p, chance, d.lead, d.best)}"
     who = "with what acts besides, they" if len(named) < len(suspects) else "they" if len(named) > 1 else "it"
     explained = explained if who == "it" else explained.replace("explains", "explain", 1)
     more = 1.0 - classes.get(d.lead, 0.0) * (1.0 - d.foreign) / d.probability
@@ -261,7 +261,7 @@ def _unlisted(d: Decision) -> str:
     return "" if small else f" A law that the catalogue lacks may do all of this (p = {d.foreign:.2f})."
 
 
-def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:
+def places(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: Key) -> str:
     """How probable it is that named effects act where it is said, and where else they may, in words."""
     where: dict[str, float] = {}
     fitted: dict[str, Key] = {}
@@ -272,7 +272,7 @@ def _elsewhere(p: Posterior, chance: dict[Key, float], lead: frozenset[str], bes
             if key in p.nodes and value >= chance.get(fitted.get(place, key), 0.0):
                 fitted[place] = key
     total = sum(where.values())
-    here = where.pop(_place(p, best, lead))
+    here = where.pop(_place(p, best, lead), 0.0)
     likely = [w for w in sorted(where, key=lambda w: -where[w]) if where[w] > (1.0 - CREDIBLE) * total][:LISTED]
     each = []
     for w in likely:

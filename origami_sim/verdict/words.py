@@ -64,13 +64,6 @@ def _named(n: Free, s: Suspect) -> str:
     return f"{name}, {of} {place}:" if several else name
 
 
-def elsewhere(f: Fit) -> str:
-    """A single effect somewhere else, in words."""
-    s = f.hypothesis.suspects[0]
-    change = f.theta[len(f.free) - len(s.free)] - s.free[0].start
-    return f"{'more' if change > 0 else 'less'} at {s.site}" if s.more else f"the same at {s.site}"
-
-
 def said(value: float, unit: str, digits: int = 3) -> str:
     """A number with its unit; a plain factor has none, and what a device states without one."""
     return f"{value:.{digits}g}" if unit in ("-", "1", "", ANY) else quantity(value, unit, digits=digits)

@@ -18,7 +18,7 @@ from origami_sim.infer.screen import Signature
 from origami_sim.locate.describe import described
 from origami_sim.locate.places import Acting, Curve, Place
 from origami_sim.verdict.decide import credible, decide, shared_out
-from origami_sim.verdict.sentences import explains, in_all, undecided
+from origami_sim.verdict.sentences import explains, in_all, places, undecided
 from origami_sim.verdict.words import joined, said, say, title
 
 
@@ -239,6 +239,23 @@ def test_a_search_that_ended_before_its_best_set_was_fitted_has_not_decided():
     for ended, word in ((True, "TIE"), (False, "UNKNOWN")):
         p.ended = ended
         assert decide(p, lambda key: Budget([Share("not named", "rest", 1.0)], 9.0)).word == word
+
+
+def test_places_are_said_with_their_probability_and_turned_signs():
+    """A stiffer root and a softer middle of a beam are the same to a modulus that is uncertain."""
+    sites = ("the root", "the middle", "the tip")
+    every = [
+        Suspect("crease_softness", site, "crease", (Free("crease_softness", "dK", "-", 0.0, 1.0),)) for site in sites
+    ]
+    p = Posterior([Signature(s, [np.zeros(0)], np.ones(1)) for s in every], Weights(np.ones(1)))
+    chance = {frozenset({n}): v for n, v in enumerate((0.6, 0.3, 0.1))} | {frozenset(): 0.0}
+    for n, strength in ((0, 1.0), (1, -1.0)):
+        free = every[n].free
+        fitted = SimpleNamespace(free=free, theta=np.array([strength]), hypothesis=Hypothesis((every[n],)))
+        p.nodes[frozenset({n})] = Node(frozenset({n}), cast(Fit, fitted), np.zeros(1), [], [], [None])
+    text = places(p, chance, frozenset({"crease_softness"}), frozenset({0}))
+    assert text == " there with p = 0.60, or with the opposite sign at the middle (p = 0.30) and at the tip (p = 0.10)"
+    assert places(p, {frozenset({0}): 1.0}, frozenset({"crease_softness"}), frozenset({0})) == ""
 
 
 def predicted(p: Posterior, at: dict[tuple[str, ...], float], owed: float = 0.0) -> None:
