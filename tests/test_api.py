@@ -13,7 +13,7 @@ SNIPPET = """\
 from math import degrees
 from origami_sim import Drive, Sheet, ramp, save_run, simulate, strip
 
-sheet = Sheet(strip([0.01, 0.02], width=0.02), thickness="1 mm", material="pdms", triangulation="center")
+sheet = Sheet(strip([0.01, 0.02], width=0.02), thickness="1 mm", material="pdms")
 sheet.patch(1, thickness="3 mm", poling=(1, 0, 0))  # magnetic elastomer on the second panel, poled away from the crease
 sheet.crease(stiffness="2 mN m/rad", loss_time="3 ms").gravity().fix(panels=[0])
 model, parameters = sheet.build()
