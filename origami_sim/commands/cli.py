@@ -38,8 +38,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 _DIAGNOSE_HELP = """\
-writes report.html, diagnosis.json, patched.toml (for --calibration; of a scene for --model, too) and a replay; data and
-patch as soon as the verdict stands. Interrupted, the same command goes on where it stopped.
+writes report.html, diagnosis.json, patched.toml (for --calibration; of a scene or a design file for --model, too) and a
+replay; data and patch as soon as the verdict stands. Interrupted, the same command goes on where it stopped.
 
 exit codes: 10 ADEQUATE (nothing is found missing), 11 PARAMETER (refitting is enough), 12 MEASUREMENT (the measurement
 makes the difference), 13 MECHANISM (an effect is missing), 14 TIE (several explain it alike), 15 SEVERAL (more than one
@@ -117,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("recording", help="CSV or Parquet file")
     what = "scene or device that models what was recorded: pendulum_chain, my_flap.py"
     p.add_argument("--scene", "--model", metavar="SCENE", help=f"{what} (default: what the sidecar names)")
+    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a diagnosis")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
@@ -354,7 +355,7 @@ def _replay(args) -> int:
 
 
 def _compare(args) -> int:
-    from origami_sim.device.device import device_module
+    from origami_sim.device.device import device_module, modelled
     from origami_sim.device.scene import check_recorded_scene, recorded_model, scene_settings
     from origami_sim.observation.compare import plot_overlay
     from origami_sim.recording import read_recording
@@ -369,12 +370,13 @@ def _compare(args) -> int:
     if given is None:
         recording = read_recording(args.recording, sidecar)
         given = recorded_model(recording, "--scene")
+    given, calibration = modelled(given, args.calibration, "--model")
     module = device_module(given)
     scene = module.__name__.rpartition(".")[2]
     if not hasattr(module, "replicate"):
         allowed = "pendulum_chain, or a device of yours"
         raise InputError("this scene cannot replicate a recording", field="--scene", value=scene, allowed=allowed)
-    settings = scene_settings(module).override(args.set, "--set")
+    settings = scene_settings(module, calibration).override(args.set, "--set")
     recording = recording or read_recording(args.recording, sidecar)  # what is wrong with names is told before
     check_recorded_scene(recording, scene, "origami-sim diagnose --model")
     if recording.by_step:

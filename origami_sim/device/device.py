@@ -29,6 +29,7 @@ from origami_sim.design.build import Sheet
 from origami_sim.design.design_file import Design, is_design, read_design
 from origami_sim.device.begun import begun, filmed
 from origami_sim.device.scene import (
+    DEVICE,
     NAMES,
     Outcome,
     Progress,
@@ -41,7 +42,7 @@ from origami_sim.device.scene import (
 )
 from origami_sim.drive import Drive, as_signal
 from origami_sim.errors import InputError, nearest
-from origami_sim.files import PATTERNS
+from origami_sim.files import PATTERNS, read_toml
 from origami_sim.model import Model, Parameters, State
 from origami_sim.quantities import ANY, Quantity, converted, parsed
 from origami_sim.recording import Recording, recorded_signals
@@ -93,6 +94,10 @@ def device_module(given: str) -> ModuleType:
     if place and path.is_dir() and not function:
         return _run_again(path)
     if path.suffix == ".toml" and not function:
+        if path.is_file() and not is_design(path) and isinstance(named := read_toml(path).get(DEVICE), str):
+            device = named if named in NAMES else os.path.relpath(path.parent / named)
+            fault, allowed = "is a calibration, not a device", f"{device} --calibration {given}"
+            raise InputError(fault, file=path, field=DEVICE, value=named, allowed=allowed)
         return _module(path.stem, path, _designed(read_design(path)), {})
     if path.suffix == ".py":
         if not path.is_file():
@@ -135,6 +140,47 @@ def is_device(given: str) -> bool:
     if given and given not in NAMES and Path(given).is_dir():
         return True
     return bool(re.search(r"\.py$|:\w+$", given))
+
+
+def modelled(given: str, calibration: str | None, option: str) -> tuple[str, str | None]:
+    """The device and the calibration that a name stands for: of a calibration that names its device, both.
+
+    A patched calibration of a diagnosis names the scene or device file that its settings are of, beside itself.
+
+    Args:
+        given: a scene, a device, or a calibration. calibration: that the user gives beside it, or None.
+        option: of the command line, such as "--model", in the error.
+
+    Returns:
+        What `device_module` takes, and the calibration; as given where it is no calibration or names no device.
+
+    Raises:
+        InputError: a device of Python code, which is executed only if the user names it; two calibrations.
+    """
+    file = Path(given)
+    if file.suffix != ".toml" or not file.is_file() or is_design(file):
+        return given, calibration
+    stated = read_toml(file).get(DEVICE)
+    if not isinstance(stated, str):
+        return given, calibration
+    if calibration is not None:
+        fault, allowed = "is a calibration already", f"{option} {stated}, or no --calibration"
+        raise InputError(fault, file=file, field="--calibration", value=calibration, allowed=allowed)
+    if stated in NAMES:
+        return stated, given
+    beside = file.parent / stated
+    if beside.is_dir() or (stated.endswith(".toml") and is_design(beside)):  # a design, in which nothing is executed
+        return os.path.relpath(beside), given
+    code = stated if re.search(r"(?<!\.py):\w+$", stated) else os.path.relpath(beside)
+    raise InputError(
+        "its device is Python code, which is executed only if you name it yourself"
+        if re.search(r"\.py$|:\w+$", stated)
+        else "its device is neither a scene nor a device file",
+        file=file,
+        field=DEVICE,
+        value=stated,
+        allowed=f"{option} {code} --calibration {given}",
+    )
 
 
 def _run_again(folder: Path) -> ModuleType:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 NAMES: tuple[str, ...] = importlib.import_module("origami_sim.scenes").NAMES
 """The scenes that ship with the package."""
 
+DEVICE = "device"
+"""Word of a calibration that says of which scene or device file its settings are."""
+
 _KEYS = {"value", "unit", "range", "choices", "source", "meaning", "uncertainty"}
 _BESIDE_STATICS = {
     "mode", "frequency", "loss_time", "decay_rate", "membrane_damping", "cells", "hinges", "motion_cells",
@@ -191,7 +194,8 @@ def read_calibration(source: str | Path) -> Settings:
     Every table is one setting with `value`, `unit` (SI; "" for words), `source`, `meaning` and optionally `range`,
     `choices` and `uncertainty`. The table `effects` adds effects to those of the scene (see `diagnose.patch`), and the
     words `panels` ("rigid", "elastic") and `motion` ("dynamic", "quasistatic") say how it moves, the number `accuracy`
-    how accurately (see `simulate`).
+    how accurately (see `simulate`). The word `device` says of which scene or device file the settings are (see
+    `device.modelled`).
 
     Raises:
         InputError: no such file, malformed TOML, a missing or unknown key, a value outside its range, an effect or a
@@ -207,6 +211,8 @@ def read_calibration(source: str | Path) -> Settings:
 
         additions = read_additions(data.pop("effects"), path)
     given = {word: data.pop(word, None) for word in ("panels", "motion", "accuracy")}
+    if isinstance(data.get(DEVICE), str):  # a table is a setting of that name
+        del data[DEVICE]
     return Settings([_setting(name, table, path) for name, table in data.items()], path, additions, **given)
 
 
@@ -233,7 +239,7 @@ def scene_settings(module: ModuleType, calibration: str | Path | None = None) ->
     for name in own:
         if name not in given:
             raise InputError("the calibration lacks a setting of this scene", file=given.file, field=name)
-        if given[name].unit != own[name].unit:
+        if given[name].unit != own[name].unit and ANY not in (given[name].unit, own[name].unit):
             raise InputError(
                 "wrong unit", file=given.file, field=f"{name}.unit", value=given[name].unit, allowed=own[name].unit
             )

@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from types import ModuleType
 
-from origami_sim.device.device import device_module, is_device
+from origami_sim.device.device import device_module, is_device, modelled
 from origami_sim.device.scene import (
     NAMES,
     Settings,
@@ -33,7 +33,7 @@ from origami_sim.diagnose.options import Options
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Free, Subject
-from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads
+from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads, with_units
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.model import Model, Parameters
 from origami_sim.observation.observe import check_scene
@@ -59,8 +59,10 @@ def run(args: Namespace) -> int:
         _check_model(folder, args.model)
     _check_folder(folder)
     data = read_recordings(args.recordings, args.sidecar)
-    given = args.model or recorded_model(data[0], "--model")
-    _check_model(folder, given)
+    stated = args.model or recorded_model(data[0], "--model")
+    given, calibration = modelled(stated, args.calibration, "--model")
+    for file in filter(None, (stated, given, calibration)):
+        _check_model(folder, file)
     replaced = _earlier(folder)
     if replaced and set(replaced) != {r.name for r in data}:
         say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
@@ -69,11 +71,12 @@ def run(args: Namespace) -> int:
     for note in data.notes:
         say(f"note: {note}")
     module, settings = model_of(given, data)
-    settings = settings if args.calibration is None else scene_settings(module, args.calibration)
+    settings = settings if calibration is None else scene_settings(module, calibration)
     name = module.__name__.rpartition(".")[2]
     overrides = _overrides(data, name)
-    if overrides and given.endswith(".toml"):
-        say("note: the sidecar's overrides are left out: --model states the numbers of this object itself.")
+    if overrides and (calibration or given.endswith(".toml")):
+        which = "--calibration" if args.calibration else "--model"
+        say(f"note: the sidecar's overrides are left out: {which} states the numbers of this object itself.")
     else:
         settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
     settings = _assigned(settings, args.set, "--set")
@@ -99,7 +102,8 @@ def run(args: Namespace) -> int:
     if not args.json:
         print("\n".join(said), flush=True)
     keep, progress = Keep(folder / RESUME), Progress()
-    files = keep.write = Files(folder, settings, given if is_device(given) else name, keep)
+    known_units = with_units(module, settings, parameters)
+    files = keep.write = Files(folder, known_units, given if is_device(given) else name, keep)
     keep.film = files.film
     try:
         with ending_as_interrupted():

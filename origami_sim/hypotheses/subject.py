@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,10 @@ from origami_sim.errors import InputError, nearest
 from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, Suspect, factor
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
+from origami_sim.quantities import ANY
+
+STEP = 1e-3
+"""Relative change of a setting that shows which parameters it is; any that rounding does not hide finds the same."""
 
 Source = (
     Subject
@@ -95,6 +100,32 @@ def refitted_as(subject: Subject, some: Sequence[Suspect]) -> dict[str, list[str
             if rows and (s.entities is None or set(rows) <= set(s.entities)) and f.name not in out.get(s.label, ()):
                 out.setdefault(s.label, []).append(f.name)
     return out
+
+
+def with_units(module: ModuleType, settings: Settings, parameters: Parameters) -> Settings:
+    """The settings, with the units of plain numbers in the `build` of a device where the model tells them.
+
+    A number without a stated unit has that of the parameters that it is, or is added to, such as the friction of the
+    ground ("1"), and keeps "SI" where it is none as it stands.
+    """
+    out = []
+    for s in settings.values():
+        units: set[str] = set()
+        if s.unit == ANY and isinstance(s.value, float) and s.value and np.isfinite(s.value):
+            other = s.value * (1.0 + STEP)
+            try:
+                _, moved, *_ = module.build(settings.replace(**{s.name: other}))
+            except InputError:  # at its bound
+                moved = parameters
+            for key in (k for k in parameters if k[0] in CATALOGUE and k in moved):
+                old, new = parameters[key], moved[key]
+                if old.shape == new.shape and np.any(changed := old != new):
+                    by = np.abs(new - old)[changed]
+                    itself = np.allclose(by, abs(other - s.value), atol=0.0)
+                    units.add(get(key[0]).parameter(key[1]).unit if itself else ANY)
+        unit = units.pop() if len(units) == 1 else ANY
+        out.append(replace(s, unit="1" if unit == "-" else unit) if s.unit == ANY else s)
+    return settings._with(out)
 
 
 def divided(priors: Mapping[str, float | str], model: Model) -> tuple[dict, dict]:

@@ -1,6 +1,7 @@
 """A patched calibration: the scene's settings with refitted numbers, and the effects that were found to be missing.
 
-It is a calibration as any other, with one table more:
+It is a calibration as any other, which names its device (`device = "my_flap.toml"`, from its own folder), with one
+table more:
 
     [[effects.crease_friction]]
     site = "crease 1"               # in words; optional, like source
@@ -15,6 +16,8 @@ added, keeps what is not stated; with `more = true` the numbers are added to wha
 """
 
 import json
+import os
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from origami_sim.device.scene import Settings
+from origami_sim.device.scene import DEVICE, NAMES, Settings
 from origami_sim.effects import CATALOGUE, Parameter, get
 from origami_sim.errors import InputError
 from origami_sim.files import write_text
@@ -283,6 +286,9 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
         *(f"# Left out, as it is an error of the recording: {e}" for e in of_channels(diagnosis, settings)),
         "",
     ]
+    words = {DEVICE: _beside(scene, Path(path).parent), "panels": settings.panels, "motion": settings.motion}
+    lines += [f"{n} = {_toml(w)}" for n, w in (words | {"accuracy": settings.accuracy}).items() if w is not None]
+    lines.append("")
     for s in settings.values():
         value, source, uncertainty = s.value, s.source, s.uncertainty
         number = numbers.get(s.name)
@@ -308,6 +314,13 @@ def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, s
             lines.append(f"{name} = {_toml(value)}  # [{p.unit}] {p.meaning}")
         lines.append("")
     return write_text(path, "\n".join(lines))
+
+
+def _beside(device: str, folder: Path) -> str:
+    """A device as a calibration in a folder names it: its file from there, whatever the working folder is."""
+    place, function = re.fullmatch(r"(.*?)(:\w+)?", device, re.S).groups()  # type: ignore[union-attr]
+    file = place and Path(place).exists() and place not in NAMES
+    return Path(os.path.relpath(place, folder)).as_posix() + (function or "") if file else device
 
 
 def _toml(value) -> str:
