@@ -39,7 +39,7 @@ def run(args: Namespace) -> dict[str, Any]:
     name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module).override(args.set, "--set")
     model, parameters, drive, *_ = module.build(settings)
-    found: dict[str, Any] = tables(model, parameters)
+    found: dict[str, Any] = {**tables(model, parameters), "notes": getattr(module, "noted", [])}
     if args.save:
         if Path(args.save).suffix != ".toml":
             raise InputError("a design is a TOML file", field="--save", value=args.save, allowed="my_flap.toml")
@@ -57,7 +57,7 @@ def text(found: dict[str, Any]) -> str:
         f"{n}\n{format_table(t)}\n" for n, t in found.items() if isinstance(t, dict) and len(next(iter(t.values())))
     ]
     said = [f"design: {found['design']}"] if "design" in found else []
-    return "\n".join([*parts, *said, f"picture: {found['picture']}"])
+    return "\n".join([*parts, *found.get("notes", []), *said, f"picture: {found['picture']}"])
 
 
 def tables(model: Model, parameters: Parameters) -> dict[str, dict[str, list]]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from origami_sim.design.calibrated import Calibrated
+from origami_sim.design.creases import Creases
 from origami_sim.design.dielectric import Electrodes
 from origami_sim.design.ground import Contact, Ground, Grounds
 from origami_sim.design.masses import LEVEL, Stated, positive
@@ -23,7 +23,7 @@ from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagneti
 from origami_sim.quantities import converted
 
 
-class Sheet(Grounds, Electrodes, Thick, Calibrated):
+class Sheet(Grounds, Electrodes, Thick, Creases):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -121,6 +121,7 @@ class Sheet(Grounds, Electrodes, Thick, Calibrated):
             dihedral_angles(self.mesh.vertices, self.mesh.creases),
             pattern.rest_angles[self.mesh.crease_edge],
         )
+        self._rest_stated = ~np.isnan(pattern.rest_angles[self.mesh.crease_edge])
         self._electrodes = np.zeros(len(self.mesh.creases) + len(self.mesh.bends), np.int32)
 
     def _refuse_overlap(self) -> None:
@@ -134,41 +135,6 @@ class Sheet(Grounds, Electrodes, Thick, Calibrated):
             )
 
     # what a designer states ------------------------------------------------------------------------------------
-
-    @statement(stiffness="N m/rad", rest_angle="rad", loss_time="s")
-    def crease(
-        self,
-        creases=None,
-        *,
-        stiffness=None,
-        rest_angle=None,
-        loss_time: float | None = None,
-        damping_ratio: float | None = None,
-    ) -> "Sheet":
-        """Elastic creases, with a Kelvin-Voigt loss if asked for.
-
-        Args:
-            creases: indices (default: all). stiffness: [N m/rad]. rest_angle: [rad].
-            loss_time: beta [s], viscosity = beta * stiffness (tan delta = beta omega), for all creases.
-            damping_ratio: instead of loss_time, a ratio of critical for the crease with the lighter panel swinging.
-        """
-        self.on("crease")
-        index = self._index("crease", creases)
-        for name, value in (("loss_time", loss_time), ("damping_ratio", damping_ratio)):
-            if value is not None and not 0 <= value < np.inf:
-                raise InputError("a loss cannot be negative", field=name, value=value, allowed=">= 0")
-        if stiffness is not None:
-            if not np.all(np.asarray(stiffness, float) >= 0):
-                raise InputError(
-                    "a crease stiffness cannot be negative", field="stiffness", value=stiffness, allowed=">= 0"
-                )
-            self._crease_stiffness[index] = stiffness
-        if rest_angle is not None:
-            self._rest[index] = rest_angle
-        if loss_time is not None or damping_ratio is not None:
-            self._viscous_creases = (loss_time or 0.0, damping_ratio or 0.0)
-            self.on("crease_viscosity")
-        return self
 
     @statement(moment="N m", viscosity="N m s/rad")
     def yields(

@@ -272,7 +272,9 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
 
     def whole(s: Settings, **options):
         try:
-            return built(tuple(raw(s, **options)), path)
+            parts = raw(s, **options)
+            out.noted = parts[0].unused_targets() if parts and isinstance(parts[0], Sheet) else []
+            return built(tuple(parts), path)
         except InputError as e:
             raise e if e.file is not None else InputError(str(e), file=path) from None
         except (Exception, SystemExit) as e:
@@ -284,7 +286,9 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
 
     def run(s: Settings, progress: Progress | None = None) -> Outcome:
         model, parameters, drive, *_ = out.build(s)
-        return outcome_of(timed(s, model, parameters, drive, progress=progress))
+        motion = timed(s, model, parameters, drive, progress=progress)
+        motion.notes += out.noted
+        return outcome_of(motion)
 
     def replicate(s: Settings, recording: Recording, progress: Progress | None = None) -> tuple[Trajectory, Settings]:
         """What was recorded, from where it begins, in the drive that was recorded over the device's own."""
