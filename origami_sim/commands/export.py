@@ -7,7 +7,7 @@ from pathlib import Path
 from origami_sim.commands.progress import Bar
 from origami_sim.errors import InputError
 
-SUMMARY = "Write a run as glTF, OBJ, FOLD or a moving picture"
+SUMMARY = "Write a run as glTF, OBJ, STL, FOLD or a moving picture"
 EXAMPLE = "origami-sim export runs/box --to box.webp; origami-sim export runs/box --to box.fold --at 1.5"
 
 
@@ -15,7 +15,12 @@ def register(parser: argparse.ArgumentParser) -> None:
     """The options of `export`."""
     add = parser.add_argument
     add("run", help="run folder")
-    add("--to", required=True, metavar="FILE", help=".glb, .webp, .gif, .mp4 (all frames); .obj, .fold, .png (one)")
+    add(
+        "--to",
+        required=True,
+        metavar="FILE",
+        help=".glb, .webp, .gif, .mp4 (all frames); .obj, .stl, .fold, .png (one)",
+    )
     add("--at", type=float, metavar="SECONDS", help="time of the one frame (default: most folded)")
     add("--start", type=float, metavar="SECONDS", help="leave out what was before")
     add("--stop", type=float, metavar="SECONDS", help="leave out what came after")
@@ -30,8 +35,11 @@ def export(args: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     from origami_sim.commands.cli import OK, _print_json
     from origami_sim.results.run_folder import load_run
+    from origami_sim.view.export import SUFFIXES
     from origami_sim.view.export import export as write
 
+    if Path(args.to).suffix.lower() not in SUFFIXES:
+        raise InputError("no such format", field="--to", value=args.to, allowed=", ".join(SUFFIXES))
     how = {}
     if args.size is not None:
         found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", args.size)
@@ -54,8 +62,11 @@ def export(args: argparse.Namespace) -> int:
         **how,
     )
     size = file.stat().st_size
+    failed = [str(f) for f in run.trajectory.failures if f.world == args.world]
     if args.json:
-        _print_json({"file": str(file), "bytes": size})
+        _print_json({"file": str(file), "bytes": size, "failures": failed})
     else:
+        for sentence in failed:
+            print(f"note: it ends where the run failed: {sentence}")
         print(f"{file}: {size / 1024:.0f} KiB")
     return OK

@@ -15,7 +15,7 @@ from origami_sim.view.gltf import glb
 from origami_sim.view.moving import RATE, write_moving
 from origami_sim.view.picture import nearest_frame
 
-ONE_FRAME, ALL_FRAMES = (".obj", ".fold", ".png"), (".glb", *RATE)
+ONE_FRAME, ALL_FRAMES = (".obj", ".stl", ".fold", ".png"), (".glb", *RATE)
 SUFFIXES = (*ALL_FRAMES, *ONE_FRAME)
 
 
@@ -33,8 +33,9 @@ def export(
 ) -> Path:
     """Writes a run, or one frame of it, in the format that the file's suffix names.
 
-    Moving: .glb (glTF 2.0), .webp, .gif, .mp4 (with PyAV). One frame: .obj (metres, triangles), .fold (metres,
-    triangles; creases are mountains and valleys with the fold angles that they have then), .png.
+    Moving: .glb (glTF 2.0), .webp, .gif, .mp4 (with PyAV). One frame: .obj, .stl (metres, triangles), .fold (metres,
+    triangles; creases are mountains and valleys with the fold angles that they have then), .png. What moves ends where
+    its world failed, as the frames after that only repeat the last sound one.
 
     Args:
         source: a trajectory, or a run that has one. path: the file; one that is there is written over.
@@ -50,7 +51,7 @@ def export(
     file = Path(path).expanduser()
     suffix = file.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError("no such format", field="suffix", value=suffix or str(path), allowed=", ".join(SUFFIXES))
+        raise InputError("no such format", field="path", value=suffix or str(path), allowed=", ".join(SUFFIXES))
     if not file.absolute().parent.is_dir():
         raise InputError("there is no such folder", file=file.parent)
     if at is not None and suffix in ALL_FRAMES:
@@ -62,10 +63,10 @@ def export(
                 "is an option of pictures", field=name, value=how[name], allowed=f"with {', '.join(pictures)}"
             )
     trajectory = source if isinstance(source, Trajectory) else source.trajectory
-    film = Film(between(trajectory, start, stop), world=world, title=title)
+    film = Film(between(until_failure(trajectory, world), start, stop), world=world, title=title)
     if suffix == ".glb":
         write_atomic(file, glb(film))
-    elif suffix == ".obj":
+    elif suffix in (".obj", ".stl"):
         nodes, triangles = _used(film)
         write_mesh(film.x[nearest_frame(film, at)][nodes], triangles, file)
     elif suffix == ".fold":
@@ -98,7 +99,17 @@ def between(trajectory: Trajectory, start: float | None, stop: float | None) -> 
         )
     arrays = {n: getattr(trajectory, n)[kept] for n in ("times", "x", "v", "angles", "gaps", "contact_forces")}
     cut = {n: {k: v[kept] for k, v in getattr(trajectory, n).items()} for n in ("energies", "work")}
-    return replace(trajectory, **arrays, **cut)
+    failures = [f for f in trajectory.failures if stop is None or f.time <= stop + slack]
+    return replace(trajectory, **arrays, **cut, failures=failures)
+
+
+def until_failure(trajectory: Trajectory, world: int) -> Trajectory:
+    """The frames of a run up to where a world failed: those after it repeat the last one that was sound."""
+    times = [f.time for f in trajectory.failures if f.world == world]
+    if not times:
+        return trajectory
+    end = max(min(times), float(trajectory.times[0]))
+    return replace(between(trajectory, None, end), failures=trajectory.failures)
 
 
 def _used(film: Film) -> tuple[np.ndarray, np.ndarray]:

@@ -205,6 +205,8 @@ class Artist:
         span = film.times[-1] - film.times[0]
         digits = 0 if span > 100 else 1 if span > 10 else 2 if span > 0.5 else 4
         out = [f"{film.times[f]:.{digits}f} s"] if span > 0 else []
+        if f == len(film.times) - 1 and any(failed.world == film.world for failed in film.trajectory.failures):
+            out.append("the run failed here")
         field_ = np.linalg.norm([film.channel(f"field_{i}") for i in "xyz"], axis=0)
         for size, symbol, of, usual in (
             (field_, "B", "T", "m"),

@@ -61,6 +61,7 @@ def model_html(model: "Model") -> str:
 
 def trajectory_html(t: "Trajectory") -> str:
     """A run as a table and a moving picture of its first world."""
+    from origami_sim.view.export import until_failure
     from origami_sim.view.film import Film
     from origami_sim.view.moving import moving_picture
 
@@ -73,8 +74,9 @@ def trajectory_html(t: "Trajectory") -> str:
         **{f"world {f.world}": str(f) for f in t.failures[:3]},
         **{f"note {i + 1}": n for i, n in enumerate(t.notes)},
     }
-    moving = moving_picture(Film(t), ".webp", rate=12, seconds=min(4.0, max(1.0, float(t.times[-1] - t.times[0]))),
-                            width=WIDTH, height=HEIGHT) if len(t.model.triangles) else b""  # fmt: skip
+    film = Film(until_failure(t, 0)) if len(t.model.triangles) else None
+    moving = moving_picture(film, ".webp", rate=12, seconds=min(4.0, max(1.0, float(t.times[-1] - t.times[0]))),
+                            width=WIDTH, height=HEIGHT) if film is not None else b""  # fmt: skip
     return card(type(t).__name__, rows, moving, "image/webp")
 
 

@@ -2,6 +2,7 @@
 
 import builtins
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from PIL import Image
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.pattern import hinge_angles, read_fold, triangulate
-from origami_sim.view.export import between, export
+from origami_sim.results.run_folder import save_run
+from origami_sim.solve.motion.dynamics import Failure
+from origami_sim.view.export import between, export, until_failure
 from origami_sim.view.film import Film
 from origami_sim.view.interactive import figure, scripts
 from origami_sim.view.palette import COLOURS
@@ -60,6 +63,8 @@ def test_obj_and_fold_of_a_frame(motion, tmp_path):
     at = float(motion.times[3])
     mesh = trimesh.load(export(motion, tmp_path / "a.obj", at=at), process=False)
     assert np.asarray(mesh.vertices) == pytest.approx(motion.x[3, :, 0], abs=1e-9)
+    printed = trimesh.load(export(motion, tmp_path / "a.stl", at=at))
+    assert len(printed.faces) == len(TRIANGLES) and printed.area == pytest.approx(mesh.area)
     pattern = read_fold(export(motion, tmp_path / "a.fold", at=at, title="swing"), scale=1.0)
     assert pattern.vertices == pytest.approx(motion.x[3, :, 0], abs=1e-12)
     (valley,) = pattern.edges_assigned("V")
@@ -109,6 +114,46 @@ def test_part_of_a_motion(motion):
     assert len(cut.times) == len(cut.x) == len(cut.energies["crease"]) == 5
     with pytest.raises(InputError, match="no frame of the run"):
         between(motion, 5.0, 6.0)
+
+
+def failed(motion, at: float):
+    """The same motion as a run that failed at a time: what follows repeats the last sound frame."""
+    x, last = motion.x.copy(), int(np.searchsorted(motion.times, at, side="right")) - 1
+    x[last + 1 :] = x[last]
+    return replace(motion, x=x, failures=[Failure(1, at, 4, "no equilibrium is found")]), last
+
+
+@pytest.mark.parametrize("between_frames", [0.0, 0.004])
+def test_a_film_ends_where_its_world_failed(motion, tmp_path, between_frames):
+    run, last = failed(motion, float(motion.times[5]) + between_frames)
+    assert last == 5
+    document, binary = opened(export(run, tmp_path / "a.glb", world=1))
+    times = array(document, binary, document["animations"][0]["samplers"][0]["input"])[:, 0]
+    assert times == pytest.approx(run.times[:6], abs=1e-6)
+    sound, binary = opened(export(run, tmp_path / "b.glb", world=0))
+    times = array(sound, binary, sound["animations"][0]["samplers"][0]["input"])[:, 0]
+    assert len(times) == FRAMES
+    with pytest.raises(InputError, match=r"outside of the run.*0 to 0\.0833333 s"):
+        export(run, tmp_path / "a.obj", at=float(run.times[8]), world=1)
+    artist = Artist(Film(until_failure(run, 1), world=1))
+    assert "the run failed here" in artist._said(5) and "the run failed here" not in artist._said(4)
+    before = between(until_failure(run, 1), None, float(run.times[3]))
+    assert not before.failures and "the run failed here" not in Artist(Film(before, world=1))._said(3)
+
+
+def test_a_run_that_fails_at_once_shows_its_first_frame(motion):
+    assert len(until_failure(failed(motion, 0.0)[0], 1).times) == 1
+
+
+def test_the_command_says_where_a_film_ends(motion, call, tmp_path):
+    run, _ = failed(motion, float(motion.times[5]))
+    save_run(tmp_path / "run", run, scene="swing")
+    code, out, _ = call("export", "run", "--to", "a.stl", "--world", "1")
+    assert code == 0 and "note: it ends where the run failed: world 1 went unstable at t = 0.0833333 s" in out
+    code, out, _ = call("export", "run", "--to", "a.stl", "--world", "0", "--json")
+    assert code == 0 and json.loads(out)["failures"] == []
+    code, _, err = call("export", "run", "--to", "a.xyz")
+    assert code == 2 and "no such format (field '--to', value 'a.xyz')" in err
 
 
 @pytest.mark.parametrize(
