@@ -209,11 +209,13 @@ def _parser() -> argparse.ArgumentParser:
     p = command(
         "stride",
         _stride,
-        "Regression of stride per cycle: against the stored reference and the paper",
-        "origami-sim stride crawler",
+        "Stride per cycle of a device; of the crawler, against the stored reference and the paper",
+        "origami-sim stride my_walker.py --cycles 8; origami-sim stride crawler",
     )
-    p.add_argument("scene", nargs="?", default="crawler", help="a scene that walks (default crawler)")
-    p.add_argument("--cycles", type=int, help="cycles to walk (default: those of the reference)")
+    p.add_argument("scene", nargs="?", default="crawler", help="crawler (default), my_walker.py or my_walker.toml")
+    p.add_argument("--cycles", type=int, help="cycles to walk (default: those of the reference, of the device, or 5)")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a device")
 
     p = command(
         "demo",
@@ -444,20 +446,9 @@ def _show(args) -> int:
 
 
 def _stride(args) -> int:
-    from origami_sim.device.scene import scene_module, scene_settings
-    from origami_sim.observation.gait import strides
+    from origami_sim.commands import stride
 
-    stored, module = import_module("origami_sim.studies.strides"), scene_module(args.scene)
-    if not hasattr(module, "walk"):
-        raise InputError("this scene does not walk", field="scene", value=args.scene, allowed="crawler")
-    settings = scene_settings(module)
-    if args.cycles is not None and args.cycles < 1:
-        raise InputError("walking takes whole cycles", field="--cycles", value=args.cycles, allowed=">= 1")
-    cycles = args.cycles or len(stored.reference(args.scene)["strides_mm"])
-    motion = module.walk(settings, cycles=cycles, progress=Bar(args.scene))
-    report = stored.check(args.scene, strides(motion, settings.frequency), settings=settings)
-    _print_json(report.to_json()) if args.json else print(report.text())
-    return OK if report.passed else NO
+    return stride.run(args)
 
 
 def _demo(args) -> int:

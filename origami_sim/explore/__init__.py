@@ -10,7 +10,7 @@
 of what was `Found` there, such as `angle("hinge")` or any of your own.
 """
 
-from origami_sim.explore.found import Found, Way, angle, find, moved
+from origami_sim.explore.found import Found, Way, angle, find, moved, stride
 from origami_sim.explore.gradients import Gradient, gradient
 from origami_sim.explore.search import Solution, optimise, solve_for
 from origami_sim.explore.sweep import Sweep, sweep
@@ -27,5 +27,6 @@ __all__ = [
     "moved",
     "optimise",
     "solve_for",
+    "stride",
     "sweep",
 ]

@@ -3,6 +3,7 @@
 import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from origami_sim.device.scene import Setting, Settings, scene_settings
 from origami_sim.errors import InputError, nearest
 from origami_sim.explore.found import Device, Found, Measure, Way, at
 from origami_sim.explore.sweep import MOST, ROWS, Sweep, sweep
+from origami_sim.observation.gait import period
 from origami_sim.quantities import parsed
 from origami_sim.results.printing import print_json
 from origami_sim.results.run_folder import check_writable, format_table
@@ -28,6 +30,9 @@ def run(args: Namespace) -> int:
     name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module).override(args.set, "--set")
     grid = _grid(settings, args.vary)
+    for name in (text.partition("=")[0].strip() for text in args.set):
+        if name in grid:
+            raise InputError("is set and varied at once", field="--set", value=name, allowed="either --set or --vary")
 
     def build(**values):
         return module.build(settings.replace(**values))
@@ -36,13 +41,19 @@ def run(args: Namespace) -> int:
     if not (folder / ROWS).is_file():  # an earlier sweep goes on
         check_writable(folder)
     first = at(build, {n: v[0] for n, v in grid.items()})
-    columns, pair = measures(first), [part.strip() for part in (args.pareto or "").split(",")]
+    columns, pair = (
+        measures(first, cycles=not args.equilibrium),
+        [part.strip() for part in (args.pareto or "").split(",")],
+    )
     if args.pareto:  # told before anything is computed
         _check_front(pair, [n for n in grid if not isinstance(settings[n].value, (str, bool))] + [*columns])
     duration = None
     if not args.equilibrium:
         stated = float(settings["duration"].value) if "duration" in settings else 0.0
         duration = stated or lasting(first.drive)
+        if not stated and period(first.drive) is not None:  # each point has its own
+            points = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+            duration = max(lasting(at(build, point).drive) for point in points)
     way = Way(duration=duration, rate=float(settings["rate"].value) if "rate" in settings else 60.0)
     found = sweep(build, grid, columns, way=way, folder=folder, progress=_progress)
     table = folder / "sweep.parquet"
@@ -54,8 +65,12 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def measures(d: Device) -> dict[str, Measure]:
-    """What is measured of any device: angles of its creases, the largest turn, its mass, and where it goes."""
+def measures(d: Device, *, cycles: bool = False) -> dict[str, Measure]:
+    """What is measured of any device: angles of its creases, the largest turn, its mass, and where it goes.
+
+    Args:
+        d: the device. cycles: whether it moves, so that a periodic drive has strides [mm per cycle].
+    """
     names = list(dict.fromkeys(d.model.name("crease", c) for c in range(len(d.model.creases))))
     out: dict[str, Measure] = {}
     if len(names) <= NAMED:
@@ -65,6 +80,8 @@ def measures(d: Device) -> dict[str, Measure]:
     out["mass_g"] = _mass
     if len(d.model.contacts):
         out |= {f"moved_{a}_mm": _went(a) for a in "xy"}
+        if cycles and period(d.drive) is not None:
+            out |= {f"stride_{a}_mm": _stride(a) for a in "xy"}
     return out
 
 
@@ -80,6 +97,10 @@ def _largest(found: Found) -> float:
 
 def _mass(found: Found) -> float:
     return 1e3 * found.mass()
+
+
+def _stride(axis: str) -> Measure:
+    return lambda found: 1e3 * found.stride(axis)
 
 
 def _went(axis: str) -> Measure:

@@ -14,6 +14,7 @@ from origami_sim.effects import SHELLS, get
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.contact import engaged
+from origami_sim.observation.gait import advances, period, summary
 from origami_sim.quantities import ANY, Quantity, converted
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.motion.dynamics import Trajectory, simulate
@@ -117,6 +118,23 @@ class Found:
         start = self.model.position if self.motion is None else self.motion.x[0, :, 0]
         return float((mass * (self.x - start)).sum(axis=0)["xyz".index(axis)] / mass.sum())
 
+    def stride(self, axis: str = "x") -> float:
+        """Stride of a periodic gait [m per cycle]: mean way of the centre of mass along an axis, once it is steady.
+
+        A cycle is the period of the drive, so that strides at different frequencies compare. The first two cycles do
+        not count where more than three are whole. nan where the drive has no period, or no cycle is whole.
+
+        Raises:
+            InputError: there is no such axis; the device is at rest, which has no gait.
+        """
+        if axis not in ("x", "y", "z"):
+            raise InputError("there is no such axis", field="axis", value=axis, allowed="x, y, z")
+        if self.motion is None:
+            raise InputError("what is at rest has no stride", field="way", value=None, allowed="Way(duration=...)")
+        lasts = period(self.drive)
+        each = np.zeros((0, 3)) if lasts is None else advances(self.motion, lasts)
+        return summary(each[:, "xyz".index(axis)])["mean"] if len(each) else float("nan")
+
 
 Measure = Callable[[Found], float]
 
@@ -129,6 +147,11 @@ def angle(crease: int | str) -> Measure:
 def moved(axis: str = "x") -> Measure:
     """The measure that is the way of the centre of mass along an axis [m]."""
     return _in("m", lambda found: found.moved(axis))
+
+
+def stride(axis: str = "x") -> Measure:
+    """The measure that is the stride of a periodic gait along an axis [m per cycle], see `Found.stride`."""
+    return _in("m", lambda found: found.stride(axis))
 
 
 def _in(unit: str, measure: Measure) -> Measure:

@@ -2,8 +2,11 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
 
+from origami_sim.drive import Drive
 from origami_sim.errors import InputError
+from origami_sim.model import node_mass
 from origami_sim.solve.motion.dynamics import Trajectory
 
 SKIP = 2
@@ -25,6 +28,44 @@ def strides(motion: Trajectory, frequency: float, *, world: int = 0) -> np.ndarr
     if len(x) < 2:
         raise InputError("the run is shorter than one cycle", field="duration", value=float(motion.times[-1]))
     return np.diff(x)
+
+
+def period(drive: Drive) -> float | None:
+    """Period of a drive [s]: of its slowest wave, of which all others are harmonics.
+
+    None where nothing of it oscillates, a channel follows samples (a ramp, a recording) or waves have no common period
+    of this kind. Of several worlds, the first.
+    """
+    frequencies = []
+    for signal in drive.signals.values():
+        one = signal.each()[0]
+        if one.values is not None and np.any(np.asarray(one.scale) * np.ptp(one.values)):
+            return None
+        if np.any(one.amplitude) and np.any(one.frequency):
+            frequencies.append(abs(float(one.frequency)))
+    if not frequencies:
+        return None
+    ratios = np.array(frequencies) / min(frequencies)
+    return 1.0 / min(frequencies) if np.allclose(ratios, np.round(ratios)) else None
+
+
+def advances(motion: Trajectory, lasts: float, *, world: int = 0) -> np.ndarray:
+    """Way [cycles, 3] of the centre of mass in each whole cycle of a motion [m].
+
+    Between frames it is that of the cubic which has the places and speeds of the frames (of motions without inertia, a
+    straight line).
+
+    Args:
+        motion: what moves. lasts: period of a cycle [s]. world: which of the worlds.
+    """
+    cycles = int((motion.times[-1] - motion.times[0]) / lasts * (1 + 1e-9))
+    at = np.minimum(motion.times[0] + lasts * np.arange(cycles + 1), motion.times[-1])
+    mass = node_mass(motion.model, motion.parameters)
+    mass = mass[:, min(world, mass.shape[1] - 1)] / mass[:, min(world, mass.shape[1] - 1)].sum()
+    place, speed = (np.einsum("n,fni->fi", mass, a[:, :, world]) for a in (motion.x, motion.v))
+    if len(motion.times) > 1 and np.any(speed):
+        return np.diff(CubicHermiteSpline(motion.times, place, speed)(at), axis=0)
+    return np.diff(np.stack([np.interp(at, motion.times, p) for p in place.T], axis=1), axis=0)
 
 
 def summary(values: ArrayLike, *, skip: int = SKIP) -> dict[str, float]:

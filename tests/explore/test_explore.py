@@ -8,7 +8,7 @@ import pytest
 from origami_sim.design.build import Sheet
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
-from origami_sim.explore import Way, angle, find, gradient, moved, optimise, solve_for, sweep
+from origami_sim.explore import Way, angle, find, gradient, moved, optimise, solve_for, stride, sweep
 from origami_sim.explore.found import number
 from origami_sim.pattern import miura, strip
 from origami_sim.physics.materials import MU0
@@ -351,6 +351,57 @@ def test_sweep_from_the_command_line(call, tmp_path):
     assert again["computed"] == 0 and again["columns"] == first["columns"]
     code, out, _ = call("sweep", "my_flap.py", "--vary", "gap=2mm", "--equilibrium", "--out", "rest")
     assert code == 0 and "hinge_deg" in out
+
+
+def test_a_setting_is_set_or_varied(call, tmp_path):
+    code, _, err = call("sweep", "my_flap.py", "--set", "gap=2mm", "--vary", "gap=1mm,2mm")
+    assert code == 2 and "is set and varied at once (field '--set', value 'gap')" in err and err.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
+
+
+WALKER = """
+import numpy as np
+from origami_sim import Drive, Sheet, si, sine
+from origami_sim.pattern.assemble import assemble
+
+def build(field="10 mT", frequency="2 Hz"):
+    x, z = si("17 mm"), si("10 mm")
+    places = [(X, 6e-3 * y, Z) for X, Z in ((-x, 0), (0, z), (x, 0)) for y in (-1, 1)]
+    sheet = Sheet(assemble(places, [(0, 2, 3, 1), (2, 4, 5, 3)]), thickness="0.5 mm", material="pet", panels="rigid")
+    sheet.crease(stiffness="0.3 mN m/rad", loss_time="10 ms")
+    for panel, side in ((0, 1), (1, -1)):
+        sheet.magnetise(panel, remanence="0.1 T", volume="60 mm^3", poling=(side * x, 0, z))
+    sheet.feet([0, 1, 4, 5], height=0, friction=0.2, backward=0.6).ground(nodes=(), friction=0.2)
+    return sheet, Drive(field=(0, 0, sine(field, frequency)))
+"""
+
+
+def test_strides_are_by_cycle_and_moved_over_the_whole(call, tmp_path):
+    """With five cycles each, however long they last; `stride` of the command line finds the same."""
+    (tmp_path / "walker.py").write_text(WALKER)
+    code, out, err = call("sweep", "walker.py", "--vary", "frequency=4,2", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)["columns"]
+    moved, each = np.array(found["moved_x_mm"]), np.array(found["stride_x_mm"])
+    assert each == pytest.approx(each[0], rel=0.02) and 1.0 < each[0] < 5.0  # slow: inertia hardly matters
+    assert moved[0] == pytest.approx(10 * each[0], rel=0.05)  # as long as the slower one takes for five
+    assert moved[1] == pytest.approx(5 * each[1], rel=0.05)
+    code, out, err = call("stride", "walker.py", "--set", "frequency=4", "--json")
+    one = json.loads(out)
+    assert (code, err) == (0, "") and len(one["columns"]["cycle"]) == 5 and one["numbers"]["period_s"] == 0.25
+    assert one["numbers"]["stride_x_mm"] == pytest.approx(each[0], rel=1e-3)
+    code, out, _ = call("stride", "walker.py", "--cycles", "4")
+    assert code == 0 and "mm per cycle of 0.5 s, of the centre of mass over the last 2 cycles" in out
+    assert "stride_x_mm" not in call("sweep", "walker.py", "--vary", "field=1mT", "--equilibrium")[1]
+
+
+def test_what_has_no_period_has_no_stride(call):
+    code, _, err = call("stride", "my_flap.py")
+    assert code == 2 and "my_flap.py: the drive has no period (field 'drive'); allowed: sine(...)" in err
+    with pytest.raises(InputError, match="at rest has no stride"):
+        sweep(flap, {"gap": [2e-3]}, {"s": stride("x")})
+    with pytest.raises(InputError, match=r"no such axis.*'w'"):
+        sweep(flap, {"gap": [2e-3]}, {"s": stride("w")})
 
 
 @pytest.mark.parametrize(
