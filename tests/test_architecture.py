@@ -26,6 +26,7 @@ ORDER = (
 LATE = {
     ("model", "view"): "a notebook draws a model: only who looks pays for the drawing",
     ("solve.motion", "view"): "the same of a trajectory",
+    ("solve.statics", "solve.motion"): "a path of equilibria as frames: the same",
     ("observation", "view"): "the same of a comparison",
     ("view", "folding"): "what is told of a folding beside its drawing",
     ("device", "observation"): "a comparison begins where channels show the device",

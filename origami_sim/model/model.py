@@ -385,6 +385,28 @@ class State:
         return self.x.shape[1]
 
 
+def check_state(model: Model, state: object) -> None:
+    """Refuses a start that is no `State`, or of another shape than the model's.
+
+    Raises:
+        InputError: naming the array, its shape and the one that is needed.
+    """
+    if not isinstance(state, State):
+        allowed = "State.at_rest(model, position=x) with x [N, 3], or the state of an equilibrium or a motion"
+        raise InputError("is no state", field="state", value=type(state).__name__, allowed=allowed)
+    nodes, hinges = len(model.position), len(model.creases) + len(model.bends)
+    for name, shape in (("x", (nodes, "W", 3)), ("v", (nodes, "W", 3)), ("angles", (hinges, "W"))):
+        given = np.shape(getattr(state, name))
+        if len(given) != len(shape) or any(a != b for a, b in zip(given, shape, strict=True) if b != "W"):
+            raise InputError(
+                "a state has another shape than the model",
+                field=f"state.{name}",
+                value=given,
+                allowed=f"({', '.join(map(str, shape))}) with W worlds; State.at_rest(model, position=x) makes it of "
+                f"x [{nodes}, 3]",
+            )
+
+
 def _carry(model: Model, x: np.ndarray) -> None:
     """Moves the mass points in positions [N, W, 3] to where the corners of their panels are (Kabsch 1976)."""
     first = len(model.position) - len(model.carriers)

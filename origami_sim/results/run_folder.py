@@ -34,6 +34,7 @@ from origami_sim.errors import InputError, unwritable
 from origami_sim.model import PADS, Model, Parameters, State
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
+from origami_sim.view.film import HasTrajectory, trajectory_of
 from origami_sim.view.replay import write_replay
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ class Run:
 
 def save_run(
     path: str | Path,
-    trajectory: Trajectory,
+    trajectory: Trajectory | HasTrajectory,
     *,
     scene: str,
     tables: Mapping[str, Mapping[str, Sequence | np.ndarray]] | None = None,
@@ -120,7 +121,8 @@ def save_run(
     Files in an earlier run folder that are not part of a run (notes, pictures) are kept.
 
     Args:
-        path: the folder; its parents are made. scene: name of what was simulated.
+        path: the folder; its parents are made. trajectory: a motion, or a path of equilibria, a point a second.
+        scene: name of what was simulated.
         tables: name -> column -> values, all columns of a table equally long.
         units: column -> unit, for all tables; absent or "" for plain numbers and words.
         settings: JSON values for the manifest; "seed", "overrides" (a mapping) and "device" get keys of their own.
@@ -130,7 +132,7 @@ def save_run(
         InputError: the folder cannot be written, is a file or is not a run; a table whose columns differ in length or
             are not numbers or words; settings that are not JSON.
     """
-    target = Path(path).expanduser().absolute()
+    target, trajectory = Path(path).expanduser().absolute(), trajectory_of(trajectory)
     settings = dict(settings or {})
     manifest = _manifest(trajectory, scene, settings) | {"tables": sorted(tables or {})}
     sheets = {name: _table(name, columns, units or {}) for name, columns in (tables or {}).items()}

@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State, carried_sides
+from origami_sim.model import Model, Parameters, State, carried_sides, check_state
 from origami_sim.model.contact import FRICTION, engaged, may_touch
 from origami_sim.pattern.intersections import crossing_pairs
 from origami_sim.solve.kernels.approach import approach
@@ -208,8 +208,10 @@ def continued(model: Model, parameters: Parameters, state: State | None) -> tupl
     """The model and parameters that a state is of: with contact, if it is the end of a run in which that acted.
 
     Raises:
-        InputError: a state of another model.
+        InputError: a state of another model, or what is none.
     """
+    if state is not None:
+        check_state(model, state)
     if state is None or not may_touch(model, parameters):
         return model, parameters
     rows = sum(size for *_, size in model.memories)

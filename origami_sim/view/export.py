@@ -10,7 +10,7 @@ from origami_sim.errors import InputError
 from origami_sim.pattern import Pattern, write_fold, write_mesh
 from origami_sim.pattern.files import write_atomic
 from origami_sim.solve.motion.dynamics import Trajectory
-from origami_sim.view.film import Film, HasTrajectory
+from origami_sim.view.film import Film, HasTrajectory, trajectory_of
 from origami_sim.view.gltf import glb
 from origami_sim.view.moving import RATE, write_moving
 from origami_sim.view.picture import nearest_frame
@@ -38,7 +38,8 @@ def export(
     its world failed, as the frames after that only repeat the last sound one.
 
     Args:
-        source: a trajectory, or a run that has one. path: the file; one that is there is written over.
+        source: a trajectory, a run that has one, or a path of equilibria, a point a second.
+        path: the file; one that is there is written over.
         at: time of the one frame [s] (default: where the creases are furthest from where they began).
         start, stop: part of the motion to be shown [s] (default: all). world: which of the worlds.
         title: name in the file. progress: called with the fraction done.
@@ -62,7 +63,7 @@ def export(
             raise InputError(
                 "is an option of pictures", field=name, value=how[name], allowed=f"with {', '.join(pictures)}"
             )
-    trajectory = source if isinstance(source, Trajectory) else source.trajectory
+    trajectory = trajectory_of(source)
     film = Film(between(until_failure(trajectory, world), start, stop), world=world, title=title)
     if suffix == ".glb":
         write_atomic(file, glb(film))

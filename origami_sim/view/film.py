@@ -33,6 +33,19 @@ class HasTrajectory(Protocol):
     def trajectory(self) -> Trajectory: ...
 
 
+def trajectory_of(source: object) -> Trajectory:
+    """The frames of a motion, of a run on disk, or of a path of equilibria.
+
+    Raises:
+        InputError: what has no frames.
+    """
+    found = source if isinstance(source, Trajectory) else getattr(source, "trajectory", None)
+    if not isinstance(found, Trajectory):
+        allowed = "a Trajectory of simulate() or quasistatic(), a Run of load_run(), a Path of continuation()"
+        raise InputError("has no frames to be shown", field="source", value=type(source).__name__, allowed=allowed)
+    return found
+
+
 class Film:
     """The geometry and the numbers of one world, in the order in which they are drawn. Lengths [m], times [s]."""
 

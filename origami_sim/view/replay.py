@@ -29,7 +29,7 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError, unwritable
 from origami_sim.recording import Recording
 from origami_sim.solve.motion.dynamics import Trajectory
-from origami_sim.view.film import WALK, Film, HasTrajectory
+from origami_sim.view.film import WALK, Film, HasTrajectory, trajectory_of
 from origami_sim.view.palette import COLOURS, PLOTTED, SERIES, length_text, nice, scaled
 from origami_sim.view.viewer import TIMELINE
 
@@ -54,7 +54,8 @@ def write_replay(
     takes the earlier one's place in a viewer. It is written beside `path` and then moved there.
 
     Args:
-        path: the .rrd file. source: a trajectory, or a run that has one. world: which of its worlds.
+        path: the .rrd file. source: a trajectory, a run that has one, or a path of equilibria. world: which of its
+            worlds.
         magnets: panels to colour as magnets (default: triangles that carry remanence).
         arms: panels to colour as arms. tip: node whose displacement is plotted (default: the one that moves most).
         recording: measured channels to be shown with the simulation.
@@ -63,7 +64,7 @@ def write_replay(
     Raises:
         InputError: no such world, panel or node; a file that cannot be written.
     """
-    trajectory = source if isinstance(source, Trajectory) else source.trajectory
+    trajectory = trajectory_of(source)
     scene = Film(trajectory, world, magnets, arms, tip, title)
     with writing(path, scene.application, scene.identity) as stream:
         stream.send_blueprint(_blueprint(scene, _write(scene, stream, recording)))

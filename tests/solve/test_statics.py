@@ -1,5 +1,7 @@
 """Statics against closed forms and an independent reduced model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -8,13 +10,19 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import fsolve
 from structures import flap, kresling, strip, tent, truss
 
+from origami_sim import Sheet
+from origami_sim import strip as pattern_strip
 from origami_sim.drive import Drive, ramp
 from origami_sim.errors import InputError
 from origami_sim.model import State
+from origami_sim.results.run_folder import save_run
 from origami_sim.solve.batch import forces
 from origami_sim.solve.motion.dynamics import simulate
+from origami_sim.solve.motion.quasistatic import quasistatic
 from origami_sim.solve.statics import system
 from origami_sim.solve.statics.equilibria import continuation, equilibrium, tangent
+from origami_sim.view.export import export
+from origami_sim.view.replay import write_replay
 
 # --- tangent
 
@@ -350,6 +358,73 @@ def test_kresling_snap_through():
     # stable up to the limit load, unstable under a held load beyond it
     assert np.all(path.stable[:peak]) and not np.any(path.stable[peak + 1 :])
     assert f"Path: {len(path.factor)} points" in repr(path) and len(repr(path)) < 300
+
+
+def test_energies_are_those_of_the_closed_form_and_their_differences_barriers():
+    a, h, stiffness = 1.0, 0.3, 100.0
+    model, parameters = truss(h, stiffness)
+    path = continuation(model, parameters, Drive(load=1.0), end=2.0)
+    z, rest = path.x[:, 2, 2], np.hypot(a, h)
+    np.testing.assert_allclose(path.energies["bars"], stiffness * (np.hypot(a, z) - rest) ** 2, atol=1e-12)
+    np.testing.assert_allclose(path.energies["load"], path.factor * z, atol=1e-12)
+    np.testing.assert_allclose(path.energy, path.energies["bars"] + path.energies["load"])
+    # without load: from one stable shape over the flat one to the other
+    over = equilibrium(
+        model, parameters, state=State.at_rest(model, position=model.position * [1, 1, 0]), unstable=True
+    )
+    up, down = (
+        equilibrium(model, parameters, state=State.at_rest(model, position=model.position * [1, 1, side]))
+        for side in (1.0, -1.0)
+    )
+    assert not over.stable and over.energy - up.energy == pytest.approx(stiffness * (a - rest) ** 2)
+    assert up.energy == pytest.approx(0.0, abs=1e-20) and down.energy == pytest.approx(0.0, abs=1e-20)
+    held = equilibrium(model, parameters, Drive(load=0.5))
+    bars = stiffness * (np.hypot(a, held.x[2, 2]) - rest) ** 2
+    acting = {n: e for n, e in held.energies.items() if e}
+    assert acting == {"bars": pytest.approx(bars), "load": pytest.approx(0.5 * held.x[2, 2])}
+
+
+def test_energy_of_rigid_panels_is_that_of_their_creases_and_loads():
+    sheet = Sheet(pattern_strip([0.01, 0.02], 0.02), thickness="1 mm", panels="rigid").fix(panels=[0])
+    model, parameters = sheet.crease(stiffness="2 mN m/rad").gravity().build()
+    found = equilibrium(model, parameters)
+    assert found.energies["crease"] == pytest.approx(0.5 * 2e-3 * found.angles[0] ** 2)
+    assert found.energies["crease"] > 0.0 > found.energies["gravity"]
+
+
+def test_a_path_is_saved_replayed_and_exported_point_by_point(tmp_path):
+    sheet = Sheet(pattern_strip([0.01, 0.02], 0.02), thickness="1 mm").fix(panels=[0])
+    model, parameters = sheet.crease(stiffness="2 mN m/rad").set("load", [4, 5], force_z=1e-2).build()
+    path = continuation(model, parameters, Drive(load=1.0), max_points=8)
+    motion = path.trajectory
+    assert len(motion.times) == len(path.factor) and np.array_equal(motion.x[:, :, 0], path.x)
+    assert motion.drive["load"](motion.times) == pytest.approx(path.factor)
+    assert np.array_equal(motion.energies["crease"][:, 0], path.energies["crease"])
+    run = save_run(tmp_path / "run", path, scene="flap")
+    assert run.replay.is_file() and np.array_equal(run.trajectory.x, motion.x)
+    assert write_replay(tmp_path / "p.rrd", path).is_file() and export(path, tmp_path / "p.glb").is_file()
+    rest = equilibrium(model, parameters)
+    for keep in (lambda: save_run(tmp_path / "no", rest, scene="flap"), lambda: export(rest, tmp_path / "no.glb")):
+        with pytest.raises(InputError, match=r"has no frames.*'Equilibrium'.*a Path of continuation\(\)"):
+            keep()
+    assert not (tmp_path / "no").exists()
+    nothing = replace(path, factor=path.factor[:0], x=path.x[:0], angles=path.angles[:0])
+    with pytest.raises(InputError, match="the path has no points"):
+        save_run(tmp_path / "no", nothing, scene="truss")
+
+
+@pytest.mark.parametrize("solve", [equilibrium, simulate, quasistatic])
+def test_a_start_of_another_shape_is_one_sentence(solve):
+    model, parameters = truss()
+    options = {equilibrium: {}, simulate: {"duration": 0.1}, quasistatic: {"times": [0.0, 0.1]}}[solve]
+    flat = replace(State.at_rest(model), x=model.position)
+    for state, said in (
+        (model.position, r"is no state \(field 'state', value 'ndarray'\); allowed: State.at_rest"),
+        (flat, r"another shape than the model \(field 'state.x', value \(3, 3\)\); allowed: \(3, W, 3\)"),
+        (State.at_rest(kresling()[0]), r"another shape .*field 'state.x'"),
+    ):
+        with pytest.raises(InputError, match=said):
+            solve(model, parameters, state=state, **options)
 
 
 def test_path_can_be_stopped_and_continued_from_its_states():

@@ -151,7 +151,14 @@ class RigidSystem:
             "mode": shape / (np.abs(shape).max() or 1.0),
             "reactions": np.full_like(x, np.nan),
             "message": message,
+            "energies": self._energies(state, time),
         }
+
+    def _energies(self, state: State, time: float) -> dict[str, float]:
+        """Potential energy [J] by effect, of those that have one."""
+        worlds = self._worlds
+        self._batch.place(np.repeat(state.x, worlds, axis=1), np.repeat(state.angles, worlds, axis=1))
+        return {n: float(e[0]) for n, e in self._batch.evaluate(time).energies.items()}
 
     def _clear(self, x: np.ndarray, new: np.ndarray) -> bool:
         """Whether panels that touch come from positions x [N, 3] to new ones without passing through each other."""

@@ -10,6 +10,7 @@ import math
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +19,7 @@ import scipy.sparse.linalg as spla
 from origami_sim.drive import Drive, Signal
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.model import Model, Parameters, State
+from origami_sim.model import Model, Parameters, State, check_state
 from origami_sim.model.clearance import gaps
 from origami_sim.model.contact import engaged, may_touch
 from origami_sim.model.distort import distorted
@@ -26,6 +27,9 @@ from origami_sim.solve.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid.statics import RigidSystem
 from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
 from origami_sim.solve.watch import STATED, Met, met_at, watch_of, with_memory, without_memory
+
+if TYPE_CHECKING:
+    from origami_sim.solve.motion.dynamics import Trajectory
 
 FURTHEST = 1e4
 """Range of the path parameter, in both directions."""
@@ -52,6 +56,9 @@ class Path:
         branch_points: indices after which the number of negative eigenvalues changes without a limit point.
         reached: whether the path came to its end. message: why it ended. wall: time that it took [s].
         touching: which panels met, so that the path is one with contact; empty if none did.
+        energies: [P] potential energy [J] by effect, of those that have one, loads and fields at the point's factor
+            among them.
+        model, parameters, drive: of one world, the latter by factor as if that were the time.
     """
 
     factor: np.ndarray
@@ -68,6 +75,26 @@ class Path:
     start: State = field(repr=False)
     wall: float = 0.0
     touching: str = ""
+    energies: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+    model: Model | None = field(default=None, repr=False)
+    parameters: Parameters | None = field(default=None, repr=False)
+    drive: Drive | None = field(default=None, repr=False)
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Potential energy [P] [J] of all effects that have one; at one factor, barriers are differences of it."""
+        return sum(self.energies.values(), np.zeros(len(self.factor)))
+
+    @property
+    def trajectory(self) -> "Trajectory":
+        """The points as the frames of a motion, a point a second, for `save_run`, `export` and `write_replay`.
+
+        Raises:
+            InputError: the path has no points.
+        """
+        from origami_sim.solve.motion.paths import frames  # only who looks pays for it
+
+        return frames(self)
 
     def __repr__(self) -> str:
         size = len(self.factor)
@@ -137,7 +164,7 @@ def equilibrium(
 
     Raises:
         InputError: a tolerance or iteration count that is not positive, no such world, no free node, a drive that
-            ends before `time`.
+            ends before `time`, a state of another shape than the model.
     """
     _positive(tolerance=tolerance, max_iterations=max_iterations)
     began = clock.perf_counter()
@@ -179,7 +206,9 @@ def _settled(model, parameters, drive, time, state, world, tolerance, max_iterat
         given = _one_world(model, parameters, drive or Drive(), time, state, world)
         return Equilibrium(**RigidSystem(*given).settle(time, tolerance, max_iterations, unstable))
     system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
-    return system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    found.energies = {n: float(e[0]) for n, e in system.energies([(found.x, found.angles, time)]).items()}
+    return found
 
 
 def continuation(
@@ -288,6 +317,8 @@ def _start(model, parameters, drive, time, state, world, fixed=None) -> tuple["S
 
 def _one_world(model, parameters, drive, time, state, world, fixed=None) -> tuple[Model, Parameters, Drive, State]:
     """Model, parameters, held drive and state of one world."""
+    if state is not None:
+        check_state(model, state)
     worlds = max(parameters.worlds, drive.worlds, state.worlds if state else 1)
     if not 0 <= world < worlds:
         raise InputError("there is no such world", field="world", value=world, allowed=f"0 to {worlds - 1}")
@@ -501,4 +532,8 @@ class _Tracer:
             reached=reached,
             message=message,
             start=s.state,
+            energies=s.energies([(p.x, p.angles, p.factor) for p in points]),
+            model=s.model,
+            parameters=s.inputs[0],
+            drive=s.inputs[1],
         )

@@ -6,8 +6,8 @@ other's forces, so they are moved in the same world (colouring of the squared co
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -82,6 +82,7 @@ class Equilibrium:
         touching: which panels met, so that it was found with contact that nobody had stated; empty if none did.
         frictionless: whether it touches a ground with friction, which is left out: with it, a device rests in a range
             of states around this one, and on a slope that has none without it.
+        energies: potential energy [J] by effect, of those that have one, loads, weight and fields among them.
     """
 
     state: State
@@ -100,6 +101,12 @@ class Equilibrium:
     wall: float = 0.0
     touching: str = ""
     frictionless: bool = False
+    energies: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def energy(self) -> float:
+        """Potential energy [J] of all effects that have one; of two equilibria, the difference counts."""
+        return float(sum(self.energies.values()))
 
     def __repr__(self) -> str:
         unit = "N m/rad" if np.all(np.isnan(self.reactions)) else "N/m"
@@ -189,7 +196,7 @@ class System:
         self.model, self.state = model, resting(state, state.x[:, 0], state.angles[:, 0])
         self.free = np.flatnonzero(model.free.ravel())
         self._one = Batch(model, parameters, drive, self.state)
-        self._inputs = parameters, drive
+        self.inputs = parameters, drive
         self._bound = self._couplings()
         apart = self._bound[0] < self._bound[1]
         self.edges = self._bound[:, apart].T
@@ -205,7 +212,7 @@ class System:
 
         Nodes of pairs that are about to touch are coupled as well; `follow` renews them.
         """
-        model, (parameters, drive), n = self.model, self._inputs, len(self.model.position)
+        model, (parameters, drive), n = self.model, self.inputs, len(self.model.position)
         self._steps, pairs = self._finest, [self._bound]
         if self.touches:
             self._margin, self._coupled = surface(model).margin, x.copy()
@@ -250,6 +257,14 @@ class System:
         """Largest force of any one effect on any axis of any node [N]."""
         self._one.place(x[:, None], angles[:, None])
         return max((float(np.abs(f).max(initial=0.0)) for f in self._one.evaluate(time).forces.values()), default=0.0)
+
+    def energies(self, points: Sequence[tuple[np.ndarray, np.ndarray, float]]) -> dict[str, np.ndarray]:
+        """Potential energy [P] [J] by effect that has one, at positions [N, 3] with angles [H], each at its time."""
+        found = []
+        for x, angles, time in points:
+            self._one.place(x[:, None], angles[:, None])
+            found.append(self._one.evaluate(time).energies)
+        return {n: np.array([e[n][0] for e in found]) for n in (found[0] if found else ())}
 
     def by_factor(self, x: np.ndarray, angles: np.ndarray, time: float, h: float) -> np.ndarray:
         """dF/dt [N, 3] at fixed positions."""
@@ -375,7 +390,7 @@ class System:
 
     def clear(self, x: np.ndarray, d: np.ndarray) -> float:
         """Largest share of a move d [N, 3] from x [N, 3] on which panels come no nearer than they may."""
-        return clear_share(self.model, self._inputs[0], x, d) if self.touches else 1.0
+        return clear_share(self.model, self.inputs[0], x, d) if self.touches else 1.0
 
     def spread(self, p: np.ndarray) -> np.ndarray:
         """A vector on the free axes as [N, 3]."""
