@@ -2,7 +2,13 @@
 
 import difflib
 import errno
-from collections.abc import Iterable
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -33,6 +39,44 @@ class InputError(ValueError):
             sentence += f"; allowed: {_brief(allowed, 1200)}"
         super().__init__(sentence + ".")
         self.what, self.file, self.field, self.value, self.allowed = what, file, field, value, allowed
+
+
+def misfit(name: str, signature: inspect.Signature, given: Mapping[str, Any], error: TypeError) -> InputError:
+    """The refusal of a call with arguments that a function does not have, or without one that it needs.
+
+    Args:
+        name: of the function, for the sentence. signature: its own. given: by name. error: what Python says of it.
+    """
+    known = [n for n in signature.parameters if n != "self"]
+    strange = next((n for n in given if n not in known), None)
+    if strange is None:
+        return InputError(f"{name} cannot be stated so ({error})", allowed=", ".join(known))
+    return InputError(
+        f"{name} has no such argument{nearest(strange, known)}",
+        field=strange,
+        value=given[strange],
+        allowed=", ".join(known),
+    )
+
+
+def named_arguments(function: Callable[P, R]) -> Callable[P, R]:
+    """Lets a function refuse arguments that it does not have by a sentence with the nearest name.
+
+    Raises:
+        InputError: of the function that is returned, on such arguments.
+    """
+    signature = inspect.signature(function)
+    name = getattr(function, "__qualname__", "").removesuffix(".__init__")
+
+    @functools.wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as e:
+            raise misfit(name, signature, kwargs, e) from None
+        return function(*args, **kwargs)
+
+    return checked
 
 
 class DiskFull(InputError):

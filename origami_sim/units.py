@@ -38,6 +38,9 @@ UNITS: dict[str, dict[str, float]] = {
 """Units by dimension with their factor to SI; the first of each dimension is the SI unit."""
 
 
+PLAIN = ("", "-", "1")
+"""How units of plain numbers are written."""
+
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "·": " ", "⋅": " ", "*": " ", "°": "deg", "²": "^2", "³": "^3"})
 _TOGETHER = {unit.replace(" ", ""): unit for units in UNITS.values() for unit in units if " " in unit}
 
@@ -68,6 +71,16 @@ def unit_factor(unit: str, *, dimension: str | None = None, file: object = None,
 def si_unit(unit: str) -> str:
     """The SI unit of the same dimension as `unit`, which must be known."""
     return next(next(iter(group)) for group in UNITS.values() if spelled(unit) in group)
+
+
+def of_unit(text: str, unit: str) -> str:
+    """A number or a range as a text, followed by its unit: "0 to 5 mm"; a plain number has none to be followed by."""
+    return text if unit in PLAIN else f"{text} {unit}"
+
+
+def in_unit(text: str, unit: str) -> str:
+    """A noun followed by the unit that it is in: "a number in mm"; a plain number is in none."""
+    return text if unit in PLAIN else f"{text} in {unit}"
 
 
 def with_prefix(value: float, unit: str) -> tuple[float, str]:

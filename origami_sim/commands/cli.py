@@ -302,19 +302,20 @@ def _run(args) -> int:
     if args.calibration and not args.json and (said := again.partly(module, args.calibration)):
         print(said)
     settings = settings.with_panels(args.panels or settings.panels)
-    settings = settings.with_motion(
-        "quasistatic" if args.quasistatic else settings.motion, args.until or settings.until
-    )
+    until = settings.until if args.until is None else args.until
+    settings = settings.with_motion("quasistatic" if args.quasistatic else settings.motion, until)
     if args.accuracy is not None:
         settings = settings.with_accuracy(args.accuracy)
     if args.settings:
+        from origami_sim.units import of_unit
+
         if args.json:
             _print_json({n: s.__dict__ for n, s in settings.items()})
         else:
             for s in settings.values():
                 limits = f", {s.range[0]:g} to {s.range[1]:g}" if s.range else ""
                 value = f"{s.value:g}" if isinstance(s.value, float) else s.value
-                print(f"{s.name} = {value} {s.unit}{limits}\n    {s.meaning}; {s.source}")
+                print(f"{s.name} = {of_unit(str(value), s.unit)}{limits}\n    {s.meaning}; {s.source}")
         return OK
     if pattern:
         return module.run(args, settings, Bar(name))

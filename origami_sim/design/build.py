@@ -14,11 +14,12 @@ from origami_sim.design.statements import statement
 from origami_sim.design.thick import Hinge, Thick
 from origami_sim.design.touch import Touch, refuse_overlap
 from origami_sim.effects import PAIRS
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, named_arguments, nearest
 from origami_sim.model import ALIKE, Model, Parameters, dihedral_angles
 from origami_sim.model.bodies import rigid
 from origami_sim.pattern import Pattern, triangulate
 from origami_sim.pattern.intersections import overlapping_pairs
+from origami_sim.pattern.triangulate import METHODS
 from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagnetising_factors, layered_rigidity, material
 from origami_sim.quantities import converted
 
@@ -46,6 +47,7 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
             overlap or pass through each other.
     """
 
+    @named_arguments
     def __init__(
         self,
         pattern: Pattern,
@@ -62,6 +64,9 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
     ):
         if panels not in ("elastic", "rigid"):
             raise InputError("no such panels", field="panels", value=panels, allowed="elastic, rigid")
+        if triangulation not in METHODS:
+            allowed = ", ".join(METHODS) + nearest(triangulation, METHODS)
+            raise InputError("unknown triangulation", field="triangulation", value=triangulation, allowed=allowed)
         self.pattern, self.panels = pattern, panels
         self.statements = []
         self.made = {
@@ -183,7 +188,7 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
             viscosity=viscosity,
         )
 
-    @statement(elasticity="Pa", membrane="N/m", bending="N m")
+    @statement(elasticity="Pa", membrane="N/m", bending="N m", poisson="1")
     def shell(
         self,
         *,
@@ -200,15 +205,15 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
         thickness, modulus, Poisson's ratio, rigidity and patch.
 
         Args:
-            poisson: Poisson's ratio instead of the material's.
+            poisson: Poisson's ratio instead of the material's, above -1, up to 0.5.
             elasticity: [3, 3] plane-stress stiffness [Pa], such as `orthotropic(...)`, for strains 11, 22 and twice 12.
             membrane, bending: [3, 3] stiffness of the whole thickness [N/m], [N m] instead of what follows from it.
             axis: the material's first axis in the reference state.
             relaxation: up to three Maxwell branches beside the elasticity, (stiffness over the elastic one, time [s]).
 
         Raises:
-            InputError: rigid panels, a matrix that is not symmetric and positive, an axis without direction, a branch
-                without stiffness or time.
+            InputError: rigid panels, a Poisson's ratio that no isotropic material has, a matrix that is not symmetric
+                and positive, an axis without direction, a branch without stiffness or time.
         """
         if self.panels == "rigid":
             raise InputError("rigid panels neither bend nor stretch", field="panels", value="rigid", allowed="elastic")
@@ -559,5 +564,6 @@ def _first_bad(value: np.ndarray) -> float:
 
 def _material(name: str, panel: int):
     if name not in MATERIALS:
-        raise InputError("unknown material", field=f"panel {panel}", value=name, allowed=", ".join(MATERIALS))
+        said = f"unknown material{nearest(name, MATERIALS)}"
+        raise InputError(said, field=f"panel {panel}", value=name, allowed=", ".join(MATERIALS))
     return material(name)

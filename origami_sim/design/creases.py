@@ -61,10 +61,14 @@ class Creases(Masses):
             damping_ratio: instead of loss_time, a ratio of critical for the crease with the lighter panel swinging.
 
         Raises:
-            InputError: no such crease, a value out of its bounds, a target of creases that the pattern gives none.
+            InputError: a sheet without creases, no such crease, a value out of its bounds, a target of creases that the
+                pattern gives none.
         """
         self.on("crease")
         index = self._index("crease", creases)
+        if creases is None and not len(index):
+            allowed = "a pattern with folds between its faces; Sheet.panel() and Sheet.shell() state how panels bend"
+            raise InputError("the sheet has no creases", field="creases", allowed=allowed)
         for name, value in (("loss_time", loss_time), ("damping_ratio", damping_ratio)):
             if value is not None and not 0 <= value < np.inf:
                 raise InputError("a loss cannot be negative", field=name, value=value, allowed=">= 0")

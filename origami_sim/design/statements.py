@@ -4,13 +4,13 @@ import copy
 import functools
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
 
 from origami_sim.effects import CONTACTS, get
-from origami_sim.errors import InputError, nearest
+from origami_sim.errors import InputError, misfit, nearest
 from origami_sim.quantities import converted
 
 P = ParamSpec("P")
@@ -37,7 +37,7 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
             try:
                 given = dict(signature.bind(self, *args, **kwargs).arguments)
             except TypeError as e:
-                raise _misfit(name, signature, kwargs, e) from None
+                raise misfit(f"Sheet.{name}", signature, kwargs, e) from None
             del given["self"]
             given = {n: list(v) if isinstance(v, Iterator) else v for n, v in given.items()}
             given |= given.pop(free, {}) if free else {}
@@ -58,20 +58,6 @@ def statement(**units: str) -> Callable[[Callable[Concatenate[S, P], R]], Callab
         return stated
 
     return wrap
-
-
-def _misfit(name: str, signature: inspect.Signature, given: Mapping[str, Any], error: TypeError) -> InputError:
-    """The refusal of a statement that was made with arguments it does not have, or without one that it needs."""
-    known = [n for n in signature.parameters if n != "self"]
-    strange = next((n for n in given if n not in known), None)
-    if strange is None:
-        return InputError(f"Sheet.{name} cannot be stated so ({error})", allowed=", ".join(known))
-    return InputError(
-        f"Sheet.{name} has no such argument{nearest(strange, known)}",
-        field=strange,
-        value=given[strange],
-        allowed=", ".join(known),
-    )
 
 
 class Statements(ABC):

@@ -469,9 +469,12 @@ def outcome_of(motion: Trajectory) -> Outcome:
         names = [model.name("crease", c) for c in range(angles.shape[1])]
         far = angles[np.abs(angles - angles[0]).argmax(axis=0), np.arange(len(names))]
         tables["creases"] = {"crease": names, "start_deg": angles[0], "furthest_deg": far, "end_deg": angles[-1]}
-        most = int(np.abs(angles[-1] - angles[0]).argmax())
-        numbers["largest_turn_deg"] = float(angles[-1, most] - angles[0, most])
-        summary.append(f"{names[most]} turns the most, by {numbers['largest_turn_deg']:z.2f} deg at the end")
+        when, most = np.unravel_index(np.abs(angles - angles[0]).argmax(), angles.shape)
+        turn, at = float(angles[when, most] - angles[0, most]), float(motion.times[when])
+        left = float(angles[-1, most] - angles[0, most])
+        numbers |= {"largest_turn_deg": turn, "largest_turn_at_s": at, "left_turn_deg": left}
+        end = "the end" if when == len(angles) - 1 else f"t = {at:.3g} s; {left:z.2f} deg are left at the end"
+        summary.append(f"{names[most]} turns the furthest, by {turn:z.2f} deg at {end}")
         past = int(np.abs(far).argmax())
         if abs(far[past]) > 180.0 + PAST:
             summary.append(

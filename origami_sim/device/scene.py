@@ -24,6 +24,7 @@ from origami_sim.solve.motion.dynamics import Trajectory, simulate
 from origami_sim.solve.motion.frames import check_frames, check_memory
 from origami_sim.solve.motion.quasistatic import quasistatic
 from origami_sim.solve.statics.equilibria import equilibrium
+from origami_sim.units import of_unit
 
 if TYPE_CHECKING:
     from origami_sim.recording import Recording
@@ -183,7 +184,7 @@ def _checked(s: Setting, file: Path) -> Setting:
                 file=file,
                 field=s.name,
                 value=s.value,
-                allowed=f"{s.range[0]:g} to {s.range[1]:g} {s.unit}",
+                allowed=of_unit(f"{s.range[0]:g} to {s.range[1]:g}", s.unit),
             )
     return s
 

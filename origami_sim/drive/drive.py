@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from origami_sim.errors import InputError
-from origami_sim.quantities import ANY, converted
+from origami_sim.errors import InputError, named_arguments
+from origami_sim.quantities import ANY, Quantity, converted
 
 if TYPE_CHECKING:
     from origami_sim.drive.gridded import FieldTable
@@ -57,6 +57,9 @@ class Signal:
     times: np.ndarray | None = None
     values: np.ndarray | None = None
     scale: float | np.ndarray = 1.0
+
+    unit = ANY
+    """SI unit that its numbers were stated in; no field, as only who takes it for a channel asks for it."""
 
     def __post_init__(self):
         if (self.times is None) != (self.values is None):
@@ -149,6 +152,7 @@ Value = float | str | np.ndarray | Signal
 """What a channel is given: a number, a quantity ("50 mT"), one number per world, or a signal."""
 
 
+@named_arguments
 def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
     """offset + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad].
 
@@ -156,23 +160,43 @@ def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
     """
     level, height = (converted(v, ANY, "amplitude") for v in (offset, amplitude))
     often, shift = converted(frequency, "Hz", "frequency"), converted(phase, "rad", "phase")
-    return Signal(offset=level, amplitude=height, frequency=often, phase=shift)
+    return _in(
+        _unit(amplitude=height, offset=level), Signal(offset=level, amplitude=height, frequency=often, phase=shift)
+    )
 
 
+@named_arguments
 def ramp(final, duration: float | str, *, start=0.0) -> Signal:
     """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s")."""
     final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
     if not 0 < duration < FOREVER:
         allowed = f"above 0, below {FOREVER:g} s"
         raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed=allowed)
-    return Signal(
-        offset=start,
-        times=np.array([0.0, duration, FOREVER]),
-        values=np.array([0.0, 1.0, 1.0]),
-        scale=np.subtract(final, start),
-    )
+    times, values = np.array([0.0, duration, FOREVER]), np.array([0.0, 1.0, 1.0])
+    signal = Signal(offset=start, times=times, values=values, scale=np.subtract(final, start))
+    return _in(_unit(final=final, start=start), signal)
 
 
+def _unit(**numbers: Any) -> str:
+    """SI unit in which some of the numbers of a signal were stated, "SI" if none was.
+
+    Raises:
+        InputError: they were stated in units of two kinds.
+    """
+    units = {n: v.unit for n, v in numbers.items() if isinstance(v, Quantity) and v.unit != ANY}
+    if len(set(units.values())) > 1:
+        (_, first), (name, other) = units.items()
+        raise InputError("units of two kinds", field=name, value=other, allowed=first)
+    return next(iter(units.values()), ANY)
+
+
+def _in(unit: str, signal: Signal) -> Signal:
+    """The signal, which remembers the unit of its numbers."""
+    object.__setattr__(signal, "unit", unit)
+    return signal
+
+
+@named_arguments
 def series(times, values, *, scale=1.0) -> Signal:
     """Samples with linear interpolation; a run may not last longer than they do."""
     return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
@@ -184,8 +208,17 @@ def held_to(end: float, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarr
 
 
 def as_signal(value, unit: str = ANY, name: str = "") -> Signal:
-    """The signal of a number or of a quantity, which must have that unit."""
-    return value if isinstance(value, Signal) else Signal(offset=converted(value, unit, name or unit))
+    """The signal of a number or of a quantity, which must have that unit.
+
+    Raises:
+        InputError: a quantity, or a signal of quantities, of another kind.
+    """
+    if not isinstance(value, Signal):
+        return Signal(offset=converted(value, unit, name or unit))
+    if value.unit != unit and ANY not in (unit, value.unit):
+        allowed = "a factor on the loads, such as ramp(1, '1 s')" if name == "load" else f"a signal in {unit}"
+        raise InputError("wrong unit", field=name or unit, value=value.unit, allowed=allowed)
+    return value
 
 
 def _seconds(duration: float | str) -> float:
@@ -206,6 +239,7 @@ class Drive:
         InputError: wrong number of components, times that do not increase, values that are not finite.
     """
 
+    @named_arguments
     def __init__(
         self,
         *,
@@ -319,7 +353,8 @@ class Drive:
         for name in signals:
             if name not in self.signals:
                 raise InputError("no such drive channel", field="channel", value=name, allowed=", ".join(self.signals))
-        return self.with_signals({n: as_signal(signals.get(n, s)) for n, s in self.signals.items()})
+        new = {n: as_signal(s, UNITS.get(n.partition("_")[0], ANY), n) for n, s in signals.items()}
+        return self.with_signals({**self.signals, **new})
 
     @property
     def end(self) -> float:

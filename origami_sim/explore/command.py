@@ -90,8 +90,11 @@ def _folded(crease: str) -> Measure:
 
 
 def _largest(found: Found) -> float:
-    start = found.motion.angles[0, :, 0] if found.motion is not None else np.zeros_like(found.angles)
-    turn = (found.angles - start)[: len(found.model.creases)]
+    count = len(found.model.creases)
+    if found.motion is None:
+        turn = found.angles[:count]
+    else:  # at any time: what a periodic drive leaves at the end says little
+        turn = (found.motion.creases[:, :, 0] - found.motion.creases[0, :, 0]).ravel()
     return float(np.degrees(turn[np.abs(turn).argmax()]))
 
 

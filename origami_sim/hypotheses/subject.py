@@ -16,9 +16,13 @@ from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, S
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
 from origami_sim.quantities import ANY
+from origami_sim.units import in_unit
 
 STEP = 1e-3
 """Relative change of a setting that shows which parameters it is; any that rounding does not hide finds the same."""
+
+RUN = ("duration", "rate")
+"""Settings that say how long a motion is shown and how often, of which no recording tells anything."""
 
 Source = (
     Subject
@@ -170,7 +174,7 @@ def alignments(
 def _aligned(s: Setting, given: float | str, source: object) -> float:
     """A standard deviation of such a number [SI]."""
     text = str(given).strip()
-    allowed = f"a standard deviation in {s.unit}, or with a unit"
+    allowed = f"{in_unit('a standard deviation', s.unit)}, or with a unit"
     if s.unit == "-" and text.endswith("%"):
         return 0.01 * _positive(s.name, text[:-1], given, allowed, source)
     return _positive(
@@ -251,8 +255,8 @@ def spreads(settings: Settings, priors: Mapping[str, float | str], *, source: ob
     out = {}
     for name, given in priors.items():
         s = settings.get(name)
-        if s is None or isinstance(s.value, (str, bool)):
-            numbers = [n for n, t in settings.items() if not isinstance(t.value, (str, bool))]
+        if s is None or isinstance(s.value, (str, bool)) or name in RUN:
+            numbers = [n for n, t in settings.items() if not isinstance(t.value, (str, bool)) and n not in RUN]
             raise InputError(
                 "a prior is for a number of the model",
                 file=source,
@@ -266,7 +270,7 @@ def spreads(settings: Settings, priors: Mapping[str, float | str], *, source: ob
 
 def _spread(s: Setting, given: float | str, settings: Settings, source: object) -> float:
     text = str(given).strip()
-    allowed = f"a standard deviation in {s.unit}, with a unit, or 10% for a share of {s.value:g}"
+    allowed = f"{in_unit('a standard deviation', s.unit)}, with a unit, or 10% for a share of {s.value:g}"
     if text.endswith("%"):
         if not s.value:
             raise InputError("no share of zero", file=source, field=f"priors.{s.name}", value=given, allowed=s.unit)

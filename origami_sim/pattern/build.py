@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, named_arguments
 from ..quantities import converted
 from .assemble import assemble
 from .checks import check_count, check_number, check_positive
@@ -19,6 +19,7 @@ FLAT = 1e-9
 """Fold angle [rad] below which a crease has no side."""
 
 
+@named_arguments
 def strip(lengths, width, *, fold_angles=None) -> Pattern:
     """Return a flat strip of rectangles (or trapezoids) along x, centred on y = 0, starting at x = 0.
 
@@ -48,6 +49,7 @@ def strip(lengths, width, *, fold_angles=None) -> Pattern:
     return _creased(vertices, faces, _by_sign(creases, angles))
 
 
+@named_arguments
 def cross(base, flap_length, *, fold_angle=None) -> Pattern:
     """Return a flat square base with a flap on each side: the net of a box without a lid.
 
@@ -76,6 +78,7 @@ def cross(base, flap_length, *, fold_angle=None) -> Pattern:
     return _creased([(x, y, 0.0) for x, y in vertices], faces, _by_sign(creases, angles))
 
 
+@named_arguments
 def grid(nx, ny, dx, dy) -> Pattern:
     """Return a flat sheet of nx by ny rectangles of dx by dy [m] from the origin; inner edges are 'U'.
 
@@ -90,6 +93,7 @@ def grid(nx, ny, dx, dy) -> Pattern:
     return _creased(vertices, _grid_faces(nx, ny), {})
 
 
+@named_arguments
 def miura(nx, ny, a, b, gamma, *, fold_angle=0.0, target_angle=None) -> Pattern:
     """Return a Miura-ori of nx by ny unit cells (2 x 2 parallelograms each), folded rigidly.
 
@@ -153,6 +157,7 @@ def _miura_vertices(nx, ny, a, b, gamma, theta) -> np.ndarray:
     )
 
 
+@named_arguments
 def waterbomb(side, *, fold_angle=0.0, target_angle=None) -> Pattern:
     """Return a square folded as a waterbomb base: one vertex, four diagonal valleys and two mountains along x.
 
@@ -196,6 +201,7 @@ def _waterbomb_vertices(side, fold_angle) -> np.ndarray:
     return np.array([(0, 0, 0), ends, (x, y, z), (-x, y, z), ends * mirror, (-x, -y, z), (x, -y, z)], dtype=np.float64)
 
 
+@named_arguments
 def kresling(n, *, radius, height, twist) -> Pattern:
     """Return a Kresling cell: two rings of n nodes, the upper one turned, joined by 2 n triangles.
 

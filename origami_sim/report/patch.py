@@ -33,6 +33,7 @@ from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect, apply, 
 from origami_sim.model import BODY, Model, Parameters
 from origami_sim.model.entities import OWNERS, WAYS, located
 from origami_sim.report.diagnosis import Candidate, Diagnosis
+from origami_sim.units import of_unit
 
 _WORDS = ("site", "source", "at")
 _SWITCHES = ("more", "times")
@@ -136,7 +137,7 @@ def _addition(name: str, entry: object, file: Path) -> Addition:
                     file=file,
                     field=at,
                     value=value,
-                    allowed=f"{low:g} to {high:g} {known[key].unit}",
+                    allowed=of_unit(f"{low:g} to {high:g}", known[key].unit),
                 )
             values[key] = float(value)
     return Addition(name, values, entities, **switches, **words)

@@ -15,6 +15,7 @@ from origami_sim.device.device import device_module, lasting
 from origami_sim.device.scene import scene_settings
 from origami_sim.drive import Drive, ramp, series, sine
 from origami_sim.errors import InputError
+from origami_sim.hypotheses.subject import spreads
 from origami_sim.pattern import kresling, miura, strip, uncreased
 from origami_sim.quantities import parsed, si
 from origami_sim.recording import read_recording
@@ -104,7 +105,7 @@ def test_arguments_of_build_are_settings(flap):
 def test_run_a_file(flap, call, tmp_path):
     code, out, err = call("run", "my_flap.py", "--set", "gap=3mm")
     assert (code, err) == (0, "")
-    assert "crease 0 turns the most" in out
+    assert "crease 0 turns the furthest, by " in out
     run = load_run(tmp_path / "runs" / "my_flap")
     assert run.trajectory.times[-1] == pytest.approx(0.2)
     assert run.manifest["overrides"] == {"gap": "3mm"}
@@ -519,3 +520,41 @@ def test_feet_without_a_ground_are_noted():
         sheet.feet([0, 1, 4, 5])
         notes.append(simulate(*(sheet.ground() if ground else sheet).build(), duration=0.02).notes)
     assert "no ground that they could touch" in " ".join(notes[0]) and not notes[1]
+
+
+def test_of_a_periodic_drive_the_furthest_turn_is_told(call, tmp_path):
+    """After whole periods nothing is left of what it turned."""
+    (tmp_path / "wave.py").write_text("""
+from origami_sim import Drive, Sheet, sine, strip
+DURATION = "2 s"
+RATE = 50
+def build(field="5 mT", parts=4):
+    sheet = Sheet(strip([0.01, 0.02], 0.02), thickness="1 mm", panels="rigid").fix(panels=[0])
+    sheet.magnetise(1, remanence="0.1 T", volume="60 mm^3", poling=(1, 0, 0))
+    return sheet.crease(stiffness="2 mN m/rad", loss_time="10 ms"), Drive(field=(0, 0, sine(field, "1 Hz")))
+""")
+    code, out, _ = call("run", "wave.py", "--json")
+    numbers = json.loads(out)["numbers"]
+    # slow: K angle = m B
+    assert abs(numbers["largest_turn_deg"]) == pytest.approx(
+        np.degrees(0.1 * 60e-9 / (4e-7 * np.pi) * 5e-3 / 2e-3), 0.05
+    )
+    assert numbers["largest_turn_at_s"] % 0.5 == pytest.approx(0.25, abs=0.03)
+    code, out, _ = call("run", "wave.py")
+    assert code == 0 and re.search(
+        r"crease 0 turns the furthest, by -?0\.6\d deg at t = \S+ s; -?0\.\d\d deg are left", out
+    )
+    code, out, _ = call("run", "wave.py", "--settings")
+    assert "parts = 4\n" in out and "field = 0.005 T\n" in out
+    code, _, err = call("run", "wave.py", "--set", "parts=many")
+    assert code == 2 and "allowed: a number." in err
+    code, _, err = call("run", "wave.py", "--until", "0")
+    assert code == 2 and "only a quasi-static motion is held on (field 'until', value 0.0)" in err
+
+
+def test_how_long_a_motion_is_shown_has_no_prior(flap, tmp_path):
+    settings = scene_settings(device_module("my_flap.py"))
+    for name in ("rate", "duration"):
+        with pytest.raises(InputError, match=rf"for a number of the model .*'{name}'\); allowed: gap, field, parts\."):
+            spreads(settings, {name: "10%"})
+    assert spreads(settings, {"gap": "10%"}) == {"gap": pytest.approx(2e-4)}
