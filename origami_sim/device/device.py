@@ -94,10 +94,7 @@ def device_module(given: str) -> ModuleType:
     if place and path.is_dir() and not function:
         return _run_again(path)
     if path.suffix == ".toml" and not function:
-        if path.is_file() and not is_design(path) and isinstance(named := read_toml(path).get(DEVICE), str):
-            device = named if named in NAMES else os.path.relpath(path.parent / named)
-            fault, allowed = "is a calibration, not a device", f"{device} --calibration {given}"
-            raise InputError(fault, file=path, field=DEVICE, value=named, allowed=allowed)
+        _refuse_calibration(path)
         return _module(path.stem, path, _designed(read_design(path)), {})
     if path.suffix == ".py":
         if not path.is_file():
@@ -181,6 +178,19 @@ def modelled(given: str, calibration: str | None, option: str) -> tuple[str, str
         value=stated,
         allowed=f"{option} {code} --calibration {given}",
     )
+
+
+def _refuse_calibration(path: Path) -> None:
+    """Refuses a file of settings where a device is asked for, and says how to state both."""
+    data = {} if not path.is_file() or is_design(path) else read_toml(path)
+    named = data.get(DEVICE)
+    tables = [t for t in data.values() if isinstance(t, dict)]
+    if isinstance(named, str) or any({"value", "unit", "source"} <= set(t) for t in tables):
+        device = "my_flap.py, or a scene, with"
+        if isinstance(named, str):
+            device = named if named in NAMES else os.path.relpath(path.parent / named)
+        allowed = f"{device} --calibration {path}"
+        raise InputError("is a calibration, not a device", file=path, field=DEVICE, value=named, allowed=allowed)
 
 
 def _run_again(folder: Path) -> ModuleType:

@@ -198,7 +198,9 @@ def model_of(given: str, data: DataSet) -> tuple[ModuleType, Settings]:
             "this calibration fits several scenes" if fitting else "this is a calibration of no scene",
             file=given,
             field=", ".join(fitting or odd[:5]),
-            allowed="[scene] name in the sidecar" if fitting else f"the settings of a scene; the nearest is {nearest}",
+            allowed="[scene] name in the sidecar"
+            if fitting
+            else f"the settings of a scene (the nearest is {nearest}), or --model my_flap.py --calibration {given}",
         )
     check_recorded_scene(data[0], fitting[0], "--model")
     module = scene_module(fitting[0])

@@ -129,6 +129,16 @@ def test_a_calibration_beside_a_device_is_over_the_overrides_of_the_sidecar(fold
     assert [f[0].nominals[0].start for f in found] == [0.0025, 0.021]
 
 
+def test_a_calibration_without_its_device_is_told_how_to_be_used(folder, call):
+    file = patch("flap.py")
+    file.write_text(file.read_text().replace('device = "../../flap.py"', ""))
+    code, _, err = call("compare", "swing.csv", "--model", str(file))
+    assert code == 2 and "is a calibration, not a device" in err and "my_flap.py, or a scene, with --calib" in err
+    (folder / "swing.toml").write_text((folder / "swing.toml").read_text().split("[scene]")[0])
+    code, _, err = call("diagnose", "swing.csv", "--model", str(file))
+    assert code == 2 and "a calibration of no scene" in err and f"or --model my_flap.py --calibration {file}" in err
+
+
 def test_a_calibration_that_names_no_device_is_refused_by_a_sentence(folder, call):
     file = patch("flap.py")
     file.write_text(file.read_text().replace("../../flap.py", "nowhere"))
