@@ -16,6 +16,7 @@ from scipy import stats
 from scipy.optimize import brentq, least_squares
 
 from origami_sim.errors import InputError
+from origami_sim.units import of_unit
 
 LEVEL = 0.95
 """Confidence of all intervals."""
@@ -96,7 +97,7 @@ def fit(
     low, high = np.array([p.bounds for p in parameters], float).T
     for p in parameters:
         if not p.bounds[0] <= p.start <= p.bounds[1]:
-            allowed = f"{p.bounds[0]:g} to {p.bounds[1]:g} {p.unit}"
+            allowed = of_unit(f"{p.bounds[0]:g} to {p.bounds[1]:g}", p.unit)
             raise InputError("the start is out of its bounds", field=p.name, value=p.start, allowed=allowed)
     first = np.asarray(residual(start), float)
     if not np.isfinite(first).all():

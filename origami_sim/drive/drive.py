@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,6 +86,11 @@ class Signal:
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
+
+    @property
+    def numbers(self) -> tuple[float | np.ndarray | None, ...]:
+        """All that it is made of, in the order of the attributes, whatever unit it was stated in."""
+        return tuple(getattr(self, f.name) for f in fields(self))
 
     @property
     def is_zero(self) -> bool:

@@ -108,7 +108,7 @@ class Worlds(ABC):
                 yield c.values
             for name, signal in drive.signals.items():
                 yield name.encode()
-                yield from (None if v is None else np.asarray(v, float) for v in vars(signal).values())
+                yield from (None if v is None else np.asarray(v, float) for v in signal.numbers)
             yield drive.fingerprint
 
     @abstractmethod

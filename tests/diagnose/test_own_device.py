@@ -139,6 +139,19 @@ def test_a_calibration_without_its_device_is_told_how_to_be_used(folder, call):
     assert code == 2 and "a calibration of no scene" in err and f"or --model my_flap.py --calibration {file}" in err
 
 
+def test_what_is_patched_is_diagnosed_and_compared_again(folder, call):
+    """From a drive in quantities to the patch and back, with what the search has found at once."""
+    (folder / "swing.toml").write_text((folder / "swing.toml").read_text().split("[scene]")[0])
+    given = ("diagnose", "swing.csv", "--model", "flap.py", "--prior", "stiffness=20%", "--limit", "1e-9")
+    quick = ("--suspects", "crease_friction", "--out")
+    assert call(*given, *quick, "runs/one")[0] >= 10
+    patched = "runs/one/patched.toml"
+    tree = tomllib.loads((folder / patched).read_text())
+    assert tree["device"] == "../../flap.py" and tree["friction"]["unit"] == "1"
+    assert call(*given, "--calibration", patched, *quick, "runs/two")[0] >= 10
+    assert call("compare", "swing.csv", "--model", "flap.py", "--calibration", "runs/two/patched.toml")[0] == 0
+
+
 def test_a_calibration_that_names_no_device_is_refused_by_a_sentence(folder, call):
     file = patch("flap.py")
     file.write_text(file.read_text().replace("../../flap.py", "nowhere"))
