@@ -144,8 +144,10 @@ class Creases(Masses):
         index = self._index("crease", creases)
         given = _law(Path(file))
         tabled, where = "resisting_moment" in given, index.tolist()
-        linear = {n: given[n] for n in ("stiffness", "rest_angle") if n in given}
-        self.crease(where, **({"stiffness": 0.0} if tabled else linear))  # others may have the linear law
+        if tabled:  # others may have the linear law
+            self.crease(where, stiffness=0.0)
+        else:
+            self.crease(where, stiffness=given.get("stiffness"), rest_angle=given.get("rest_angle"))
         if tabled:
             numbers = {n: given[n] for n in ("angle_min", "angle_max", "resisting_moment")}
             self.set("crease_table", where, **{n: np.asarray(v).tolist() for n, v in numbers.items()})
