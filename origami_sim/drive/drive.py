@@ -158,7 +158,7 @@ Value = float | str | np.ndarray | Signal
 
 
 @named_arguments
-def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
+def sine(amplitude: Any, frequency: Any, *, phase: Any = 0.0, offset: Any = 0.0) -> Signal:
     """offset + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad].
 
     Numbers are SI or quantities: sine("50 mT", "1 Hz").
@@ -171,7 +171,7 @@ def sine(amplitude, frequency, *, phase=0.0, offset=0.0) -> Signal:
 
 
 @named_arguments
-def ramp(final, duration: float | str, *, start=0.0) -> Signal:
+def ramp(final: Any, duration: float | str, *, start: Any = 0.0) -> Signal:
     """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s")."""
     final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
     if not 0 < duration < FOREVER:
@@ -202,7 +202,7 @@ def _in(unit: str, signal: Signal) -> Signal:
 
 
 @named_arguments
-def series(times, values, *, scale=1.0) -> Signal:
+def series(times: Any, values: Any, *, scale: Any = 1.0) -> Signal:
     """Samples with linear interpolation; a run may not last longer than they do."""
     return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
 

@@ -4,6 +4,7 @@ Lengths and angles may be quantities: "20 mm", "60 deg".
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ FLAT = 1e-9
 
 
 @named_arguments
-def strip(lengths, width, *, fold_angles=None) -> Pattern:
+def strip(lengths, width, *, fold_angles: Any = None) -> Pattern:
     """Return a flat strip of rectangles (or trapezoids) along x, centred on y = 0, starting at x = 0.
 
     Args:
@@ -50,7 +51,7 @@ def strip(lengths, width, *, fold_angles=None) -> Pattern:
 
 
 @named_arguments
-def cross(base, flap_length, *, fold_angle=None) -> Pattern:
+def cross(base, flap_length, *, fold_angle: Any = None) -> Pattern:
     """Return a flat square base with a flap on each side: the net of a box without a lid.
 
     Args:
@@ -94,7 +95,7 @@ def grid(nx, ny, dx, dy) -> Pattern:
 
 
 @named_arguments
-def miura(nx, ny, a, b, gamma, *, fold_angle=0.0, target_angle=None) -> Pattern:
+def miura(nx, ny, a, b, gamma, *, fold_angle: Any = 0.0, target_angle: Any = None) -> Pattern:
     """Return a Miura-ori of nx by ny unit cells (2 x 2 parallelograms each), folded rigidly.
 
     With theta = fold_angle / 2, the inclination of the panels, a cell has height H = a sin(theta) sin(gamma), half
@@ -158,7 +159,7 @@ def _miura_vertices(nx, ny, a, b, gamma, theta) -> np.ndarray:
 
 
 @named_arguments
-def waterbomb(side, *, fold_angle=0.0, target_angle=None) -> Pattern:
+def waterbomb(side, *, fold_angle: Any = 0.0, target_angle: Any = None) -> Pattern:
     """Return a square folded as a waterbomb base: one vertex, four diagonal valleys and two mountains along x.
 
     The symmetric rigid folding in closed form: each mountain lifts by alpha = 2 atan(sin(fold_angle / 2)) from the
