@@ -377,7 +377,7 @@ def _compare(args) -> int:
     module = device_module(given)
     scene = module.__name__.rpartition(".")[2]
     if not hasattr(module, "replicate"):
-        allowed = "pendulum_chain, or a device of yours"
+        allowed = "pendulum_chain, or a device of yours; 'origami-sim diagnose' takes all"
         raise InputError("this scene cannot replicate a recording", field="--scene", value=scene, allowed=allowed)
     settings = scene_settings(module, calibration).override(args.set, "--set")
     recording = recording or read_recording(args.recording, sidecar)  # what is wrong with names is told before
