@@ -18,7 +18,8 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World
 from origami_sim.recording import Recording
 from origami_sim.solve.motion.quasistatic import TOLERANCE, March, knots
-from origami_sim.solve.statics.settling import Held, levels, per_world, settling
+from origami_sim.solve.statics.held import Held
+from origami_sim.solve.statics.settling import levels, per_world, settling
 
 ACCURATE = 0.03
 """Error of a step over the noise of the channel that sees best: with half or twice as much no fit changes."""

@@ -6,7 +6,7 @@ from solve.sheets import mesh, rimmed_end
 
 from origami_sim import Drive, InputError, Sheet, State, equilibrium, quasistatic, series, simulate
 from origami_sim.pattern import sheet
-from origami_sim.solve.statics.settling import Held
+from origami_sim.solve.statics.held import Held
 from origami_sim.solve.timestep import stable_step
 
 E, THICKNESS, DENSITY = 1e6, 1e-3, 1000.0

@@ -31,6 +31,7 @@ from origami_sim.solve.oversights import (
     idle_drives,
     refuse_start_outside_tables,
 )
+from origami_sim.solve.statics.held import FOREVER
 from origami_sim.solve.statics.settling import Settling, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
 from origami_sim.solve.watch import Met, continued, watch_of, with_memory
@@ -40,9 +41,6 @@ TOLERANCE = 1e-5
 
 INSTANT = 1e-12
 """Length of a step in which nothing has time to relax [s]: a millionth of the shortest time constant admitted."""
-
-FOREVER = 1e12
-"""Length of a step after which everything has relaxed [s]: a million times the longest time constant admitted."""
 
 SHORTEST = 2.0**-10
 """Shortest step, as a part of the interval between two instants: what moves suddenly within it is called a jump."""

@@ -8,7 +8,6 @@ how stiff a crease is that has no time to relax.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,13 +16,14 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
-from origami_sim.solve.batch import Batch, Evaluation
-from origami_sim.solve.rigid.statics import NEUTRAL, closed, loops_kept
 from origami_sim.solve.rigid.statics import STEP as TURN
+from origami_sim.solve.rigid.statics import closed, loops_kept
 from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import clear_share
 from origami_sim.solve.statics.equilibria import equilibrium
-from origami_sim.solve.statics.system import NULL_SHIFT, THREADED, Cholesky, Factor, System
+from origami_sim.solve.statics.held import Held
+from origami_sim.solve.statics.system import FINER, THREADED, System
+from origami_sim.solve.statics.tangents import Tangent, of_bars, of_panels, of_slipping_panels
 
 CLOSE = 1e-10
 """Error over the size of the device up to which a place is an equilibrium."""
@@ -38,65 +38,15 @@ ITERATIONS = 12
 PATIENT = 60
 """Tangents of a world that has lost its equilibrium: so many cover the device from end to end several times."""
 
+EASIER = 4.0
+"""Factor by which the drag of `Settling._crept` falls after a step, and grows where a step missed.
+
+With 2 and 8 a crawler goes as far to 1e-5 of its stride; 8 takes up to twice as long.
+"""
+
 FRESH, KEPT = 0.5, 0.1
 """Part of the iteration before that each has to be at most, else a tangent is taken anew: one of this step, or of an
 earlier one. Where a tangent of an earlier step contracts tenfold, the present one is as stable as that was."""
-
-
-class Held:
-    """Worlds of which the nodes are led, and what the laws then give.
-
-    Args:
-        drive: one level of every channel for each world, see `levels`. The rest as for `Batch`.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        parameters: Parameters,
-        drive: Drive,
-        state: State,
-        *,
-        among: Sequence[str] = (),
-        threads: int | None = None,
-    ):
-        still = replace(model, free=np.zeros_like(model.free))
-        self.batch = Batch(still, parameters, drive, state, among=among, threads=threads, supports=model)
-        self.remembers = any(get(e).memory for e in model.laws)
-
-    def force(
-        self, start: State, x: np.ndarray, dt: float, time: float, velocity: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Forces [N, W, 3] at positions x [N, W, 3], reached from a state within dt [s], at a time [s].
-
-        They are those at rest, or at a velocity [N, W, 3].
-        """
-        b = self.batch
-        if self.remembers:
-            b.place(start.x, start.angles, start.memory)
-            b.lead(x, dt)
-        else:
-            b.place(x, start.angles)
-        b._overwrite(b._v, np.zeros_like(x) if velocity is None else velocity)
-        return b.total_force(time)
-
-    def after(self, start: State, x: np.ndarray, dt: float, time: float) -> State:
-        """The state at positions x [N, W, 3], reached from another within dt [s], at a time [s]."""
-        b = self.batch
-        if self.remembers:
-            b.place(start.x, start.angles, start.memory)
-            b.lead(x, dt)
-        else:
-            b.place(x, start.angles)
-            b.total_force(time)  # which also goes on with the angles
-        return b.state()
-
-    def at(self, state: State, time: float, velocity: np.ndarray | None = None) -> Evaluation:
-        """Forces and energies by effect in a state, at rest or at a velocity [N, W, 3]."""
-        b = self.batch
-        b.place(state.x, state.angles, state.memory)
-        b._overwrite(b._v, np.zeros_like(state.x) if velocity is None else velocity)
-        return b.evaluate(time)
 
 
 class Settling(ABC):
@@ -133,6 +83,7 @@ class Settling(ABC):
         parameters = Parameters.join([p for _, p in worlds])
         every = 1 if state.worlds < 64 else threads
         self.held = Held(self.model, parameters, per_world(drive, self.levels), state, among=among, threads=every)
+        self.slips = bool(np.any(self.held.friction))
         self._copied: dict[int, Held] = {}
 
     @property
@@ -169,8 +120,12 @@ class Settling(ABC):
         self.start, self.dt, self.time, self.levels = start, dt, time, level
         self.moving, self.past = self.viscous and gradual, past
         self.held.batch.hold(level)
-        x, done = self._newton(guess, wanted, ROUNDS)
+        x, done = self._newton(guess, wanted & (gradual or not self.slips), ROUNDS)
         lost = wanted & ~done
+        if np.any(lost) and self.slips:
+            x, again = self._crept(np.where(lost[None, :, None], start.x, x), lost)
+            done |= again
+            lost &= ~again
         if np.any(lost) and search:
             x, again = self._newton(np.where(lost[None, :, None], start.x, x), lost, PATIENT)
             done |= again
@@ -181,7 +136,7 @@ class Settling(ABC):
                 x, found = self._newton(x, found, ROUNDS)
             done |= found
         done &= wanted
-        out = self.held.after(start, np.where(done[None, :, None], x, start.x), dt, time)
+        out = self.held.after(start, np.where(done[None, :, None], x, start.x), dt, time, self.moving)
         out.v[:], out.a[:] = 0.0, 0.0
         out.step, out.status = -1, np.full_like(out.status, -1)
         return out, done
@@ -201,6 +156,9 @@ class Settling(ABC):
             else:
                 factors, stable = self._factors(x, left)
             going = np.array([f is not None for f in factors])
+            if self.slips:  # a full step along what slides freely would go anywhere
+                going &= stable
+                wanted = wanted & (stable | ~left)
             if not np.any(going):
                 break
             if self.keeping:
@@ -208,6 +166,46 @@ class Settling(ABC):
                 self._kept = [new if s else k for new, k, s in zip(factors, self._kept, sound, strict=True)]
             x, close = self._with(factors, x, going, FRESH)
             done |= close & stable
+        return x, done
+
+    def _crept(self, x: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions to which the nodes creep through a viscous medium, and which worlds came to rest.
+
+        A foot that slips has no stiffness against its slip, and gets it at once where it turns back, so that Newton's
+        steps go to and fro, or anywhere if all feet slip. Here they are backward Euler's steps of the creep, of lengths
+        that follow what their linear models miss (pseudo-transient continuation: Kelley & Keyes 1998; where forces have
+        kinks, Fowler & Kelley 2005). They end in balance without the medium, at rest as near as its drag leads.
+        """
+        x, done = x.copy(), np.zeros(len(wanted), bool)
+        drag = np.full(len(wanted), np.inf)
+        for _ in range(PATIENT):
+            tangents = self._tangents(x, wanted & ~done)
+            left = np.array([t is not None for t in tangents])
+            if not np.any(left):
+                break
+            least = np.array([t.least if t else 0.0 for t in tangents])
+            drag = np.maximum(np.minimum(drag / EASIER, [t.largest if t else 0.0 for t in tangents]), least)
+            f = self._unbalanced(x)
+            free = [t.factor(t.least) if t else None for t in tangents]
+            held = [t.factor(d) if t else None for t, d in zip(tangents, drag, strict=True)]
+            ahead, s = (np.abs(self._by(each, f, left)).max(axis=0, initial=0.0) for each in (free, held))
+            # once the drag hardly counts, Newton's method ends what it began
+            stable = np.array([t is not None and t.stable for t in tangents])
+            new, close = self._with(free, x, left & stable & (FRESH * ahead <= s), FRESH)
+            x = np.where(close[None, :, None], new, x)
+            done |= close
+            left &= ~close
+            while np.any(left):
+                held = [t.factor(d) if go else None for t, d, go in zip(tangents, drag, left, strict=True)]
+                s = self._by(held, f, left)
+                share = self._share(x, s, left)
+                moved = self._moved(x, np.where(left, s * share, 0.0))
+                drags = np.stack([t.dragged(s[:, w]) if t else s[:, w] for w, t in enumerate(tangents)], axis=1)
+                missed = self._by(held, self._unbalanced(moved) - f + share * (f - drag * drags), left)
+                good = left & (np.abs(missed).max(axis=0) <= FRESH * share * np.abs(s).max(axis=0))
+                x = np.where(good[None, :, None], moved, x)
+                left &= ~good & (drag < 1e3 * np.array([t.largest if t else 0.0 for t in tangents]))
+                drag = np.where(left, EASIER * drag, drag)
         return x, done
 
     def _shared(self, x: np.ndarray, wanted: np.ndarray) -> tuple[list, np.ndarray]:
@@ -230,8 +228,7 @@ class Settling(ABC):
         for n in range(self.iterations):
             large = np.abs(s).max(axis=0, initial=0.0)
             going &= large < part * before  # else a new tangent serves better; false for nan
-            share = np.minimum(_over(np.full_like(large, self.far * self.size), large), 1.0)
-            share = self._clear(x, s * share, going) * np.where(large > 0, share, 1.0)
+            share = self._share(x, s, going)
             far = going & (share < 1.0)
             if np.any(far):  # no further than this without a new tangent
                 x = self._moved(x, np.where(far, s * share, 0.0))
@@ -293,7 +290,10 @@ class Settling(ABC):
         return now.x + ratio * (now.x - before.x)
 
     def _solved(self, factors, x: np.ndarray, going: np.ndarray) -> np.ndarray:
-        f = self._unbalanced(x)
+        return self._by(factors, self._unbalanced(x), going)
+
+    def _by(self, factors, f: np.ndarray, going: np.ndarray) -> np.ndarray:
+        """What the tangents of these worlds give for forces [m, W]."""
         out, of = np.zeros_like(f), dict[int, list[int]]()
         for w in np.flatnonzero(going).tolist():
             of.setdefault(id(factors[w]), []).append(w)
@@ -313,6 +313,12 @@ class Settling(ABC):
             self._copied[w] = Held(self.model, self.worlds[w][1], drive, state, among=self.among, threads=threads)
         self._copied[w].batch.hold(self.levels[:, [w]])
         return self._copied[w]
+
+    def _share(self, x: np.ndarray, s: np.ndarray, going: np.ndarray) -> np.ndarray:
+        """[W] share of a change s [m, W] of the coordinates that goes no further than `far`, nor through panels."""
+        large = np.abs(s).max(axis=0, initial=0.0)
+        share = np.minimum(_over(np.full_like(large, self.far * self.size), large), 1.0)
+        return self._clear(x, s * share, going) * np.where(large > 0, share, 1.0)
 
     def _clear(self, x: np.ndarray, s: np.ndarray, going: np.ndarray) -> np.ndarray:
         """[W] share of a change s [m, W] of the coordinates on which panels do not pass through each other."""
@@ -336,9 +342,16 @@ class Settling(ABC):
     def _moved(self, x: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Positions [N, W, 3] after a change s [m, W] of the coordinates."""
 
-    @abstractmethod
     def _factors(self, x: np.ndarray, wanted: np.ndarray) -> tuple[list, np.ndarray]:
-        """Factors of the tangent of every world, shifted where it is not positive definite, and where it is [W]."""
+        """Factors of each tangent, shifted where it is not stable, and whether Newton's steps may end there [W]."""
+        found = self._tangents(x, wanted)
+        # what slides without any resistance is to be led by a drag
+        stable = np.array([t is not None and t.stable and not (self.slips and t.neutral) for t in found])
+        return [None if t is None else t.factor(t.least) for t in found], stable
+
+    @abstractmethod
+    def _tangents(self, x: np.ndarray, wanted: np.ndarray) -> list[Tangent | None]:
+        """Tangent of every world; None of one that is not finite."""
 
 
 class SettlingBars(Settling):
@@ -361,12 +374,11 @@ class SettlingBars(Settling):
         out[self.free] = s
         return x + np.moveaxis(out.reshape(-1, 3, s.shape[1]), 2, 1)
 
-    def _factors(self, x, wanted):
+    def _tangents(self, x, wanted):
         y = self.system
         y.follow(x)
         count = y.moves.shape[1]
-        out: list[Cholesky | Factor | None] = [None] * x.shape[1]
-        stable = np.zeros(x.shape[1], bool)
+        out: list[Tangent | None] = [None] * x.shape[1]
         for w in np.flatnonzero(wanted):
             start = self.start.select(np.full(count, w))
             copies = self._copies(int(w), count)
@@ -375,22 +387,8 @@ class SettlingBars(Settling):
             k = y.assembled(forces)
             if not np.all(np.isfinite(k.data)):
                 continue
-            largest = float(np.abs(k.data).max(initial=0.0)) or 1.0
-            out[w], shift = y.definite(k, largest, 0.0)
-            stable[w] = shift <= NULL_SHIFT * largest * (1 + 1e-9)
-        return out, stable
-
-
-class _Small:
-    """A dense tangent of any symmetry along some directions [m, d], shifted."""
-
-    def __init__(self, k: np.ndarray, shift: float, along: np.ndarray):
-        k = k + shift * np.eye(len(k))
-        self._whole = along @ np.linalg.pinv(k, rcond=1e-15) @ along.T
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """What gives forces [m, k]; each column is the same to the last digit whatever others are beside it."""
-        return np.einsum("ab,bk->ak", self._whole, right)
+            out[w] = of_bars(y, k)
+        return out
 
 
 class SettlingPanels(Settling):
@@ -412,7 +410,8 @@ class SettlingPanels(Settling):
         if self.loops:  # the directions in which loops stay closed turn with every step
             self.iterations, self.keeping = 1, False
         m = self.count
-        self._near = TURN * np.concatenate([np.zeros((m, 1)), np.eye(m), -np.eye(m)], axis=1)
+        self._turn = TURN * (FINER if self.slips else 1.0)
+        self._near = self._turn * np.concatenate([np.zeros((m, 1)), np.eye(m), -np.eye(m)], axis=1)
         self._every: Held | None = None
 
     @property
@@ -436,12 +435,23 @@ class SettlingPanels(Settling):
         return out
 
     def ahead(self, before: State, now: State, ratio: float) -> np.ndarray:
+        if self.slips:
+            return self._moved(now.x, -ratio * self._between(now.x, before.x))
         if self.loops or len(self.tree.turns):
             return now.x
         turned = now.angles - before.angles
         return self.tree.moved(now.x, ratio * np.stack([turned[c] for c, _ in self.tree.joints]))
 
-    def _factors(self, x, wanted):
+    def _between(self, x: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Change [m, W] of the coordinates that leads from positions [N, W, 3] to others."""
+        q, by = np.zeros((self.count, x.shape[1])), self.tree.rates(x)
+        for _ in range(3):  # a turn within a step is small: 0.1 rad, 1e-3, 1e-7
+            off = other - self._moved(x, q)
+            for w in range(x.shape[1]):
+                q[:, w] += np.linalg.lstsq(by[:, :, w].reshape(len(by), -1).T, off[:, w].ravel(), rcond=None)[0]
+        return q
+
+    def _tangents(self, x, wanted):
         m, worlds = self.count, x.shape[1]
         copies = 2 * m + 1
         each = np.repeat(np.arange(worlds), copies)
@@ -454,16 +464,16 @@ class SettlingPanels(Settling):
         self._every.batch.hold(self.levels[:, each])
         f = self._every.force(self.start.select(each), moved, self.dt, self.time, self._velocity(moved, each))
         moments = np.einsum("mnwa,nwa->mw", by, f).reshape(m, worlds, copies)
-        out: list[_Small | None] = [None] * worlds
-        stable = np.zeros(worlds, bool)
+        out: list[Tangent | None] = [None] * worlds
         for w in np.flatnonzero(wanted & np.all(np.isfinite(moments), axis=(0, 2))):
             along, own = loops_kept(self.tree, x[:, w], self._near, moments[:, w])
-            k = along.T @ ((own[:, m + 1 :] - own[:, 1 : m + 1]) / (2 * TURN)) @ along
-            values = np.linalg.eigvalsh(0.5 * (k + k.T))
-            largest = float(np.abs(values).max(initial=0.0)) or 1.0
-            stable[w] = not len(values) or values[0] >= -NEUTRAL * largest
-            out[w] = _Small(k, 0.0 if stable[w] else -1.5 * float(values[0]), along)
-        return out, stable
+            k = along.T @ ((own[:, m + 1 :] - own[:, 1 : m + 1]) / (2 * self._turn)) @ along
+            if self.slips:
+                rate = by[:, :, copies * w]
+                out[w] = of_slipping_panels(k, along, np.einsum("mna,kna->mk", rate, rate))
+            else:
+                out[w] = of_panels(k, along)
+        return out
 
 
 def settling(worlds, drive: Drive, state: State, **options) -> Settling:
@@ -477,7 +487,8 @@ def settling(worlds, drive: Drive, state: State, **options) -> Settling:
 def coupled(model: Model, parameters: Parameters, drive: Drive) -> System:
     """Couplings and colours of a model, which depend on its effects only."""
     one = parameters.world(0) if parameters.worlds > 1 else parameters
-    return System(model, one, per_world(drive, levels(drive, 0.0, 1)), State.at_rest(model))
+    slips = any(get(e).family == "tangent" for e in model.laws)
+    return System(model, one, per_world(drive, levels(drive, 0.0, 1)), State.at_rest(model), slips=slips)
 
 
 def levels(drive: Drive, time: float, worlds: int) -> np.ndarray:
