@@ -99,7 +99,7 @@ def matched(model: Model, recording: Recording, pose: Pose, rates: np.ndarray, r
     """
     from origami_sim.observation.channels import angle_mask, stacked
     from origami_sim.observation.observe import observe
-    from origami_sim.predict.starts import BENT
+    from origami_sim.observation.rates import BENT
 
     arm, m = Articulation(model), Articulation(model).size
     turning, best = angle_mask(recording), np.zeros(2 * m)

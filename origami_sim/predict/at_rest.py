@@ -5,7 +5,8 @@ import numpy as np
 from origami_sim.hypotheses.hypothesis import Subject
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.channels import stacked, units_of
-from origami_sim.predict.starts import channel_tangent, local_line
+from origami_sim.observation.rates import local_line
+from origami_sim.predict.starts import channel_tangent
 from origami_sim.recording import Recording
 
 WINDOW = 10

@@ -11,9 +11,12 @@ from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.weight import weighed
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
-from origami_sim.predict.starts import Reading
+from origami_sim.observation.channels import channel_values, stacked
+from origami_sim.observation.rates import WIDEST
+from origami_sim.predict.starts import Reading, read_start
 from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds
+from origami_sim.solve.motion.dynamics import simulate
 from origami_sim.solve.statics.equilibria import equilibrium
 
 AT_REST = 1e-3
@@ -46,22 +49,25 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow
     arm, m = forward.articulation, forward.articulation.size
     sidecar = recording.metadata.get("sidecar")
     pose, known = block.pose, block.known.copy()
-    still, let_go = AT_REST * np.maximum(usual, 1e-9), np.zeros(m)
+    still, own, let_go = AT_REST * np.maximum(usual, 1e-9), np.zeros(m), np.zeros(m)
+    world = forward.world(Hypothesis(), np.array([f.start for f in forward.subject.nominals]), ())
     if start.rate_sd is not None:
         still = np.full(m, start.rate_sd)
     elif start.state == "released":
         let_go = _in_a_frame(forward, block.recording, usual)
-    far = np.abs(slow.rates) > CONTRADICTED * np.hypot(still, slow.error) + let_go
+        own = np.maximum(let_go, _released(forward, block.recording, world, read))
+    far = np.abs(slow.rates) > CONTRADICTED * np.hypot(still, slow.error) + own
     if np.any(far):
-        worst = arm.names()[int(np.argmax(np.abs(slow.rates) * far))]
+        worst = int(np.argmax(np.abs(slow.rates) * far))
+        rate = f"{abs(slow.rates[worst]):.3g} {'m/s' if worst < arm.shifts else 'rad/s'}"
         raise InputError(
-            f"the data contradict a start at rest: {worst} moves at {np.abs(slow.rates[far]).max():.3g} per second",
+            f"the data contradict a start at rest: {arm.names()[worst]} moves at {rate}",
             file=sidecar,
             field="start",
             value=start.state,
             allowed="'moving', or the frames from the release on",
         )
-    doubtful = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read.error) + let_go  # what is longer may be bent
+    doubtful = np.abs(block.rates) > CONTRADICTED * np.hypot(still, read.error) + own  # what is longer may be bent
     known[m:] = np.where(doubtful, np.abs(block.rates), np.hypot(still, let_go))
     angles = pose.angles.copy()
     first = m - len(arm.creases)
@@ -80,7 +86,6 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow
             _agrees(angles[joint, 0], value, np.hypot(start.sd, read.shown[first + joint]), crease, sidecar)
             angles[joint], known[first + joint] = value, start.sd
     else:
-        world = forward.world(Hypothesis(), np.array([f.start for f in forward.subject.nominals]), ())
         rest, doubt = equilibrium_of(forward, block.recording, world, angles[:, 0])
         sd = np.hypot(RESTS if start.sd is None else start.sd, doubt)
         for joint, value in enumerate(rest):
@@ -90,8 +95,27 @@ def stated(forward: Worlds, block: Block, usual: np.ndarray, read: Reading, slow
     return replace(block, pose=replace(pose, angles=angles), rates=np.zeros(m), known=known)
 
 
+def _released(forward: Worlds, r: int, world: World, read: Reading) -> np.ndarray:
+    """Rates (m,) that the model shows where it is released at rest, read as data are, with what it gains in a frame.
+
+    The first frames already hold its motion; and at which instant within a frame a hand let go is not known.
+    """
+    recording, (values, noise) = forward.recordings[r], stacked(forward.recordings[r])
+    model, parameters = weighed(*world, recording.gravity)
+    state = State.at_rest(model, position=forward.articulation.positions(read.pose)[:, 0])
+    times, step = recording.times - recording.times[0], float(np.median(np.diff(recording.times)))
+    last = float(times[: 2 * WIDEST][-1])
+    run = simulate(model, parameters, forward.drives[r], duration=last, rate=1.0 / step, state=state)
+    own = channel_values(forward.model, recording, run.x, None)[:, :, 0]
+    shown = np.stack([np.interp(times, run.times, c, right=np.nan) for c in own.T], axis=1)
+    shown = np.where(np.isfinite(values), shown, np.nan)
+    found = read_start(forward.model, forward.articulation, recording, shown, noise, 0, slowest=True)
+    moved = np.linalg.lstsq(found.tangent / noise[:, None], (own[1] - own[0]) / noise, rcond=None)[0]
+    return np.abs(found.rates) + 2.0 / step * np.abs(moved)
+
+
 def _in_a_frame(forward: Worlds, r: int, usual: np.ndarray) -> np.ndarray:
-    """Rates (m,) that a device gains in a frame after a hand let it go: at which instant is not known better.
+    """Rates (m,) that a device usually gains in a frame: at which instant a hand let it go is not known better.
 
     With usual rates u and a spread q of a coordinate, accelerations are about u^2 / q.
     """

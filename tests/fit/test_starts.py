@@ -14,11 +14,12 @@ from origami_sim.drive.starts import shifted
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import Parameters
+from origami_sim.observation.rates import local_line
 from origami_sim.predict.at_rest import starting
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.drives import reaching, refined
 from origami_sim.predict.measured import lateness
-from origami_sim.predict.starts import local_line, seen_first
+from origami_sim.predict.starts import seen_first
 from origami_sim.recording import Recording
 from origami_sim.recording.possible import Possible
 from origami_sim.recording.recording import DriveChannel
