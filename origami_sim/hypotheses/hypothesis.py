@@ -12,7 +12,7 @@ from origami_sim.effects import get
 from origami_sim.model import Model, Parameters
 from origami_sim.model.bodies import rigid
 from origami_sim.model.entities import tune
-from origami_sim.model.places import across, along
+from origami_sim.model.places import across, along_creases
 
 SEPARATOR = " + "
 """Between the effects of one explanation in its label."""
@@ -319,9 +319,7 @@ def apply(
                 out.set(s.effect, p.name, across(model)[ACROSS.index(p.name)])
                 continue
             if p.name == ALONG:
-                middle = model.position[model.creases[:, 1:3]].mean(axis=1)
-                at = along(model, middle)
-                out.set(s.effect, p.name, np.zeros(len(middle)) if at is None else at - 0.5)
+                out.set(s.effect, p.name, along_creases(model))
                 continue
             donor = next(
                 (

@@ -37,6 +37,18 @@ def along(model: Model, points: np.ndarray) -> np.ndarray | None:
     return ((points - middle) @ axis - np.min((corners - middle) @ axis)) / extent[0]
 
 
+def along_creases(model: Model) -> np.ndarray:
+    """Place of each crease (C,) along a slender device, from -1/2 to 1/2; zeros if it is no beam.
+
+    A part that is held is none of the beam: its first crease is then its first end.
+    """
+    at = along(model, model.position[model.creases[:, 1:3]].mean(axis=1)) if len(model.creases) else None
+    if at is None:
+        return np.zeros(len(model.creases))
+    first = float(at.min()) if np.any(~np.any(model.free, axis=1)) else 0.0
+    return (at - first) / (1.0 - first) - 0.5
+
+
 def stretches(model: Model, family: str) -> list[Place]:
     """(name, kind, entities) of stretches of a beam: the creases, bending lines or triangles of thirds and quarters.
 

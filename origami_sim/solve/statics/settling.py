@@ -196,7 +196,7 @@ class Settling(ABC):
             done |= close
             left &= ~close
             while np.any(left):
-                held = [t.factor(d) if go else None for t, d, go in zip(tangents, drag, left, strict=True)]
+                held = [t.factor(d) if t and go else None for t, d, go in zip(tangents, drag, left, strict=True)]
                 s = self._by(held, f, left)
                 share = self._share(x, s, left)
                 moved = self._moved(x, np.where(left, s * share, 0.0))
