@@ -27,8 +27,9 @@ from origami_sim.effects import get  # noqa: E402
 from origami_sim.recording import Recording  # noqa: E402
 from tests.diagnose.strips import record, subject  # noqa: E402
 
-FOLDERS = ("hypotheses", "fit", "predict", "infer", "diagnose")
-LEFT_OUT = ("fit/hyper.py", "report/diagnosis.py", "diagnose/baselines.py", "diagnose/closed_loop.py",
+FOLDERS = ("observation", "hypotheses", "fit", "predict", "infer", "verdict", "diagnose")
+LEFT_OUT = ("observation/compare.py", "observation/gait.py", "observation/observe.py", "fit/hyper.py",
+            "report/diagnosis.py", "diagnose/baselines.py", "diagnose/closed_loop.py",
             "diagnose/command.py", "diagnose/experiment.py", "diagnose/inertia.py", "diagnose/menu.py",
             "diagnose/observed.py", "diagnose/overlay.py", "diagnose/prepare.py", "diagnose/tables.py")  # fmt: skip
 """Varied elsewhere, asked of other recordings (closed loops, slow motions), or made after the verdict."""

@@ -35,7 +35,7 @@ def export(args: argparse.Namespace) -> int:
     """Runs the command and returns its exit code."""
     from origami_sim.commands.cli import OK, _print_json
     from origami_sim.results.run_folder import load_run
-    from origami_sim.view.export import SUFFIXES
+    from origami_sim.view.export import ALL_FRAMES, SUFFIXES
     from origami_sim.view.export import export as write
 
     if Path(args.to).suffix.lower() not in SUFFIXES:
@@ -66,7 +66,8 @@ def export(args: argparse.Namespace) -> int:
     if args.json:
         _print_json({"file": str(file), "bytes": size, "failures": failed})
     else:
+        moving = Path(args.to).suffix.lower() in ALL_FRAMES and args.stop is None
         for sentence in failed:
-            print(f"note: it ends where the run failed: {sentence}")
+            print(f"note: {'it ends where the run failed' if moving else 'the run failed'}: {sentence}")
         print(f"{file}: {size / 1024:.0f} KiB")
     return OK

@@ -72,10 +72,9 @@ def _device(args: Namespace, module: ModuleType) -> int:
     x, y, z = (of["mean"] for of in steady)
     print(format_table(table))
     spread, trend = steady[0]["spread"], steady[0]["trend"]
-    print(
-        f"stride ({x:z.3f}, {y:z.3f}, {z:z.3f}) mm per cycle of {lasts:g} s, of the centre of mass over the last "
-        f"{numbers['cycles']:.0f} cycles (along x: spread {spread:.3f} mm, trend {trend:+.3f} mm per cycle)"
-    )
+    text = f"stride ({x:z.3f}, {y:z.3f}, {z:z.3f}) mm per cycle of {lasts:g} s, of the centre of mass over "
+    many = f"the last {numbers['cycles']:.0f} cycles (along x: spread {spread:.3f} mm, trend {trend:+.3f} mm per cycle)"
+    print(text + (many if numbers["cycles"] > 1 else "one cycle"))
     for note in motion.notes:
         print(note)
     return _soundness(motion)

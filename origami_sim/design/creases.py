@@ -94,7 +94,7 @@ class Creases(Masses):
 
     def _rest_at_targets(self, index: np.ndarray, share: float) -> None:
         """Makes the pattern's target angles, or a share of the way to them, the rest angles of these creases."""
-        if not 0.0 <= share <= 1.0:
+        if not isinstance(share, float | int) or not 0.0 <= share <= 1.0:
             raise InputError("no share of a fold", field="share", value=share, allowed="0 to 1")
         target = self._targets()[index]
         given = ~np.isnan(target)
@@ -139,18 +139,23 @@ class Creases(Masses):
             loss_time: beta [s], viscosity = beta * stiffness (default: the viscosity in the file, if it has one).
 
         Raises:
-            InputError: no such file or crease, a file that says nothing of a crease, a value in another unit.
+            InputError: no such file or crease, a file that says nothing of a crease, a loss time where it has no
+                stiffness, a value in another unit.
         """
         index = self._index("crease", creases)
         given = _law(Path(file))
         tabled, where = "resisting_moment" in given, index.tolist()
-        if tabled:  # others may have the linear law
-            self.crease(where, stiffness=0.0)
-        else:
-            self.crease(where, stiffness=given.get("stiffness"), rest_angle=given.get("rest_angle"))
+        if loss_time is not None and "stiffness" not in given:
+            allowed = "a file with a stiffness, or no loss time"
+            raise InputError(
+                "a loss time needs a stiffness", file=file, field="loss_time", value=loss_time, allowed=allowed
+            )
         if tabled:
+            self.crease(where, stiffness=0.0)  # others may have the linear law
             numbers = {n: given[n] for n in ("angle_min", "angle_max", "resisting_moment")}
             self.set("crease_table", where, **{n: np.asarray(v).tolist() for n, v in numbers.items()})
+        else:
+            self.crease(where, stiffness=given.get("stiffness"), rest_angle=given.get("rest_angle"))
         viscosity = given.get("viscosity")
         if loss_time is not None:
             viscosity = converted(loss_time, "s", "loss_time") * given["stiffness"]

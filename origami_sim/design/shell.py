@@ -88,10 +88,10 @@ def stated(
     if poisson is not None:
         if elasticity is not None:
             raise InputError("the elasticity has Poisson's ratio in it", field="poisson", value=poisson, allowed="none")
-        if not -1 < poisson <= 0.5:
+        if not isinstance(poisson, float | int) or not -1 < poisson <= 0.5:
             allowed = "above -1, up to 0.5; elasticity=isotropic(...) of a sheet that is no isotropic solid"
             raise InputError(
-                "no isotropic material has this Poisson's ratio", field="poisson", value=float(poisson), allowed=allowed
+                "no isotropic material has this Poisson's ratio", field="poisson", value=poisson, allowed=allowed
             )
     direction = np.asarray(axis, float)
     if direction.shape != (3,) or not np.all(np.isfinite(direction)) or not np.linalg.norm(direction) > 0:

@@ -1,4 +1,4 @@
-"""Contact of patches, or a stop: on one side of a crease, when it has folded far enough."""
+"""One-sided stop: patches that touch, or a limit, from a fold angle on."""
 
 import math
 

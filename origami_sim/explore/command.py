@@ -30,9 +30,9 @@ def run(args: Namespace) -> int:
     name = module.__name__.rpartition(".")[2]
     settings = scene_settings(module).override(args.set, "--set")
     grid = _grid(settings, args.vary)
-    for name in (text.partition("=")[0].strip() for text in args.set):
-        if name in grid:
-            raise InputError("is set and varied at once", field="--set", value=name, allowed="either --set or --vary")
+    for stated in (text.partition("=")[0].strip() for text in args.set):
+        if stated in grid:
+            raise InputError("is set and varied at once", field="--set", value=stated, allowed="either --set or --vary")
 
     def build(**values):
         return module.build(settings.replace(**values))

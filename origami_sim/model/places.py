@@ -40,7 +40,7 @@ def along(model: Model, points: np.ndarray) -> np.ndarray | None:
 def along_creases(model: Model) -> np.ndarray:
     """Place of each crease (C,) along a slender device, from -1/2 to 1/2; zeros if it is no beam.
 
-    A part that is held is none of the beam: its first crease is then its first end.
+    Where a part is held, the beam begins at its first crease.
     """
     at = along(model, model.position[model.creases[:, 1:3]].mean(axis=1)) if len(model.creases) else None
     if at is None:

@@ -254,7 +254,9 @@ def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
         tuned.append(Addition(effect, {parameter: value}, source=source, more=not factor, times=factor, at=at))
     best = patched(diagnosis)
     suspected = [] if best is None else best.effects
-    sites = iter([] if best is None else best.sites)
+    sites: dict[str, list[str]] = {}  # of an effect at several sites in the order of its numbers
+    for effect, site in zip(suspected, [] if best is None else best.sites, strict=True):
+        sites.setdefault(effect, []).append(site)
     there = {a.effect for a in settings.effects}
     for (effect, entities), values in found.items():
         if effect not in suspected and effect not in there:  # of what is aligned, the rest does nothing
@@ -264,7 +266,7 @@ def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
             effect,
             values,
             tuple(map(int, entities.split(","))) if entities else None,
-            next(sites) if effect in suspected else "",
+            sites[effect].pop(0) if sites.get(effect) else "",
             source,
             effect in diagnosis.changed,
         )

@@ -253,6 +253,7 @@ def credible(classes: dict[frozenset[str], float]) -> tuple[list[frozenset[str]]
 
 
 def from_recorder(effects: frozenset[str]) -> bool:
+    """Whether effects are all errors of the recorder, and there are any."""
     return bool(effects) and all(map(of_recorder, effects))
 
 

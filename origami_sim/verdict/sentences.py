@@ -278,7 +278,7 @@ def places(p: Posterior, chance: dict[Key, float], lead: frozenset[str], best: K
     for w in likely:
         turned = len(lead) == 1 and w in fitted and _sign(p, fitted[w], lead) * _sign(p, best, lead) < 0.0
         each.append(f"{'with the opposite sign ' if turned else ''}{w} (p = {where[w] / total:.2f})")
-    return f" there with p = {here / total:.2f}, or {joined(each)}" if each else ""
+    return f", there with p = {here / total:.2f}, else {' or '.join(each)}" if each else ""
 
 
 def _place(p: Posterior, key: Key, lead: frozenset[str]) -> str:

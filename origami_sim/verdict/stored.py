@@ -274,7 +274,7 @@ def _suspect(given: Mapping[str, Any]) -> Suspect:
     """The suspect that was stored; bounds and spreads that are infinite were left out."""
 
     def tupled(value: Any) -> Any:
-        return tuple(value) if isinstance(value, list) else value
+        return tuple(map(tupled, value)) if isinstance(value, list) else value
 
     ends = {"lower": -np.inf, "upper": np.inf, "spread": np.inf}
     free = [

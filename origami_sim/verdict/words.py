@@ -18,6 +18,7 @@ PEOPLE = ("Coulomb", "Kelvin", "Maxwell", "Mullins", "Stribeck")
 
 
 def distinct(fits: Sequence[Fit]) -> list[str]:
+    """Labels of the explanations of fits, each once."""
     return list(dict.fromkeys(f.hypothesis.label for f in fits))
 
 

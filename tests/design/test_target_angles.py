@@ -67,6 +67,7 @@ def test_targets_that_nothing_uses_are_named_once():
     ("state", "said"),
     [
         (lambda: sheet(rest_angle="target", share=1.5), r"no share of a fold \(field 'share', value 1.5\).*0 to 1"),
+        (lambda: sheet(rest_angle="target", share=[0.5]), r"no share of a fold \(field 'share'"),
         (lambda: sheet(rest_angle=0.3, share=0.5), r"is of target angles \(field 'share'"),
         (lambda: sheet(rest_angle="targt"), r"no rest angle .*value 'targt'.*'target'"),
         (

@@ -125,6 +125,21 @@ def test_an_error_of_one_channel_is_the_recordings_and_not_patched_into_the_mode
     assert [a.effect for a in additions(found, settings)] == ["crease_friction", "angle_offset"]  # type: ignore[arg-type]
 
 
+def test_a_number_that_a_suspect_fixes_leaves_every_effect_at_its_site():
+    """It comes before those that were fitted."""
+    numbers = {"crease_contact.contact_side@0": -1.0, "crease_friction.friction_moment@1": 1e-4}
+    numbers["crease_contact.contact_stiffness@0"] = 2e-3
+    said = [SimpleNamespace(value=v, label=n) for n, v in numbers.items()]
+    best = SimpleNamespace(numbers=said, sites=["crease 1", "crease 0"], effects=["crease_friction", "crease_contact"])
+    found = SimpleNamespace(patch=numbers, changed=[], candidates=[best], recordings=["swing"], verdict="SEVERAL")
+    added = additions(found, read_calibration("pendulum_chain"))  # type: ignore[arg-type]
+    assert {a.effect: (a.site, a.entities) for a in added} == {
+        "crease_contact": ("crease 0", (0,)),
+        "crease_friction": ("crease 1", (1,)),
+    }
+    assert dict(next(a for a in added if a.effect == "crease_contact").values)["contact_side"] == -1.0
+
+
 def test_numbers_of_bodies_are_patched_and_read_by_the_names_that_tables_show(tmp_path):
     module = scene_module("pendulum_chain")
     settings = scene_settings(module)

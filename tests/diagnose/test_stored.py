@@ -1,5 +1,6 @@
 """A stored search is judged anew as the search itself was, with these and with other hyperparameters."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from origami_sim.fit.evidence import problem, summed
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.linear import Linearisation, Rows
 from origami_sim.fit.nominal import nominal_fits
+from origami_sim.hypotheses.hypothesis import Free, Suspect
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_priors, place
@@ -20,7 +22,7 @@ from origami_sim.infer.posterior import Posterior
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import search
 from origami_sim.verdict.sentences import judge
-from origami_sim.verdict.stored import Reduced, Stored
+from origami_sim.verdict.stored import Reduced, Stored, _plain, _suspect
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
@@ -98,3 +100,10 @@ def test_what_was_not_stored_is_refused(kept, tmp_path):
     (tmp_path / "odd.npz").write_bytes(b"no archive")
     with pytest.raises(InputError, match=r"odd.npz: is no stored search"):
         Stored.load(tmp_path / "odd.npz")
+
+
+def test_a_suspect_is_the_same_after_storing():
+    free = (Free("crease_contact", "contact_stiffness", "N m/rad", 0.0, 1e-3, entities=(0,)),)
+    one = Suspect("crease_contact", "crease 0", "crease", free, (0,), fixed=(("contact_side", -1.0),))
+    again = _suspect(json.loads(json.dumps(_plain(one))))
+    assert again == one and {again.form: 1}[one.form] == 1

@@ -58,7 +58,7 @@ def test_a_stop_short_of_flat_is_named_wherever_flat_is():
     numbers = {n.label: n for n in found.candidates[0].numbers}
     assert numbers["crease_contact.contact_side"].value == -1.0
     assert numbers["crease_contact.contact_angle"].value == pytest.approx(0.1, abs=0.01)
-    assert any(label.startswith("crease_contact.contact_side") for label in found.patch)
+    assert [v for label, v in found.patch.items() if label.startswith("crease_contact.contact_side@")] == [-1.0]
 
 
 def test_a_stiff_stop_is_found_from_a_soft_one_that_acts_earlier(stopped):

@@ -254,7 +254,9 @@ def test_places_are_said_with_their_probability_and_turned_signs():
         fitted = SimpleNamespace(free=free, theta=np.array([strength]), hypothesis=Hypothesis((every[n],)))
         p.nodes[frozenset({n})] = Node(frozenset({n}), cast(Fit, fitted), np.zeros(1), [], [], [None])
     text = places(p, chance, frozenset({"crease_softness"}), frozenset({0}))
-    assert text == " there with p = 0.60, or with the opposite sign at the middle (p = 0.30) and at the tip (p = 0.10)"
+    assert (
+        text == ", there with p = 0.60, else with the opposite sign at the middle (p = 0.30) or at the tip (p = 0.10)"
+    )
     assert places(p, {frozenset({0}): 1.0}, frozenset({"crease_softness"}), frozenset({0})) == ""
 
 

@@ -357,6 +357,8 @@ def test_a_setting_is_set_or_varied(call, tmp_path):
     code, _, err = call("sweep", "my_flap.py", "--set", "gap=2mm", "--vary", "gap=1mm,2mm")
     assert code == 2 and "is set and varied at once (field '--set', value 'gap')" in err and err.count("\n") == 1
     assert not (tmp_path / "runs").exists()
+    code, _, _ = call("sweep", "my_flap.py", "--set", "field=20mT", "--vary", "gap=1mm,2mm")
+    assert code == 0 and [f.name for f in (tmp_path / "runs").iterdir()] == ["sweep_my_flap"]
 
 
 WALKER = """
@@ -383,7 +385,7 @@ def test_strides_are_by_cycle_and_moved_over_the_whole(call, tmp_path):
     assert (code, err) == (0, "")
     found = json.loads(out)["columns"]
     moved, each = np.array(found["moved_x_mm"]), np.array(found["stride_x_mm"])
-    assert each == pytest.approx(each[0], rel=0.02) and 1.0 < each[0] < 5.0  # slow: inertia hardly matters
+    assert each == pytest.approx(2.55, rel=0.02)  # slow: inertia hardly matters
     assert moved[0] == pytest.approx(10 * each[0], rel=0.05)  # as long as the slower one takes for five
     assert moved[1] == pytest.approx(5 * each[1], rel=0.05)
     code, out, err = call("stride", "walker.py", "--set", "frequency=4", "--json")

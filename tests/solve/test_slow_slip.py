@@ -51,14 +51,14 @@ def cycles(request):
 
 
 def test_slipping_legs_stand_as_virtual_work_says(cycles):
-    """A spring that drags its feet over the ground; within 1e-3 of its slope, what stretched bars leave."""
+    """A spring that drags its feet over the ground; within 1e-5 of its slope with bars that stretch."""
     run, _ = cycles
     assert not run.failures and not run.jumps
     slope = np.abs(run.creases[:, 0, 0]) / 2
     for frame, way in ((70, -1), (73, -1), (82, 1), (90, 1), (102, 1), (110, -1), (118, -1)):
         expected = slope_at(FIELD * np.sin(2 * np.pi * frame / 60), way)
         assert abs(expected - slope_at(FIELD * np.sin(2 * np.pi * frame / 60), 0)) > 1e-3  # friction counts
-        assert slope[frame] == pytest.approx(expected, rel=2e-4)
+        assert slope[frame] == pytest.approx(expected, rel=3e-5)
 
 
 def test_a_cycle_goes_on_by_the_change_of_span(cycles):
@@ -69,9 +69,9 @@ def test_a_cycle_goes_on_by_the_change_of_span(cycles):
     feet = np.ptp(span - THICKNESS * np.sin(slope))
     stride = np.diff(run.centre_of_mass()[::60, 0, 0])[-1]
     stretch = MU * WEIGHT / 4 / stiffness
-    assert stride == pytest.approx(feet - 4 * stretch, rel=2e-3)
+    assert stride == pytest.approx(feet - 4 * stretch, rel=1e-4)
     lost = run.work["friction"][120, 0] - run.work["friction"][60, 0]
-    assert lost == pytest.approx(-MU * WEIGHT / 2 * 2 * (feet - 2 * stretch), rel=0.01)
+    assert lost == pytest.approx(-MU * WEIGHT / 2 * 2 * (feet - 2 * stretch), rel=3e-3)
 
 
 def test_a_slow_walk_is_that_of_the_dynamics():
@@ -80,7 +80,7 @@ def test_a_slow_walk_is_that_of_the_dynamics():
     slow = quasistatic(model, parameters, drive, np.linspace(0, 8, 121))
     full = simulate(model, parameters, drive, duration=8.0, rate=15.0)
     strides = [np.diff(run.centre_of_mass()[::60, 0, 0]) for run in (slow, full)]
-    assert strides[0][1] == pytest.approx(strides[1][1], rel=2e-3)
+    assert strides[0][1] == pytest.approx(strides[1][1], rel=5e-4)
 
 
 def test_equal_feet_go_nowhere():

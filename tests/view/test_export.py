@@ -149,6 +149,8 @@ def test_the_command_says_where_a_film_ends(motion, call, tmp_path):
     run, _ = failed(motion, float(motion.times[5]))
     save_run(tmp_path / "run", run, scene="swing")
     code, out, _ = call("export", "run", "--to", "a.stl", "--world", "1")
+    assert code == 0 and "note: the run failed: world 1 went unstable at t = 0.0833333 s" in out
+    code, out, _ = call("export", "run", "--to", "a.glb", "--world", "1")
     assert code == 0 and "note: it ends where the run failed: world 1 went unstable at t = 0.0833333 s" in out
     code, out, _ = call("export", "run", "--to", "a.stl", "--world", "0", "--json")
     assert code == 0 and json.loads(out)["failures"] == []

@@ -82,7 +82,10 @@ def _number(n: Number, *, owner: bool) -> Html:
     if np.isfinite(away):
         before = element("small", f"before: {amount(known(n.prior), n.unit, 3)}, {away:.1f} sd away")
     bound = element("span", "at its bound", class_="badge") if n.at_bound else None
-    value = interval(known(n.value), known(n.low), known(n.high), n.unit)
+    sided = n.low < n.high or not np.isfinite(n.low)  # else it was not fitted
+    value = (
+        interval(known(n.value), known(n.low), known(n.high), n.unit) if sided else amount(known(n.value), n.unit, 3)
+    )
     name = element("span", number_of(n.label, owner=owner), class_="name")
     return element("div", name, f" {value} ", bound, before, class_="fitted")
 

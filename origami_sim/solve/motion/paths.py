@@ -36,11 +36,11 @@ def frames(path: "Path") -> Trajectory:
     for n, f in forces.items():
         spent = 0.5 * np.einsum("fnwa,fnwa->fw", f[1:] + f[:-1], np.diff(x, axis=0))
         work[n] = np.concatenate([np.zeros((1, 1)), np.cumsum(spent, axis=0)]) * get(n).exchanges_work
-    zero, held = np.zeros_like(x), [path.factor[0], *path.factor][: max(2, len(times))]
+    zero = np.zeros_like(x)
     signals = {}
     for n, s in drive.signals.items():
         if s.times is not None:  # a line of the factor, see `continuation`
-            along = np.asarray(path.factor if len(times) > 1 else held, float)
+            along = np.asarray(path.factor if len(times) > 1 else np.repeat(path.factor, 2), float)
             s = Signal(offset=s.offset, times=np.arange(float(len(along))), values=along, scale=s.scale)
         signals[n] = s
     contact = [n for n in model.laws if get(n).family in CONTACTS]

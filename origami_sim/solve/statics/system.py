@@ -53,10 +53,10 @@ TOUCHING = 1e-4
 """Largest step of the differences over the distance at which parts touch: what touches must not part within it."""
 
 FINER = 0.01
-"""Steps of the differences at points with dry friction, as a part of those elsewhere.
+"""Steps of the differences at points on the ground with dry friction, as a part of those elsewhere.
 
 Within a step no foot may go from sticking to slipping, nor off the ground: over micrometres on `Sheet.ground`. With 1 a
-crawler of 40 mm on bars is lost within a cycle; 0.1, 0.02, 0.005 and 0.001 find its stride as 0.01 does, to 1e-5 of it.
+crawler of 40 mm on bars is lost within a cycle; 0.1, 0.02, 0.005 and (bars only) 0.001 find its stride to 1e-5 of it.
 """
 
 
