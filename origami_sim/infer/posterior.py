@@ -175,23 +175,23 @@ class Posterior:
         """Effects of a set, without those whose strengths its fit does not tell from zero: a Wald test.
 
         A set is judged beside a discrepancy that its fit lacks. Where that is large, an effect may be probable which
-        the fit hardly has: of it there is no strength to say. Nor is there where a fit stays at zero, as of a clock in
-        slow steps, whatever its derivatives promise.
+        the fit hardly has: of it there is no strength to say. Nor is there where it changes the fit by less than data
+        see, as of a clock in slow steps, whatever its derivatives promise.
         """
         node, every = self.nodes.get(key), self.effects(key)
         if node is None or not key:
             return every
         gaps = len(self.hyper.cells) // len(self.hyper.gaps)  # the first cell of each gap has the least discrepancy
         cell = node.grid[gaps * int(np.argmax(node.evidence[::gaps]))]
-        f = node.fit
-        own, suspects, out = node.groups[: len(key)], f.hypothesis.suspects, set(every)
+        own, suspects, out = node.groups[: len(key)], node.fit.hypothesis.suspects, set(every)
         if cell is None:
             return every
-        away = dict(zip(map(id, f.free), np.abs(f.theta) / np.maximum(f.deviations(), 1e-300), strict=True))
         for effect in every:
             mine = [n for n, s in enumerate(suspects) if s.effect == effect]
-            fitted = max(away[id(n)] for m in mine for n in suspects[m].strengths) ** 2 > chi2.ppf(CREDIBLE, 1)
-            if not fitted or cell.lost(own, mine) < chi2.ppf(CREDIBLE, sum(own[n].strengths for n in mine)):
+            shown = chi2.ppf(CREDIBLE, sum(own[n].strengths for n in mine))
+            columns = [c for n in mine for c in own[n].columns[: own[n].strengths]]
+            at = np.concatenate([own[n].at[: own[n].strengths] for n in mine])
+            if cell.lost(own, mine) < shown or at @ cell.gram[np.ix_(columns, columns)] @ at < shown:
                 out.remove(effect)
         return frozenset(out)
 

@@ -293,13 +293,12 @@ def posterior(logs: dict[tuple[str, ...], float]) -> Posterior:
 def test_an_effect_whose_strength_is_not_told_from_zero_is_not_named(deviations, moved, lead):
     """Friction is probable beside drag, as it would explain part of a discrepancy; its fit has hardly any."""
     p = posterior({("air_drag", "crease_friction"): 0.0, ("air_drag",): -4.0, (): -50.0})
-    at = np.array([30.0, deviations])
+    at, promised = np.array([30.0, deviations * moved]), deviations * (not moved)
     groups = [Group((k,), 1, at[k : k + 1], 1, np.full(1, np.inf)) for k in range(2)]
-    both = Summed(np.diag([1.0, 1.0, 40.0]), 0.0)  # where the fit ended, in units of what is known of each strength
+    # where the fit ended, in units of what is known of each strength
+    both = Summed(np.array([[1.0, 0.0, 0.0], [0.0, 1.0, promised], [0.0, promised, 40.0]]), 0.0)
     key = frozenset({0, 1})
-    own = Hypothesis(tuple(s.suspect for s in p.signatures))
-    made = {"hypothesis": own, "free": own.free, "theta": at if moved else at * [1.0, 0.0]}
-    fitted = cast(Fit, SimpleNamespace(**made, deviations=lambda: np.full(2, 0.2)))
+    fitted = cast(Fit, SimpleNamespace(hypothesis=Hypothesis(tuple(s.suspect for s in p.signatures))))
     grid = [both, *[None] * (len(HYPER.cells) - 1)]
     p.nodes[key] = Node(key, fitted, np.where(HYPER.clean, 0.0, -np.inf), groups, [], grid)
     decided = decide(p, lambda key: Budget([Share("", "effect", 1.0)], 1.0))
