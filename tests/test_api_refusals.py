@@ -42,6 +42,7 @@ def flap(**how) -> Sheet:
             r"wrong unit \(field 'load', value 'N'\); allowed: a factor on the loads",
         ),
         (lambda: Drive(field=(0, 0, sine("1 V", "1 Hz"))), r"wrong unit \(field 'field_z', value 'V'\).*signal in T"),
+        (lambda: Drive(voltage=sine(["1 T", "2 T"], "1 Hz")), r"wrong unit \(field 'voltage.*value 'T'\).*signal in V"),
         (lambda: Drive().replace(field_x=ramp("1 V", "1 s")), r"wrong unit \(field 'field_x', value 'V'\)"),
         (lambda: ramp("1 T", "1 s", start="1 V"), r"units of two kinds \(field 'start', value 'V'\); allowed: T"),
     ],

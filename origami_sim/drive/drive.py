@@ -188,11 +188,18 @@ def _unit(**numbers: Any) -> str:
     Raises:
         InputError: they were stated in units of two kinds.
     """
-    units = {n: v.unit for n, v in numbers.items() if isinstance(v, Quantity) and v.unit != ANY}
-    if len(set(units.values())) > 1:
-        (_, first), (name, other) = units.items()
-        raise InputError("units of two kinds", field=name, value=other, allowed=first)
-    return next(iter(units.values()), ANY)
+    units = [(n, v.unit) for n, given in numbers.items() for v in _each(given) if v.unit != ANY]
+    for name, other in units:
+        if other != units[0][1]:
+            raise InputError("units of two kinds", field=name, value=other, allowed=units[0][1])
+    return units[0][1] if units else ANY
+
+
+def _each(value: Any) -> list[Quantity]:
+    """The quantities in a number, or in nested sequences of them, one for each world."""
+    if isinstance(value, list | tuple):
+        return [one for v in value for one in _each(v)]
+    return [value] if isinstance(value, Quantity) else []
 
 
 def _in(unit: str, signal: Signal) -> Signal:

@@ -3,7 +3,6 @@
 import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from origami_sim.device.device import device_module, lasting
 from origami_sim.device.scene import Setting, Settings, scene_settings
 from origami_sim.errors import InputError, nearest
 from origami_sim.explore.found import Device, Found, Measure, Way, at
-from origami_sim.explore.sweep import MOST, ROWS, Sweep, sweep
+from origami_sim.explore.sweep import MOST, ROWS, Sweep, points_of, sweep
 from origami_sim.observation.gait import period
 from origami_sim.quantities import parsed
 from origami_sim.results.printing import print_json
@@ -52,8 +51,7 @@ def run(args: Namespace) -> int:
         stated = float(settings["duration"].value) if "duration" in settings else 0.0
         duration = stated or lasting(first.drive)
         if not stated and period(first.drive) is not None:  # each point has its own
-            points = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
-            duration = max(lasting(at(build, point).drive) for point in points)
+            duration = max(lasting(at(build, point).drive) for point in points_of(build, grid))
     way = Way(duration=duration, rate=float(settings["rate"].value) if "rate" in settings else 60.0)
     found = sweep(build, grid, columns, way=way, folder=folder, progress=_progress)
     table = folder / "sweep.parquet"

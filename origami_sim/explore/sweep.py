@@ -134,7 +134,7 @@ def sweep(
     Raises:
         InputError: no points, no measures, points of different names, what `build` refuses.
     """
-    how, points = way or Way(), _points(build, grid)
+    how, points = way or Way(), points_of(build, grid)
     if not measures:
         raise InputError("a sweep needs a measure", field="measures", allowed="{name: function of Found}")
     kept = _Kept(folder)
@@ -161,7 +161,12 @@ def sweep(
     return Sweep(columns, tuple(points[0]), tuple(measures), failures, len(todo))
 
 
-def _points(build: Build, grid: Mapping[str, Sequence] | Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def points_of(build: Build, grid: Mapping[str, Sequence] | Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Values of the arguments at each point of a grid, or of a list of points.
+
+    Raises:
+        InputError: too many points, or a value that its argument does not take.
+    """
     if isinstance(grid, Mapping):
         count = prod(len(np.atleast_1d(np.asarray(given, object))) for given in grid.values())
         if count > MOST:

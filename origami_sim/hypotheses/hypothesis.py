@@ -292,6 +292,13 @@ ACROSS = ("across_x", "across_y", "across_z")
 ALONG = "along"
 """Parameter of a crease that stands for its place along a beam, from -1/2 to 1/2."""
 
+FORM: dict[str, Callable[[Model], np.ndarray | float]] = {
+    **{name: lambda model, n=n: model.position[:, n] for n, name in enumerate(ANCHORS)},
+    **{name: lambda model, n=n: float(across(model)[n]) for n, name in enumerate(ACROSS)},
+    ALONG: along_creases,
+}
+"""Parameters that follow from the form of a device: it is tied where it was when it was undeformed, for instance."""
+
 
 def apply(
     parameters: Parameters, hypothesis: Hypothesis, values: Sequence[float] | np.ndarray, model: Model
@@ -312,14 +319,8 @@ def apply(
         for p in effect.parameters:
             if p.name in fitted:
                 continue
-            if p.name in ANCHORS:  # tied where it was when it was undeformed
-                out.set(s.effect, p.name, model.position[:, ANCHORS.index(p.name)])
-                continue
-            if p.name in ACROSS:
-                out.set(s.effect, p.name, across(model)[ACROSS.index(p.name)])
-                continue
-            if p.name == ALONG:
-                out.set(s.effect, p.name, along_creases(model))
+            if p.name in FORM:
+                out.set(s.effect, p.name, FORM[p.name](model))
                 continue
             donor = next(
                 (

@@ -6,7 +6,6 @@ from scipy.interpolate import CubicHermiteSpline
 
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
-from origami_sim.model import node_mass
 from origami_sim.solve.motion.dynamics import Trajectory
 
 SKIP = 2
@@ -60,9 +59,7 @@ def advances(motion: Trajectory, lasts: float, *, world: int = 0) -> np.ndarray:
     """
     cycles = int((motion.times[-1] - motion.times[0]) / lasts * (1 + 1e-9))
     at = np.minimum(motion.times[0] + lasts * np.arange(cycles + 1), motion.times[-1])
-    mass = node_mass(motion.model, motion.parameters)
-    mass = mass[:, min(world, mass.shape[1] - 1)] / mass[:, min(world, mass.shape[1] - 1)].sum()
-    place, speed = (np.einsum("n,fni->fi", mass, a[:, :, world]) for a in (motion.x, motion.v))
+    place, speed = motion.centre_of_mass()[:, world], motion.centre_velocity()[:, world]
     if len(motion.times) > 1 and np.any(speed):
         return np.diff(CubicHermiteSpline(motion.times, place, speed)(at), axis=0)
     return np.diff(np.stack([np.interp(at, motion.times, p) for p in place.T], axis=1), axis=0)

@@ -132,8 +132,15 @@ class Trajectory:
 
     def centre_of_mass(self) -> np.ndarray:
         """[F, W, 3] [m]."""
+        return self._by_mass(self.x)
+
+    def centre_velocity(self) -> np.ndarray:
+        """Velocity [F, W, 3] of the centre of mass [m/s]."""
+        return self._by_mass(self.v)
+
+    def _by_mass(self, of_nodes: np.ndarray) -> np.ndarray:
         m = node_mass(self.model, self.parameters)[None, :, :, None]
-        return (m * self.x).sum(1) / m.sum(1)
+        return (m * of_nodes).sum(1) / m.sum(1)
 
     def crossings(self, frame: int = -1) -> np.ndarray:
         """[W] pairs of triangles that pass through each other in a frame; of worlds that went unstable, 0."""
