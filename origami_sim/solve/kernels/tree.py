@@ -72,12 +72,14 @@ class Tree:
     u0: int
     dy: int  # [S + 1, 7 + J], the last of probes
     du: int  # [S + 1, m], the last of probes and of the error
-    # where steps are implicit in damping: its matrix, accelerations by it at the stages, the factor of the mass matrix
-    # at the step's begin, and that of the damped one
+    # where steps are implicit in damping and stiffness: the matrix of one, the joints' moments per angle, accelerations
+    # by both at the stages, the factor of the mass matrix at the step's begin, and that of the damped one
     damping: int  # [m, m]
+    rigidity: int  # [J]
     damped: int  # [S, m]
     factor0: int  # [m, m]
     stiff: int  # [m, m]
+    age: int  # [1] steps for which they count
     span: int
     # what a step changes besides, to go back to
     hinges: int  # number of hinge angles
@@ -114,9 +116,9 @@ class Tree:
 
 
 PARTS = tuple(
-    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du damping damped factor0 stiff "
-    "span angles0 memory0 feet feet0 power0 spent turned placed hinge joint omega speed alpha gain force moment torque "
-    "heavy first second factor jacobian solved gram pull found".split()
+    "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du damping rigidity damped factor0 "
+    "stiff age span angles0 memory0 feet feet0 power0 spent turned placed hinge joint omega speed alpha gain force "
+    "moment torque heavy first second factor jacobian solved gram pull found".split()
 )
 """Parts of a world's stretch, in order."""
 

@@ -166,7 +166,6 @@ def rigid({arguments}
         clock = scalar(0.0)
         until = scalar(wp.inf)  # when a hinge reverses
         going = int(1)
-        stale = int(1)  # the damping that steps are implicit in is found once in a frame, and after a step that failed
         still = int(0)  # a pass that finds accelerations and takes no time
         if s < 0:
             still = int(1)
@@ -192,9 +191,10 @@ def rigid({arguments}
                 first_stage = final
             runge_kutta.begin(tree, angles, memory, power, w)
             probes = int(0)
-            if tree.implicit.shape[0] > 0 and still == 0 and stale == 1:
-                probes = tree.rates + 1
-                stale = int(0)
+            if tree.implicit.shape[0] > 0 and still == 0:
+                # the damping that steps are implicit in is found now and then, and after a step that failed
+                if runge_kutta.is_stale(tree, w):
+                    probes = tree.rates + 2
             for stage in range(first_stage - probes, final + 1):
                 h = scalar(0.0)
                 weighs = scalar(0.0)
@@ -240,7 +240,7 @@ def rigid({arguments}
                     longer = runge_kutta.lengthen(tree, step, error / allowed, cut, w)
                 still = int(0){halt}
             else:
-                stale = int(1)
+                runge_kutta.doubt(tree, w)
                 runge_kutta.go_back(tree, angles, memory, power, w)
                 if not (error <= allowed):
                     longer = scalar(0.0)

@@ -36,8 +36,8 @@ class RigidBatch(Batch):
 
     Args:
         model: with `panels` "rigid" (see `bodies.rigid`). tolerance: error of one step [rad]; 0: steps as given.
-        tree: the model's, if it is known. implicit: whether steps are implicit in damping, which then does not
-            bound them, see `damping.overdamped`. The rest as for `Batch`.
+        tree: the model's, if it is known. implicit: whether steps are implicit in the joints' damping and stiffness,
+            which then do not bound them, see `damping.overdamped`. The rest as for `Batch`.
 
     Raises:
         InputError: panels that are not joined by creases, held in a way that is no rigid motion, without mass or
@@ -136,6 +136,8 @@ class RigidBatch(Batch):
                 "dy": (stages + 1) * (7 + joints),
                 "du": (stages + 1) * rates,
                 "damping": self.implicit * rates**2,
+                "rigidity": self.implicit * joints,
+                "age": int(self.implicit),
                 "damped": self.implicit * stages * rates,
                 "factor0": self.implicit * rates**2,
                 "stiff": self.implicit * rates**2,
