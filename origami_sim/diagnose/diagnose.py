@@ -34,7 +34,7 @@ from origami_sim.hypotheses.subject import Source, subject_of, untold
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.posterior import Posterior, marginals
-from origami_sim.infer.screen import Signature, screen
+from origami_sim.infer.screen import LATE, Signature, screen
 from origami_sim.infer.search import search
 from origami_sim.locate.describe import unnamed
 from origami_sim.locate.impulses import impulses
@@ -145,22 +145,27 @@ def _diagnosed(
                 f"Not suspected, as it cannot act on this device or show in these recordings: {', '.join(idle)}."
             )
     screened = lambda part: tell("screen", part)  # noqa: E731
+
+    def in_time() -> bool:
+        return clock.perf_counter() - began < o.limit
+
     calm = None if not rough else calmest(forward, every, given, base, screened)
     if calm is not None:
-        weights = calm.weights
-    signatures = calm.signatures if calm is not None else screen(forward, every, base, weights, progress=screened)
+        weights, signatures = calm.weights, calm.signatures
+    else:
+        signatures = screen(forward, every, base, weights, progress=screened, going_on=in_time)
     lap("screen")
     tell("search", 0.0)
 
     def going_on(part: float, so_far: Posterior) -> bool:
         tell(f"search, so far {so_far.label(so_far.leader) if so_far.leader else 'no effect'}", part)
-        return told(lambda: clock.perf_counter() - began < o.limit)
+        return told(in_time)
 
     store = keep is not None and keep.store
     how = {"given": given, "calm": calm, "going_on": going_on, "most": o.fits, "store": store}
     posterior = search(forward, base, signatures, weights, **how)
     lap("search")
-    noted += untold(subject, [s.suspect for s in posterior.signatures if s.status])
+    noted += untold(subject, [s.suspect for s in posterior.signatures if s.status not in ("", LATE)])
     tell("verdict", 0.0)
     judged = judge(forward, given, base, posterior, compared)
     if (cause := wrong or loop) is not None:
@@ -272,8 +277,11 @@ def _diagnosed(
         Part("curves", "What looks alike could not be told", lambda: alike(shown, base), alone=True),
         *([] if film is None else [Part("replay", "The replay could not be written", replay, alone=True, of=keep)]),
         Part("held out", "Held-out errors are estimates by one linear step", left_out_in_turn),
-        Part("next experiment", "The next experiment could not be told", experiments),
     ]
+    if out.ended and best is base:
+        noted.append("No next experiment is proposed before the search is done.")
+    else:
+        parts.append(Part("next experiment", "The next experiment could not be told", experiments))
     if out.verdict != "UNTESTABLE":  # else there is nothing to be better than
         parts.append(Part("baselines", "Baselines could not be told", others))
     if keep is not None and keep.store:

@@ -45,6 +45,10 @@ CHUNK, ALONG = 6, 24
 loads, of which every frame takes its time however many worlds there are."""
 
 
+LATE = "not simulated before the limit"
+"""Status of a suspect for which there was no time."""
+
+
 @dataclass(frozen=True, eq=False)
 class Signature:
     """What a suspect would do to the predictions.
@@ -107,6 +111,7 @@ def screen(
     *,
     sized: bool = False,
     progress: Callable[[float], None] | None = None,
+    going_on: Callable[[], bool] = lambda: True,
 ) -> list[Signature]:
     """Signatures of all suspects about a fit.
 
@@ -115,21 +120,34 @@ def screen(
 
     Args:
         sized: whether the scales of strengths are known to suit.
+        going_on: asked before each few; if it says no, the others are `LATE`.
     """
     single = [one for s in suspects if not _together(s, suspects) for one in along_each_axis(s)]
     count = ALONG if forward.curve else CHUNK
     groups = [single[k : k + count] for k in range(0, len(single), count)]
     goal = float(np.hypot(_missed(forward, base, weights), small(forward, weights, base.blocks)))
-    jobs = [partial(_signatures, forward, group, base, weights, goal, sized) for group in groups]
-    each = side_by_side(jobs, forward.threads, progress)
+
+    def simulated(group: Sequence[Suspect]) -> list[tuple[Suspect, np.ndarray, float]] | None:
+        return _signatures(forward, group, base, weights, goal, sized) if going_on() else None
+
+    each = side_by_side([partial(simulated, group) for group in groups], forward.threads, progress)
     assert base.linear is not None
     ends = np.cumsum([r.count for r in base.linear.rows])[:-1]
-    alone = (Signature(s, np.split(whole[:, None], ends), np.array([z])) for mine in each for s, whole, z in mine)
+    alone = (
+        Signature(s, np.split(one[1][:, None], ends), np.array([one[2]]))
+        if one is not None
+        else Signature(s, [], np.array([s.free[0].scale]), status=LATE)
+        for group, mine in zip(groups, each, strict=True)
+        for s, one in zip(group, mine or [None] * len(group), strict=True)
+    )
     found = {id(s): _vector(s, [next(alone) for _ in s.strengths]) for s in suspects if not _together(s, suspects)}
     for s in suspects:
         if not _together(s, suspects):
             continue
-        mine = [v for v in found.values() if v.suspect.effect == s.effect and v.parts and not v.suspect.more]
+        mine = [v for v in found.values() if v.suspect.effect == s.effect and not v.suspect.more]
+        if any(v.status for v in mine):
+            found[id(s)] = Signature(s, [], np.array([f.scale for f in s.strengths]), status=LATE)
+            continue
         if not mine:
             continue
         size = np.median([abs(m.size) for m in mine], axis=0) * np.sign(mine[0].size)
@@ -163,7 +181,7 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     out, place = [], dict(zip(map(id, good), np.cumsum([0, *(len(s.size) for s in good)]).tolist(), strict=False))
     for s in found:
         if id(s) not in place:
-            out.append(replace(s, parts=[], status="its simulation goes unstable"))
+            out.append(replace(s, parts=[], status=s.status or "its simulation goes unstable"))
             continue
         mine = slice(place[id(s)], place[id(s)] + len(s.size))
         loud = np.linalg.norm(np.concatenate(s.parts), axis=0)
@@ -188,6 +206,8 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
 def _vector(s: Suspect, axes: Sequence[Signature]) -> Signature:
     """The signature of a suspect from those of each of its strengths alone."""
     size = np.concatenate([a.size for a in axes])
+    if late := next((a.status for a in axes if a.status), ""):
+        return Signature(scaled(s, size), [], size, status=late)
     parts = [np.concatenate(p, axis=1) for p in zip(*(a.parts for a in axes), strict=True)]
     return Signature(scaled(s, size), parts, size)
 

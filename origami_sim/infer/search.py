@@ -69,7 +69,7 @@ def search(
     _add(out, forward, frozenset(), base, log_priors(signatures))
     if calm is not None:
         _begun(out, forward, calm)
-    elif given is not None and strained(base):
+    elif given is not None and strained(base) and not _ended(out, most, going_on):
         _about_given(out, forward, base, given)
     for _ in range(most):  # what is named has to be fitted, however many were
         extended(out, forward, most, going_on)

@@ -8,6 +8,7 @@ import numpy as np
 from origami_sim.infer.budget import FAR, Budget
 from origami_sim.infer.discrepancy import laws, of_recorder
 from origami_sim.infer.posterior import CREDIBLE, Key, Node, Posterior
+from origami_sim.infer.screen import LATE
 from origami_sim.infer.unlisted import UNLISTED
 
 ALONE = 0.8
@@ -66,9 +67,10 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     def as_(word: str, probability: float, *, tie: bool = False) -> Decision:
         return Decision(word, best, lead or top, may_be, tie, probability * (1.0 - foreign), chance, classes, foreign)
 
-    if all(s.status for s in p.signatures):
+    late = not_simulated(p)
+    if not late and all(s.status for s in p.signatures):
         return as_("UNTESTABLE", 1.0)
-    if not lead and ended_early(p, chance):
+    if ended_early(p, chance) and (not lead or (late and left.rest > left.beyond)):
         return as_("TIE", total, tie=True)
     real = UNLISTED in lead or left.over > FAR or missing(p, best, left) > ALONE
     if left.rest > left.beyond and real:
@@ -83,8 +85,13 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
 
 
 def ended_early(p: Posterior, chance: dict[Key, float]) -> bool:
-    """Whether a search was ended while a set was most probable that had not been fitted."""
-    return p.ended and max(chance, key=lambda k: (chance[k], k in p.nodes)) not in p.nodes
+    """Whether a search was ended before all was simulated, or while a set was most probable that was not fitted."""
+    return p.ended and (not_simulated(p) > 0 or max(chance, key=lambda k: (chance[k], k in p.nodes)) not in p.nodes)
+
+
+def not_simulated(p: Posterior) -> int:
+    """How many suspects there was no time to simulate."""
+    return sum(s.status == LATE for s in p.signatures)
 
 
 def missing(p: Posterior, key: Key, left: Budget) -> float:

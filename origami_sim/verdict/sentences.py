@@ -21,6 +21,7 @@ from origami_sim.verdict.decide import (
     best_of,
     decide,
     ended_early,
+    not_simulated,
     of_each,
     shared_out,
 )  # fmt: skip
@@ -88,6 +89,16 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = "None of the catalogue's suspects is excited by these recordings."
         text = text if p.signatures else "There is no suspect that could act here."
         return Judgement(d.word, text, d.probability, [], **common)
+    if d.tie and ended_early(p, chance):
+        late = not_simulated(p)
+        text = "Not decided yet" + (f": {late} of {len(p.signatures)} suspects were not simulated." if late else ".")
+        likely = ([c for c in d.credible if classes[c] > 1.0 - CREDIBLE] or d.credible)[:LISTED]
+        if any(likely):
+            text += f" Estimated to be most probable{' of the others' if late else ', and not fitted'}: "
+            text += f"{joined([f'{_name(c)} (p = {classes[c]:.2f})' for c in likely])}."
+        text += " Of what was fitted the best is "
+        text += f"{say(shown)}, which {explained}." if suspects else "the model without any effect."
+        return Judgement(d.word, text, d.probability, chosen, **common)
     if not d.lead:
         alone = p.nodes[frozenset()].fit  # its numbers are those of the tables
         word, text, chosen = unnamed_verdict(forward, given, alone, compared, unknown=d.word == "UNKNOWN")
@@ -103,12 +114,6 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         text += MORE_LAWS if more_laws else ""
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
-    if d.tie and ended_early(p, chance):
-        likely = ([c for c in d.credible if classes[c] > 1.0 - CREDIBLE] or d.credible)[:LISTED]
-        text = "Not decided yet. Estimated to be most probable, and not fitted: "
-        text += f"{joined([f'{_name(c)} (p = {classes[c]:.2f})' for c in likely])}. Of what was fitted the best is "
-        text += f"{say(shown)}, which {explained}." if suspects else "the model without any effect."
-        return Judgement(d.word, text, d.probability, chosen, **common)
     if d.tie:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (
             ["nothing"] if frozenset() in d.credible else []

@@ -3,9 +3,11 @@
 import json
 import os
 import signal
+import time as clock
 import tomllib
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from diagnose.swings import QUICK, main, swing
@@ -34,15 +36,26 @@ def stopped_at(name: str, by):
     return told
 
 
-def test_a_search_that_ends_at_its_limit_has_a_verdict_and_goes_on_with_more_time(recorded, tmp_path, capfd):
+def test_a_search_that_ends_at_its_limit_has_a_verdict_and_goes_on_with_more_time(
+    recorded, tmp_path, capfd, monkeypatch
+):
     out = tmp_path / "out"
     arguments = ("diagnose", recorded, "--model", "pendulum_chain", "--out", out, *QUICK)
-    assert main(*arguments, "--limit", "1e-9") == EXIT["TIE"]
-    early = json.loads((out / "diagnosis.json").read_text())
+    assert main(*arguments, "--limit", "1e-9") == EXIT["TIE"]  # before suspects are simulated
+    early, said = json.loads((out / "diagnosis.json").read_text()), capfd.readouterr()
+    assert early["ended"] and not early["experiments"] and "effects" not in early["patch"]
+    assert "Not decided yet: " in said.out and "suspects were not simulated" in said.out
+    assert "do not tell" not in said.out
+    passed = [0.0]
+    with monkeypatch.context() as m:
+        fake = SimpleNamespace(perf_counter=lambda: clock.perf_counter() + passed[0])
+        m.setattr(import_module("origami_sim.diagnose.diagnose"), "clock", fake)
+        m.setattr(command.Progress, "__call__", stopped_at("search", lambda: passed.append(passed.pop() + 1e6)))
+        assert main(*arguments, "--limit", "1e5") == EXIT["TIE"]  # before a set is fitted
+    early, said = json.loads((out / "diagnosis.json").read_text()), capfd.readouterr()
     assert early["ended"] and early["verdict"] == "TIE" and "crease_friction" not in str(early["patch"])
-    said = capfd.readouterr()
     assert "search, so far no effect" in said.err
-    assert "Not decided yet" in said.out and "dry friction" in said.out and "its limit of 1e-09 s" in said.out
+    assert "Not decided yet. " in said.out and "dry friction" in said.out and "its limit of 100000 s" in said.out
     assert (out / ".resume").exists()
     assert main(*arguments) == EXIT["MECHANISM"]
     assert not json.loads((out / "diagnosis.json").read_text())["ended"]

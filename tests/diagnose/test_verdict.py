@@ -14,7 +14,7 @@ from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect
 from origami_sim.infer.budget import Budget, Share, shapley
 from origami_sim.infer.posterior import Estimate, Node, Posterior, realised_part
-from origami_sim.infer.screen import Signature
+from origami_sim.infer.screen import LATE, Signature
 from origami_sim.locate.describe import described
 from origami_sim.locate.places import Acting, Curve, Place
 from origami_sim.verdict.decide import credible, decide, shared_out
@@ -238,6 +238,14 @@ def test_a_search_that_ended_before_its_best_set_was_fitted_has_not_decided():
     del p.nodes[frozenset({0})]
     for ended, word in ((True, "TIE"), (False, "UNKNOWN")):
         p.ended = ended
+        assert decide(p, lambda key: Budget([Share("not named", "rest", 1.0)], 9.0)).word == word
+
+
+def test_what_was_not_simulated_may_be_what_nothing_else_explains():
+    p = posterior({("crease_friction",): 0.0, (): -50.0})
+    p.ended = True
+    for status, word in (("", "UNKNOWN"), (LATE, "TIE")):
+        p.signatures[-1] = replace(p.signatures[-1], status=status)
         assert decide(p, lambda key: Budget([Share("not named", "rest", 1.0)], 9.0)).word == word
 
 
