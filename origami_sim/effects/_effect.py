@@ -134,6 +134,7 @@ class Effect:
             model's axes x, y and z as the panel has turned them.
         fitted: parameters that the diagnosis fits when it suspects this effect; the first is its strength, which
             switches the effect off at its default. Empty: the effect is never suspected.
+        further: parameters that are fitted as well where a fit of those is the best, and begins from it.
         across: another effect whose vector this one turns: of its own components, as many as are fitted are suspected
             of those across that vector.
         stated: parameters that only a model can know, such as an area; the effect is suspected where one states them.
@@ -167,6 +168,7 @@ class Effect:
     channels: tuple[str, ...] = ()
     on_body: bool = False
     fitted: tuple[str, ...] = ()
+    further: tuple[str, ...] = ()
     across: str = ""
     stated: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
@@ -184,7 +186,7 @@ class Effect:
             raise ValueError(f"effect '{self.name}': unknown family '{self.family}'; allowed: {', '.join(FAMILIES)}")
         if (self.apply if self.family in DISTORTIONS else self.force) is None:
             raise ValueError(f"effect '{self.name}': the family '{self.family}' needs a law (apply or force)")
-        for name in self.fitted:
+        for name in (*self.fitted, *self.further):
             if not any(p.name == name and p.typical is not None for p in self.parameters):
                 raise ValueError(f"effect '{self.name}': fitted parameter '{name}' needs a typical value")
         own = {p.name for p in self.parameters} | {m.name for m in self.memory}

@@ -66,11 +66,11 @@ def suspects(
                 sites = sites[1:]
         fitted = _across(effect, parameters) or effect.fitted
         for site, kind, entities in sites:
-            free = tuple(_free(name, p, entities) for p in fitted)
+            free = tuple(free_number(name, p, entities) for p in fitted)
             found.append(Suspect(name, site, kind, free, entities, _among(effect.family, sites, entities)))
         parts = stretches(model, effect.family) if effect.uneven else []
         for site, kind, entities in parts:
-            free = tuple(_free(name, p, entities) for p in effect.fitted)
+            free = tuple(free_number(name, p, entities) for p in effect.fitted)
             found.append(Suspect(name, site, kind, free, entities, len(parts) + 1, stretch=True))
     return found
 
@@ -91,7 +91,7 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
         return []
     out = []
     for site, kind, entities in each:
-        strength = _free(name, effect.fitted[0], entities)
+        strength = free_number(name, effect.fitted[0], entities)
         if parameters:  # no less than nothing is left
             strength = replace(
                 strength, lower=strength.lower - float(np.min(parameters[name, strength.name][list(entities)]))
@@ -226,7 +226,8 @@ def _in_kilograms(effect) -> bool:
     return effect.parameter(effect.fitted[0]).unit == "kg"
 
 
-def _free(effect: str, name: str, entities) -> Free:
+def free_number(effect: str, name: str, entities: tuple[int, ...] | None) -> Free:
+    """A number of an effect that a fit may change, with what is plausible."""
     p = get(effect).parameter(name)
     assert p.typical is not None
     first = get(effect).parameter(get(effect).fitted[0])

@@ -1,12 +1,31 @@
-"""Components of vectors, as of a field that is turned or added, which recordings do not tell from zero."""
+"""Numbers of a leading fit that recordings do not tell from zero, and further ones that they may tell."""
 
 from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
 
+from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.suspects import free_number
+
+
+def with_further_numbers(f: Fit) -> tuple[Hypothesis, np.ndarray] | None:
+    """The effects of a fit with their further numbers (`Effect.further`), and where to begin; None if there are none.
+
+    They change little before the others are about right, and much of what is seen of a blow: from afar a fit with them
+    ends elsewhere.
+    """
+    place, suspects, theta = len(f.free) - len(f.hypothesis.free), [], [f.theta[: len(f.free) - len(f.hypothesis.free)]]
+    for s in f.hypothesis.suspects:
+        names = [] if s.more else [n for n in get(s.effect).further if n not in {g.name for g in s.free}]
+        more = tuple(free_number(s.effect, n, s.entities) for n in names)
+        suspects.append(replace(s, free=(*s.free, *more)) if more else s)
+        theta += [f.theta[place : place + len(s.free)], np.array([g.start for g in more])]
+        place += len(s.free)
+    hypothesis = Hypothesis(tuple(suspects))
+    return (hypothesis, np.concatenate(theta)) if len(hypothesis.free) > len(f.hypothesis.free) else None
 
 
 def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.ndarray] | None:

@@ -24,7 +24,7 @@ from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere, loosened, tightened
 from origami_sim.infer.budget import FAR, astray, over_noise
 from origami_sim.infer.columns import Columns
-from origami_sim.infer.components import without_unseen_components
+from origami_sim.infer.components import with_further_numbers, without_unseen_components
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
@@ -252,6 +252,7 @@ def _tried(out: Posterior, forward: Predictor, key: Key) -> None:
         out.futile = 0
     if key == out.leader:
         _with_seen_components(out, forward, key)
+        _with_further_numbers(out, forward, out.leader)
 
 
 def better_within(out: Posterior, f: Fit, key: Key) -> Node | None:
@@ -327,11 +328,27 @@ def _with_seen_components(out: Posterior, forward: Predictor, key: Key) -> None:
     if (fewer := without_unseen_components(f, CREDIBLE)) is None:
         return
     hypothesis, theta = fewer
-    found = _finished(out, forward, fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local), f.weights)
+    _in_another_form(out, forward, fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local), f)
+
+
+def _with_further_numbers(out: Posterior, forward: Predictor, key: Key) -> None:
+    """Fits a set as well with the further numbers of its effects, such as the loss of a contact."""
+    f = out.nodes[key].fit
+    if (more := with_further_numbers(f)) is None:
+        return
+    hypothesis, theta = more
+    found = fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local)
+    _in_another_form(out, forward, elsewhere(forward, found, rough=False), f)
+
+
+def _in_another_form(out: Posterior, forward: Predictor, found: Fit, f: Fit) -> None:
+    """Enters the fit of a set whose effects have other numbers than in a fit before."""
+    found = _finished(out, forward, found, f.weights)
     if not found.failed:
         known = {id(s.suspect) for s in out.signatures}
-        out.signatures += [Signature(s, [], np.ones(1)) for s in hypothesis.suspects if id(s) not in known]
-        _add(out, forward, frozenset(members_of(hypothesis, out)), found, log_priors(out.signatures))
+        new = [s for s in found.hypothesis.suspects if id(s) not in known]
+        out.signatures += [Signature(s, [], np.ones(1)) for s in new]
+        _add(out, forward, frozenset(members_of(found.hypothesis, out)), found, log_priors(out.signatures))
 
 
 def polished(out: Posterior, forward: Predictor, most: int, going_on: GoingOn) -> bool:

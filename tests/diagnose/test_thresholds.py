@@ -61,6 +61,17 @@ def test_a_stop_short_of_flat_is_named_wherever_flat_is():
     assert [v for label, v in found.patch.items() if label.startswith("crease_contact.contact_side@")] == [-1.0]
 
 
+def test_a_stop_that_takes_energy_is_named_with_what_it_takes():
+    stop = {"contact_stiffness": (2e-2, None), "contact_angle": (-STOP, None), "contact_loss": (0.12, None)}
+    few = ["crease_contact", "crease_stop", "crease_stiffening", "crease_asymmetry", "air_drag"]
+    found = diagnose(subject(2), record({"crease_contact": stop}, **SWING), Options(threads=1), catalogue=few)
+    assert found.verdict == "MECHANISM" and found.chosen == ["crease_contact at crease 0"], found.sentence
+    numbers = {n.label: n for n in found.candidates[0].numbers}
+    for name, (true, _) in stop.items():
+        number = numbers[f"crease_contact.{name}"]
+        assert number.low < true < number.high and number.value == pytest.approx(true, rel=0.15)
+
+
 def test_a_stiff_stop_is_found_from_a_soft_one_that_acts_earlier(stopped):
     """A threshold is tried with strengths of its own: to a late stop belongs a stiff one."""
     forward, _ = arranged(subject(2), prepared([stopped], 200.0), Options())

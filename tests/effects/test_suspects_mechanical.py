@@ -261,6 +261,20 @@ def test_contact_acts_on_its_side_only(side):
     assert m == pytest.approx(side * 0.6 * (0.2 - side * ANGLES).clip(min=0), abs=1e-13)
 
 
+def test_a_contact_with_loss_returns_a_blow_as_hunt_and_crossley_say():
+    c, k = 0.15, 0.6
+    given = {**under("crease_contact", contact_stiffness=k, contact_angle=0.2, contact_loss=c)}
+    for rate in (-9.0, -2.0, 0.0, 3.0):  # it never pulls
+        m = moments(["crease_contact"], given, [0.1, 0.5], rate=rate)
+        assert m == pytest.approx([0.0, -k * 0.3 * max(1.0 + c * rate, 0.0)], abs=1e-13)
+    w0 = 4.0
+    run = ringing(given, angle=0.1, rate=w0, duration=1.0, frames=2000)
+    w1 = -(run.creases[-1, 0, 0] - run.creases[-11, 0, 0]) / (run.times[-1] - run.times[-11])
+    assert c * (w0 + w1) == pytest.approx(math.log((1 + c * w0) / (1 - c * w1)), rel=1e-3)
+    assert 0.5 * w0 < w1 < 0.8 * w0
+    assert run.energy_error < 1e-3
+
+
 def test_quadratic_damping_decays_as_one_over_time():
     for rate in (-250.0, -3.0, 0.0, 7.0, 250.0):
         m = moments(["crease_quadratic_damping"], under("crease_quadratic_damping", coefficient=0.2), [0.3], rate=rate)
