@@ -307,7 +307,7 @@ def apply(
 
     Parameters that are not fitted are copied from an effect of the model that has one of the same name for the same
     family (a suspect's magnet is the panel's magnet); else they get their typical value, else their default. What else
-    is a strength of the effect, as another component of a vector, is zero.
+    is a strength of the effect, as another component of a vector, is zero, and further numbers have their defaults.
     """
     out = parameters.for_model(model)
     given = [n for n in model.effects if any(owner == n for owner, _ in parameters)]
@@ -315,7 +315,7 @@ def apply(
         effect = get(s.effect)
         if s.effect in given:
             continue
-        fitted = {f.name for f in s.free} | silent(s.effect).keys()
+        fitted = {f.name for f in s.free} | silent(s.effect).keys() | {*effect.further}
         for p in effect.parameters:
             if p.name in fitted:
                 continue
