@@ -1,5 +1,6 @@
 """Numbers of a leading fit that recordings do not tell from zero, and further ones that they may tell."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +8,34 @@ from scipy.stats import chi2
 
 from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
-from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.hypothesis import Hypothesis, Suspect
 from origami_sim.hypotheses.suspects import free_number
+from origami_sim.infer.screen import Signature
+
+
+def with_single_components(signatures: Sequence[Signature]) -> list[Signature]:
+    """The signatures, and after each of a vector one for every component of it alone.
+
+    A component that a device hardly shows, as the turn of a magnet about the normal of its panel, spoils the fits of
+    the others: what it promises far from zero it does not keep.
+    """
+    out = []
+    for s in signatures:
+        out.append(s)
+        strong, rest = s.suspect.strengths, [n for n in s.suspect.free if n not in s.suspect.strengths]
+        if len(strong) < 2 or not is_vector(s.suspect) or not s.parts:
+            continue
+        for n, strength in enumerate(strong):
+            alone = replace(s.suspect, free=(replace(strength, spread=np.inf), *rest))
+            mine = slice(n, n + 1)
+            parts = [p[:, mine] for p in s.parts]
+            out.append(replace(s, suspect=alone, parts=parts, size=s.size[mine], norm=s.norm[mine], raw=s.raw[mine]))
+    return out
+
+
+def is_vector(s: Suspect) -> bool:
+    """Whether a suspect's strengths are components of one vector: branches of a spectrum have a time constant each."""
+    return len(s.free) < 2 * len(s.strengths)
 
 
 def with_further_numbers(f: Fit) -> tuple[Hypothesis, np.ndarray] | None:
@@ -42,7 +69,7 @@ def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.n
     cover, at = root @ root.T, f.coordinates.of(f.theta)
     place, gone, suspects = len(f.free) - len(f.hypothesis.free), [], []
     for s in f.hypothesis.suspects:
-        vector = len(s.free) < 2 * len(s.strengths)  # the branches of a spectrum have a time constant each
+        vector = is_vector(s)
         unseen = _unseen(cover, at, [place + k for k, n in enumerate(s.free) if vector and n in s.strengths], credible)
         kept = [n for k, n in enumerate(s.free) if place + k not in unseen]
         suspects.append(replace(s, free=(replace(kept[0], spread=np.inf), *kept[1:])) if unseen else s)

@@ -156,6 +156,28 @@ def screen(
     return rated([found[id(s)] for s in suspects if id(s) in found], base)
 
 
+def simulated_at(
+    forward: Predictor, some: Sequence[Signature], strengths: Sequence[np.ndarray], base: Fit, weights: Weights
+) -> list[Signature]:
+    """Signatures simulated again, each at strengths (k,) over its size; those at zero are as they were."""
+    least = forward.step(base.hypothesis, base.theta) / SLOWEST
+    each = [
+        (axis, _affordable(forward, base, axis, z * x, least))
+        for s, x in zip(some, strengths, strict=True)
+        for axis, z, x in zip(along_each_axis(s.suspect), s.size, np.where(x == 0.0, 1.0, x), strict=True)
+    ]
+    groups = [each[k : k + CHUNK] for k in range(0, len(each), CHUNK)]
+
+    def simulated(group: Sequence[tuple[Suspect, float]]) -> list[Signature]:
+        size = np.array([z for _, z in group])
+        changes = _changes(forward, [s for s, _ in group], size, base, weights, base.blocks)
+        return [Signature(s, [c[:, None] for c in p], np.array([z])) for (s, z), p in zip(group, changes, strict=True)]
+
+    found = side_by_side([partial(simulated, group) for group in groups], forward.threads)
+    alone = iter([one for group in found for one in group])
+    return [_vector(s.suspect, [next(alone) for _ in s.size]) for s in some]
+
+
 def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     """The signatures with their norms about a fit, and what cannot be tested there."""
     line = base.linear

@@ -24,13 +24,13 @@ from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere, loosened, tightened
 from origami_sim.infer.budget import FAR, astray, over_noise
 from origami_sim.infer.columns import Columns
-from origami_sim.infer.components import with_further_numbers, without_unseen_components
+from origami_sim.infer.components import with_further_numbers, with_single_components, without_unseen_components
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
 from origami_sim.infer.posterior import CREDIBLE, Estimate, Key, Node, Posterior
 from origami_sim.infer.proposals import ROUGH, UNFITTED, in_place_of, named, proposed
-from origami_sim.infer.scan import from_given_numbers, over_their_range, scanned, strained
+from origami_sim.infer.scan import at_their_strengths, from_given_numbers, over_their_range, scanned, strained
 from origami_sim.infer.screen import Signature, screen
 from origami_sim.infer.unlisted import anywhere, beside
 
@@ -65,6 +65,8 @@ def search(
         going_on: asked before each fit, and told the part of them that is done and what is known so far. If it says no,
             what has been fitted by then is the answer (`Posterior.ended`).
     """
+    if calm is None:
+        signatures = with_single_components(at_their_strengths(forward, signatures, base, weights))
     out = Posterior(signatures, weights, store=store)
     _add(out, forward, frozenset(), base, log_priors(signatures))
     if calm is not None:
@@ -328,6 +330,11 @@ def _with_seen_components(out: Posterior, forward: Predictor, key: Key) -> None:
     if (fewer := without_unseen_components(f, CREDIBLE)) is None:
         return
     hypothesis, theta = fewer
+    of = {s.suspect.form: s.suspect for s in out.signatures}
+    hypothesis = Hypothesis(tuple(of.get(s.form, s) for s in hypothesis.suspects))
+    if {id(s) for s in hypothesis.suspects} <= {id(s.suspect) for s in out.signatures}:
+        if frozenset(members_of(hypothesis, out)) in out.nodes:
+            return
     _in_another_form(out, forward, fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local), f)
 
 
