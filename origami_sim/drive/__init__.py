@@ -2,13 +2,16 @@
 
 from origami_sim.drive.drive import (
     CHANNELS,
+    PATHS,
     SAMPLES_PER_SECOND,
     UNITS,
     Drive,
     Signal,
     Value,
     as_signal,
+    held_series,
     held_to,
+    path_to,
     ramp,
     series,
     sine,
@@ -16,13 +19,16 @@ from origami_sim.drive.drive import (
 
 __all__ = [
     "CHANNELS",
+    "PATHS",
     "SAMPLES_PER_SECOND",
     "UNITS",
     "Drive",
     "Signal",
     "Value",
     "as_signal",
+    "held_series",
     "held_to",
+    "path_to",
     "ramp",
     "series",
     "sine",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from origami_sim.errors import InputError, named_arguments
 from origami_sim.quantities import ANY, Quantity, converted
@@ -26,13 +27,20 @@ CHANNELS = (
 """Fixed channels, in the order of the kernels; `voltage_0`, `voltage_1`, ... (electrode groups) follow, and after them
 the numbers of the sources, `source_0_strength`, `source_0_x`, ...
 
-The origin is the age [s] of the device at the start: laws of time count from it.
+The origin is the age [s] of the device at the start: laws of time count from it. Paths of grips come last: `grip_top`
+[m] of one that moves along a direction, `turn_top` [rad] of one that turns about an axis.
 """
 FOREVER = 1e9
 """Instant to which the end of a ramp is held [s], as if for ever: thirty years."""
 
-UNITS = {"field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1", "origin": "s"}
+UNITS = {
+    "field": "T", "gradient": "T/m", "voltage": "V", "temperature": "K", "load": "1", "origin": "s",
+    "grip": "m", "turn": "rad",
+}  # fmt: skip
 """SI unit of each family of channels, which is what stands before the first underscore."""
+
+PATHS = ("grip", "turn")
+"""Families of channels that are paths of grips."""
 
 SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 """How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
@@ -42,12 +50,13 @@ SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 class Signal:
     """One channel: offset + amplitude sin(2 pi frequency t + phase) + scale * series(t).
 
-    All numbers may be arrays with one value per world. The series is linear between its samples.
+    All numbers may be arrays with one value per world. The series is linear between its samples, unless it has slopes.
 
     Attributes:
         offset, amplitude: in the channel's SI unit.
         frequency: [Hz]. phase: [rad].
         times, values: samples [s] and their values (n,), or (n, worlds), or None. scale: factor on the series.
+        slopes: of a path that is smooth, its derivatives at the samples (as the values), by which cubics join them.
     """
 
     offset: float | np.ndarray = 0.0
@@ -57,6 +66,7 @@ class Signal:
     times: np.ndarray | None = None
     values: np.ndarray | None = None
     scale: float | np.ndarray = 1.0
+    slopes: np.ndarray | None = None
 
     unit = ANY
     """SI unit that its numbers were stated in; no field, as only who takes it for a channel asks for it."""
@@ -86,6 +96,8 @@ class Signal:
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
+        if self.slopes is not None:
+            object.__setattr__(self, "slopes", np.broadcast_to(np.asarray(self.slopes, float), values.shape))
 
     @property
     def numbers(self) -> tuple[float | np.ndarray | None, ...]:
@@ -113,12 +125,53 @@ class Signal:
     def _sampled(self, t) -> np.ndarray:
         """The series at times t; [..., worlds] where the worlds differ."""
         assert self.times is not None and self.values is not None
+        if self.slopes is not None:
+            return self._joined(t, 0)
         if self.values.ndim == 1:
             return np.interp(t, self.times, self.values)
         t = np.asarray(t, float)
         if t.ndim and t.shape[-1] == 1:
             t = t[..., 0]
         return np.stack([np.interp(t, self.times, column) for column in self.values.T], axis=-1)
+
+    def _joined(self, t, order: int) -> np.ndarray:
+        """The series at times t as its slopes join it, or as straight lines; or its first or second derivative.
+
+        Beyond its ends it rests. At a sample a derivative is that of what comes before.
+        """
+        assert self.times is not None and self.values is not None
+        at = np.asarray(t, float)
+        at = at[..., 0] if at.ndim and at.shape[-1] == 1 and self.values.ndim == 2 else at
+        if self.slopes is not None:
+            out = CubicHermiteSpline(self.times, self.values, self.slopes)(np.clip(at, *self.times[[0, -1]]), order)
+        elif order == 1:
+            shape = (-1, *(1,) * (self.values.ndim - 1))
+            i = np.clip(np.searchsorted(self.times, at), 1, len(self.times) - 1)
+            out = (np.diff(self.values, axis=0) / np.diff(self.times).reshape(shape))[i - 1]
+        else:
+            out = np.zeros((*at.shape, *self.values.shape[1:]))
+        if not order:
+            return out
+        inside = (at >= self.times[0]) & (at <= self.times[-1])
+        return np.where(inside.reshape((*at.shape, *(1,) * (out.ndim - at.ndim))), out, 0.0)
+
+    def derivatives(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Its first and second derivative at times t [s], shaped like the signal; without the jumps at `kinks`."""
+        omega = 2 * math.pi * np.asarray(self.frequency)
+        angle = omega * t + self.phase
+        out = [self.amplitude * omega * np.cos(angle), -self.amplitude * omega**2 * np.sin(angle)]
+        if self.times is not None:
+            out = [o + np.asarray(self.scale) * self._joined(t, k) for k, o in enumerate(out, 1)]
+        return np.asarray(out[0], float), np.asarray(out[1], float)
+
+    @property
+    def kinks(self) -> np.ndarray:
+        """Instants (k,) at which its rate jumps [s]: the samples of a series that is linear in between."""
+        if self.times is None or self.values is None or self.slopes is not None or not np.any(self.scale):
+            return np.zeros(0)
+        rates = np.diff(self.values, axis=0) / np.diff(self.times).reshape(-1, *(1,) * (self.values.ndim - 1))
+        jumps = np.abs(np.diff(rates, axis=0, prepend=0.0, append=0.0)).reshape(len(self.times), -1).max(axis=1)
+        return self.times[jumps > 1e-12 * jumps.max(initial=0.0)]
 
     def seen_from(self, start: float) -> "Signal":
         """The same signal on a clock that shows 0 at `start` [s] of this one."""
@@ -149,8 +202,11 @@ class Signal:
         values = [self.values] * count
         if self.values is not None and self.values.ndim == 2:
             values = list(np.broadcast_to(self.values, (len(self.values), count)).T)
+        slopes = [self.slopes] * count
+        if self.slopes is not None and self.slopes.ndim == 2:
+            slopes = list(np.broadcast_to(self.slopes, (len(self.slopes), count)).T)
         parts = [dict(zip(names, mine, strict=True)) for mine in zip(*numbers, strict=True)]
-        return [replace(self, **part, values=v) for part, v in zip(parts, values, strict=True)]
+        return [replace(self, **part, values=v, slopes=d) for part, v, d in zip(parts, values, slopes, strict=True)]
 
 
 Value = float | str | np.ndarray | Signal
@@ -171,14 +227,20 @@ def sine(amplitude: Any, frequency: Any, *, phase: Any = 0.0, offset: Any = 0.0)
 
 
 @named_arguments
-def ramp(final: Any, duration: float | str, *, start: Any = 0.0) -> Signal:
-    """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s")."""
+def ramp(final: Any, duration: float | str, *, start: Any = 0.0, smooth: bool = False) -> Signal:
+    """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s").
+
+    With `smooth`, the path of a grip begins and ends at rest, without jumps of acceleration: s^3 (10 - 15 s + 6 s^2)
+    at the share s of the duration, by cubics between 33 samples.
+    """
     final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
     if not 0 < duration < FOREVER:
         allowed = f"above 0, below {FOREVER:g} s"
         raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed=allowed)
-    times, values = np.array([0.0, duration, FOREVER]), np.array([0.0, 1.0, 1.0])
-    signal = Signal(offset=start, times=times, values=values, scale=np.subtract(final, start))
+    s = np.linspace(0.0, 1.0, 33 if smooth else 2)
+    times, values = np.append(duration * s, FOREVER), np.append(s**3 * (10 - 15 * s + 6 * s**2) if smooth else s, 1.0)
+    slopes = np.append(30 * (s * (1 - s)) ** 2 / duration, 0.0) if smooth else None
+    signal = Signal(offset=start, times=times, values=values, scale=np.subtract(final, start), slopes=slopes)
     return _in(_unit(final=final, start=start), signal)
 
 
@@ -209,14 +271,35 @@ def _in(unit: str, signal: Signal) -> Signal:
 
 
 @named_arguments
-def series(times: Any, values: Any, *, scale: Any = 1.0) -> Signal:
-    """Samples with linear interpolation; a run may not last longer than they do."""
-    return Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
+def series(times: Any, values: Any, *, scale: Any = 1.0, smooth: bool = False) -> Signal:
+    """Samples with linear interpolation; a run may not last longer than they do.
+
+    With `smooth`, the path of a grip goes through them on a cubic spline, without jumps of its velocity.
+    """
+    signal = Signal(times=np.asarray(times, float), values=np.asarray(values, float), scale=scale)
+    if not smooth or signal.times is None or signal.values is None:
+        return signal
+    return replace(signal, slopes=CubicSpline(signal.times, signal.values)(signal.times, 1))
 
 
 def held_to(end: float, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Samples, the last of them held to a second after `end` [s], which is no earlier."""
     return np.append(times, end + 1.0), np.append(values, values[-1:], axis=0)
+
+
+def held_series(end: float, times: np.ndarray, values: np.ndarray) -> Signal:
+    """The series of samples of which the last holds until after `end` [s]."""
+    return series(*held_to(end, times, values))
+
+
+def path_to(end: float, times: np.ndarray, values: np.ndarray) -> Signal:
+    """The smooth path of a grip through samples, which goes on for one of their steps and then comes to rest.
+
+    It is held until after `end` [s].
+    """
+    curve = CubicSpline(times, values)
+    at = np.append(times, 2 * times[-1] - times[-2])
+    return replace(held_series(max(end, at[-1]), at, curve(at)), slopes=np.append(curve(at, 1), 0.0))
 
 
 def as_signal(value, unit: str = ANY, name: str = "") -> Signal:
@@ -227,6 +310,9 @@ def as_signal(value, unit: str = ANY, name: str = "") -> Signal:
     """
     if not isinstance(value, Signal):
         return Signal(offset=converted(value, unit, name or unit))
+    if value.slopes is not None and name.partition("_")[0] not in PATHS:
+        allowed = "the path of a grip; other channels are linear between their samples"
+        raise InputError("only paths are smooth", field=name or unit, value="smooth", allowed=allowed)
     if value.unit != unit and ANY not in (unit, value.unit):
         allowed = "a factor on the loads, such as ramp(1, '1 s')" if name == "load" else f"a signal in {unit}"
         raise InputError("wrong unit", field=name or unit, value=value.unit, allowed=allowed)
@@ -246,6 +332,8 @@ class Drive:
         voltage: a number or signal [V], or one for each electrode group.
         temperature: rise above the rest state [K]. load: load factor [-]. origin: age of the device at the start [s].
         sources: magnets, coils and tables around the device (`sources`), whose field is added at every place.
+        grips: path of each grip that moves along a direction (`Sheet.grip`), by its name [m]. turns: of each that turns
+            about an axis [rad].
 
     Raises:
         InputError: wrong number of components, times that do not increase, values that are not finite.
@@ -262,6 +350,8 @@ class Drive:
         load: Value = 0.0,
         origin: Value = 0.0,
         sources: Sequence["Source | Sequence[Source]"] = (),
+        grips: Mapping[str, Value] | None = None,
+        turns: Mapping[str, Value] | None = None,
     ):
         if not isinstance(field, Sequence | np.ndarray) or isinstance(field, str) or len(field) != 3:
             raise InputError("a field has three components", field="field", value=field, allowed="(x, y, z)")
@@ -271,6 +361,12 @@ class Drive:
         voltages = list(voltage) if isinstance(voltage, (list, tuple)) else [voltage]
         values: list = [*field, *(g for row in gradient for g in row), temperature, load, origin, *voltages]
         names = [*CHANNELS, *(f"voltage_{i}" for i in range(len(voltages)))]
+        for family, paths in zip(PATHS, (grips, turns), strict=True):
+            if paths is not None and not isinstance(paths, Mapping):
+                field = f"{family}s"
+                raise InputError("paths go by the names of grips", field=field, value=paths, allowed='{"top": "5 mm"}')
+            names += [f"{family}_{n}" for n in paths or ()]
+            values += (paths or {}).values()
         self.signals = {n: as_signal(v, UNITS[n.partition("_")[0]], n) for n, v in zip(names, values, strict=True)}
         self._place(sources)
 
@@ -357,13 +453,13 @@ class Drive:
         return max(s.worlds for s in self.signals.values())
 
     def replace(self, **signals: Value) -> "Drive":
-        """The same drive with other signals in the channels named.
+        """The same drive with other signals in the channels named; paths of grips may be new ones.
 
         Raises:
             InputError: there is no such channel.
         """
         for name in signals:
-            if name not in self.signals:
+            if name not in self.signals and name.partition("_")[0] not in PATHS:
                 raise InputError("no such drive channel", field="channel", value=name, allowed=", ".join(self.signals))
         new = {n: as_signal(s, UNITS.get(n.partition("_")[0], ANY), n) for n, s in signals.items()}
         return self.with_signals({**self.signals, **new})

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from origami_sim.drive.drive import UNITS, Drive, Signal, ramp, series, sine
+from origami_sim.drive.drive import PATHS, UNITS, Drive, Signal, ramp, series, sine
 from origami_sim.drive.sources import STRENGTHS, coil, coil_pair, dipole, field_table, flattened, magnet
 from origami_sim.errors import InputError, nearest
 from origami_sim.quantities import converted
@@ -118,7 +118,8 @@ def read_drive(given: dict[str, Any], path: Path) -> Drive:
     plain = Drive(voltage=[0.0] * (max(groups, default=0) + 1))
     signals = {}
     for name, value in given.items():
-        check_known(name, plain.signals, "drive", path)
+        if name.partition("_")[0] not in PATHS:
+            check_known(name, plain.signals, "drive", path)
         signals[name] = read_signal(value, UNITS[name.partition("_")[0]], f"drive.{name}", path)
     return plain.replace(**signals).with_sources(sources)
 
@@ -132,7 +133,7 @@ def read_signal(value: Any, unit: str, field: str, path: Path) -> Any:
             rest = {n: converted(v, unit, field) if n in ("start", "offset") else v for n, v in value.items()}
             amount = converted(rest.pop(kind), unit, field)
             return called(wave, {first: amount, **rest}, field, path)
-    if "times" in value and set(value) <= {"times", "values", "scale"}:
+    if "times" in value and set(value) <= {"times", "values", "scale", "smooth"}:
         values = converted(value.get("values", []), unit, field)
         return called(series, {**value, "values": values}, field, path)
     whole = {n: converted(v, unit, field) if n in ("offset", "amplitude") else v for n, v in value.items()}

@@ -1,8 +1,10 @@
 """A drive as it is seen from several starts."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from origami_sim.drive.drive import SAMPLES_PER_SECOND, Drive, Signal, series
+from origami_sim.drive.drive import PATHS, SAMPLES_PER_SECOND, Drive, Signal, series
 
 
 def shifted(
@@ -37,7 +39,15 @@ def shifted(
         each *= len(own) // len(each)
         columns = [np.broadcast_to(one(local + t0), local.shape) for one, t in zip(each, own, strict=True) for t0 in t]
         values = np.stack(columns, axis=1)
-        changed[name] = series(local, np.tile(values, (1, worlds * count // values.shape[1])))
+        times = (1, worlds * count // values.shape[1])
+        changed[name] = series(local, np.tile(values, times))
+        if name.partition("_")[0] in PATHS and not len(s.kinks):  # smooth, and exactly so
+            rates = [
+                np.broadcast_to(one.derivatives(local + t0)[0], local.shape)
+                for one, t in zip(each, own, strict=True)
+                for t0 in t
+            ]
+            changed[name] = replace(changed[name], slopes=np.tile(np.stack(rates, axis=1), times))
     age = np.ravel(drive.signals["origin"](0.0))
     ages = (np.broadcast_to(age, worlds)[:, None] + starts).ravel()
     return drive.replace(**changed, origin=ages)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import solve_banded
 
-from origami_sim.drive import Drive, series
+from origami_sim.drive import PATHS, Drive, series
 
 Read = Callable[[np.ndarray], np.ndarray]
 """What an undistorted channel would have read [n, d, W] at times [n, W] [s]."""
@@ -28,7 +28,9 @@ def sampled(
     if not (np.any(when) and moving):
         return drive
     times, values = drive.series(moving, duration)
-    return drive.replace(**{c: series(times, change(times, v)) for c, v in zip(moving, values, strict=True)})
+    smooth = [c.partition("_")[0] in PATHS and not len(drive[c].kinks) for c in moving]
+    new = [series(times, change(times, v), smooth=s) for v, s in zip(values, smooth, strict=True)]
+    return drive.replace(**dict(zip(moving, new, strict=True)))
 
 
 def scaled(drive: Drive, channels: Sequence[str], factor: np.ndarray) -> Drive:

@@ -201,7 +201,7 @@ def upload(drive: Drive, now: wp.array, device) -> Sources:
 
     out = Sources()
     out.kind = constant([KINDS.index(kind) for kind, _ in drive.placed], wp.int32)
-    out.first, out.now = len(CHANNELS) + drive.groups, now
+    out.first, out.now = list(drive.signals).index("source_0_strength") if drive.placed else 0, now
     out.grid, out.box = constant(grid, wp.int32, 4), constant(box, wp.float64, 6)
     out.potential = constant(np.concatenate(potential), wp.float64)
     return out
