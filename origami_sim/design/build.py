@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from origami_sim.design.creases import Creases
 from origami_sim.design.dielectric import Electrodes
+from origami_sim.design.grips import Grips
 from origami_sim.design.ground import Contact, Ground, Grounds
 from origami_sim.design.masses import LEVEL, Stated, positive
 from origami_sim.design.shell import Shell, assign, matrices, plates, stated
@@ -24,7 +25,7 @@ from origami_sim.physics.materials import MATERIALS, MEMBRANE_POISSON, demagneti
 from origami_sim.quantities import converted
 
 
-class Sheet(Grounds, Electrodes, Thick, Creases):
+class Sheet(Grounds, Electrodes, Thick, Creases, Grips):
     """Builder: collects what a designer states about a sheet and turns it into a Model and Parameters.
 
     Args:
@@ -110,6 +111,7 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
         self._extra_mass = np.zeros(len(self.mesh.vertices))
         self._free = np.ones((len(self.mesh.vertices), 3))
         self._labels: dict[str, tuple[str, ...]] = {}
+        self._grips: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._contacts: list[Contact] = []
         self._ground: Ground | None = None
         self._between: Touch | None = None
@@ -408,6 +410,7 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
         tri = np.array([c.triangle for c in contacts], int)
         carriers = [c.pad or mesh.triangles[c.triangle] for c in contacts]
         elastic = None if self._shell is None else matrices(self, self._shell)
+        named = {"grip": tuple(self._grips)} if self._grips else {}
         model = Model(
             position=mesh.vertices,
             free=self._free,
@@ -422,8 +425,9 @@ class Sheet(Grounds, Electrodes, Thick, Creases):
             contact_axes=np.array([c.axis for c in contacts]).reshape(-1, 3),
             electrodes=self._electrodes,
             effects=tuple(self._effects),
-            names={**self._labels, "contact": tuple(c.name for c in contacts)},
+            names={**self._labels, "contact": tuple(c.name for c in contacts), **named},
             plates=ALIKE if elastic is None or self._shell is None else plates(self, self._shell, elastic[1]),
+            **self._gripped(),
         )
         p = Parameters(model)
         mass = self._node_masses()

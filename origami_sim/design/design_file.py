@@ -47,7 +47,7 @@ _EDGES = ("fold_angles", "stiffness", "rest_angles")
 _STATEMENTS = (
     *("on", "set", "crease", "yields", "shell", "panel", "patch", "magnetise", "soften", "fix", "name"),
     *("gravity", "body", "mass", "point_mass", "contact", "underside", "feet", "ground", "touch"),
-    *("electrode", "hinge", "mitre"),
+    *("electrode", "hinge", "mitre", "grip"),
 )
 
 
@@ -257,7 +257,7 @@ def _signal(s: Signal) -> Any:
         if np.array_equal(s.values, [0, 1, 1]) and s.times[-1] > 1e8:
             start, rise = float(s.offset), float(s.scale)
             return {"ramp": start + rise, "duration": s.times[1], **({"start": start} if start else {})}
-        if not np.any(s.offset):
+        if not np.any(s.offset) and s.slopes is None:
             return {"times": s.times, "values": s.values, **({"scale": s.scale} if s.scale != 1.0 else {})}
     if s.times is None and np.any(s.amplitude):
         rest = {n: getattr(s, n) for n in ("phase", "offset") if np.any(getattr(s, n))}
@@ -265,7 +265,7 @@ def _signal(s: Signal) -> Any:
     if s.times is None:
         return s.offset
     names = ("offset", "amplitude", "frequency", "phase", "times", "values", "scale")
-    return {n: getattr(s, n) for n in names}
+    return {n: getattr(s, n) for n in names} | ({} if s.slopes is None else {"slopes": s.slopes})
 
 
 def _sources(drive: Drive) -> list[dict[str, Any]]:

@@ -344,6 +344,16 @@ def meeting(edges: list[Edge]) -> float:
     return float(np.clip(np.pi + min(least, 0.0), 0.0, np.pi))
 
 
+def _parted_grips(model: Model, source: np.ndarray, held: np.ndarray, free: np.ndarray, hinges: int) -> np.ndarray:
+    """Grips of the nodes of `parted`: those of copies of nodes `source` that panels hold, and of what is still held."""
+    if not len(model.grips):
+        return model.grips
+    corners = len(free)
+    own = np.where(np.all(free > 0, axis=1), -1, model.grips[:corners])
+    copies = np.where(held, model.grips[source], -1)
+    return np.concatenate([own, copies, model.grips[corners:], np.full(hinges, -1)]).astype(np.int32)
+
+
 def parted(
     model: Model, parameters: Parameters, lifts: np.ndarray, axes: np.ndarray, sides: np.ndarray
 ) -> tuple[Model, Parameters]:
@@ -394,6 +404,7 @@ def parted(
         contacts=moved(model.contacts),
         creases=(first + np.arange(4 * len(hinges))).reshape(-1, 4).astype(np.int32),
         carriers=np.concatenate([model.carriers, carried.ravel()]).astype(np.int32),
+        grips=_parted_grips(model, source, held[of], free[:corners], 4 * len(hinges)),
     )
     found = Parameters(out)
     for name, key in found:

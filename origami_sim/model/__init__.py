@@ -3,6 +3,7 @@
 from origami_sim.model.model import (
     ALIKE,
     BODY,
+    GRIPS,
     PADS,
     STATED,
     SURFACE,
@@ -20,6 +21,7 @@ from origami_sim.model.model import (
 __all__ = [
     "ALIKE",
     "BODY",
+    "GRIPS",
     "PADS",
     "STATED",
     "SURFACE",

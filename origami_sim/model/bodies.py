@@ -129,6 +129,7 @@ def rigid(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
         effects=effects,
         panels="rigid",
         carriers=carriers,
+        grips=np.append(model.grips, np.full(len(carriers), -1, np.int32)) if len(model.grips) else model.grips,
     )
     given = Parameters(out)
     for owner, name in given:

@@ -27,6 +27,9 @@ STATED = ("inertia", "plane", "body", "surface")
 PADS = ("pad_triangles", "pad_weights", "pad_heights", "pad_thickness")
 """Attributes of a model that say where patches can touch; a model without them is stored as if there were none."""
 
+GRIPS = ("grips", "grip_screws")
+"""Attributes of a model that say what moves held nodes; a model without them is stored as if there were none."""
+
 ALIKE = np.zeros((0, 6))
 """`Model.plates` of triangles that are all alike."""
 
@@ -61,6 +64,9 @@ class Model:
             (`curvature.axes_of`), by which neighbours share the turn of the line between them; empty: all are alike.
         start: [N, 3] where motions and equilibria begin that are given no state, such as a buckled shape; empty: in
             the reference state.
+        grips: [N] grip that moves the held axes of each node along its path in time, -1 for none; empty: nothing does.
+            Grips are named by `names["grip"]`, and move with `Drive(grips=..., turns=...)`.
+        grip_screws: [G, 6] angular velocity [rad] and velocity at the origin [m] of each for a unit of its path.
     """
 
     position: np.ndarray
@@ -86,6 +92,8 @@ class Model:
     pad_thickness: np.ndarray = field(default_factory=lambda: np.zeros(0))
     plates: np.ndarray = field(default_factory=lambda: ALIKE)
     start: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    grips: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    grip_screws: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import model_line  # only who looks pays for it
@@ -167,7 +175,7 @@ class Model:
                 continue
             if (f.name in PADS and not len(self.pad_triangles)) or (f.name == "plates" and not len(self.plates)):
                 continue
-            if f.name == "start" and not len(self.start):
+            if (f.name == "start" and not len(self.start)) or (f.name in GRIPS and not len(self.grips)):
                 continue
             value = getattr(self, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
@@ -319,7 +327,8 @@ class State:
         a: [N, W, 3] accelerations of the last force evaluation [m/s^2].
         angles: [C + Q, W] continuous hinge angles, creases first [rad].
         memory: [M, W] extra state of the effects.
-        work: [E, W] work done so far by each effect that exchanges it [J]. power: [E, W] its present power [W].
+        work: [E, W] work done so far by each effect that exchanges it [J]. power: [E, W] its present power [W]. Both
+            have a row more, the last, of the grips of a model that has any.
         step: number of steps taken; -1 before the first force evaluation.
         status: [2, W] step and node at which a world failed, -1 while it is sound.
     """
@@ -359,8 +368,8 @@ class State:
             a=np.zeros_like(x),
             angles=angles,
             memory=np.zeros((rows, worlds)),
-            work=np.zeros((len(effects), worlds)),
-            power=np.zeros((len(effects), worlds)),
+            work=np.zeros((len(effects) + bool(len(model.grips)), worlds)),
+            power=np.zeros((len(effects) + bool(len(model.grips)), worlds)),
             step=-1,
             status=np.full((2, worlds), -1, np.int32),
         )

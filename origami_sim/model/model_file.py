@@ -22,18 +22,18 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError, nearest
-from origami_sim.model.model import PADS, Model, Parameters
+from origami_sim.model.model import GRIPS, PADS, Model, Parameters
 
 _COLUMNS = {
     "position": 3, "free": 3, "bars": 2, "creases": 4, "bends": 4, "triangles": 3, "triangle_panel": 0,
     "contacts": 3, "contact_weights": 3, "contact_offsets": 0, "contact_axes": 3, "electrodes": 0, "carriers": 0,
     "pad_triangles": 0, "pad_weights": 3, "pad_heights": 0, "pad_thickness": 0, "plates": 6,
-    "start": 3,
+    "start": 3, "grips": 0, "grip_screws": 6,
 }  # fmt: skip
 """Arrays of a model, with the length of their rows."""
 
 _NODES = ("bars", "creases", "bends", "triangles", "contacts")
-_WHOLE = (*_NODES, "triangle_panel", "electrodes", "carriers", "pad_triangles")
+_WHOLE = (*_NODES, "triangle_panel", "electrodes", "carriers", "pad_triangles", "grips")
 _WORDS = ("effects", "channels", "panels")
 
 
@@ -45,7 +45,8 @@ def model_tables(model: Model, parameters: Parameters) -> dict[str, dict[str, An
     """
     if parameters.worlds > 1:
         raise InputError("a design is one world", field="parameters", value=f"{parameters.worlds} worlds")
-    empty = tuple(n for n in ("plates", "start") if not len(getattr(model, n))) + PADS * (not len(model.pad_triangles))
+    empty = tuple(n for n in ("plates", "start", *GRIPS) if not len(getattr(model, n)))
+    empty += PADS * (not len(model.pad_triangles))
     kept = [n for n in (*_WORDS, *_COLUMNS) if n not in empty]
     out: dict[str, dict[str, Any]] = {"model": {n: getattr(model, n) for n in kept}}
     out["model"]["effects"] = list(model.effects)
@@ -89,12 +90,16 @@ def read_model(data: Mapping[str, Any], path: Path) -> tuple[Model, Parameters]:
     }  # fmt: skip
     pads = 4 * len(arrays.get("pad_thickness", ()))
     counts |= {n: pads for n in ("pad_triangles", "pad_weights", "pad_heights") if n in arrays}
-    counts |= {n: count for n, count in (("plates", triangles), ("start", nodes)) if len(arrays.get(n, ()))}
+    counts |= {
+        n: count for n, count in (("plates", triangles), ("start", nodes), ("grips", nodes)) if len(arrays.get(n, ()))
+    }
     for name, count in counts.items():
         if len(arrays[name]) != count:
             raise InputError(
                 "has another number of rows", file=path, field=f"model.{name}", value=len(arrays[name]), allowed=count
             )
+    if len(arrays.get("grips", ())) and arrays["grips"].max() >= len(arrays.get("grip_screws", ())):
+        raise InputError("points nowhere", file=path, field="model.grips", value=int(arrays["grips"].max()))
     if np.any(arrays["electrodes"] < 0) or np.any(arrays["triangle_panel"] < 0):
         raise InputError("groups and panels are counted from 0", file=path, field="model.electrodes, triangle_panel")
     effects = given["effects"]
