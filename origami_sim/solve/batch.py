@@ -14,7 +14,8 @@ from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, magnets, node_mass
-from origami_sim.solve import skin
+from origami_sim.solve import grips, skin
+from origami_sim.solve.kernels import grips as clamps
 from origami_sim.solve.kernels import plates, sources
 from origami_sim.solve.program.compose import BITS, compose
 from origami_sim.solve.program.compose_sheets import asks_change
@@ -84,8 +85,9 @@ class Batch:
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
         every = [*(n for n in among if get(n).strengths or n in model.effects), *model.effects]
         self.model = model
+        self.gripped = grips.moving(model, drive) and supports is None and bool(np.any(model.free))
         with COMPILING:
-            self.program = compose(tuple(dict.fromkeys(every)), bool(among))
+            self.program = compose(tuple(dict.fromkeys(every)), bool(among), self.gripped)
         self.worlds = state.worlds
         self.threads = 1 if self.device.is_cuda else max(1, min(threads or default_threads(), self.worlds))
         self._pool: ThreadPoolExecutor | None = None
@@ -163,6 +165,9 @@ class Batch:
             self._constants.append(plates.upload(supports or model, self.device, *room))
         if self.program.touches:
             self._constants.append(skin.upload(model, self._room, self.device))
+        row = len(self.program.effects)
+        own = [clamps.upload(model, drive, grips.paths(model), row, self.device)] if self.gripped else []
+        self._clamps: list[Any] = own
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)
         self._angles, self._memory = (self._upload(s, wp.float64) for s in (state.angles, state.memory))
@@ -221,10 +226,15 @@ class Batch:
         return np.concatenate(blocks), np.array(layout, np.int32)
 
     def _spread(self, a: np.ndarray) -> np.ndarray:
-        """Rows [E, W] of the model's laws in the places that these have in the program."""
-        out = np.zeros((len(self.program.effects), a.shape[1]))
-        out[self._places] = a
+        """Rows [E, W] of the model's laws, and of its grips, in the places that these have in the program."""
+        out = np.zeros((len(self.program.effects) + bool(len(self.model.grips)), a.shape[1]))
+        out[self._rows] = a
         return out
+
+    @property
+    def _rows(self) -> list[int]:
+        """Where the rows of work of a state are in the program's."""
+        return [*self._places, len(self.program.effects)] if len(self.model.grips) else self._places
 
     def _arranged(self, a: np.ndarray) -> np.ndarray:
         """Numbers [E, W, ...] in the order in which they lie in the buffer: on the CPU world after world."""
@@ -369,6 +379,7 @@ class Batch:
                 angles,
                 carried,
                 *(notes or self._no_notes),
+                *self._clamps,
             ],
         )
         self.step = max(self.step, 0) + steps
@@ -457,8 +468,8 @@ class Batch:
             a=self._download(self._a, n),
             angles=self._download(self._angles, len(m.creases) + len(m.bends)),
             memory=self.remembered(),
-            work=self._download(self._work, len(self.program.effects))[self._places],
-            power=self._download(self._power, len(self.program.effects))[self._places],
+            work=self._download(self._work, len(self._work))[self._rows],
+            power=self._download(self._power, len(self._power))[self._rows],
             step=self.step,
             status=self._download(self._status, 2),
         )

@@ -228,9 +228,12 @@ def with_memory(model: Model, state: State) -> State:
     out = State.at_rest(model, state.worlds, position=state.x, placed=True)
     out.v, out.a, out.angles = state.v.copy(), state.a.copy(), state.angles.copy()
     out.memory[: len(state.memory)] = state.memory  # contact comes last
+    own = bool(len(model.grips))  # whose row comes last
     for name in ("work", "power"):
-        given = getattr(state, name)
-        getattr(out, name)[: len(given)] = given
+        given, rows = getattr(state, name), getattr(out, name)
+        rows[: len(given) - own] = given[: len(given) - own]
+        if own:
+            rows[-1] = given[-1]
     out.status, out.step = state.status.copy(), state.step
     return out
 
@@ -239,5 +242,6 @@ def without_memory(model: Model, state: State) -> State:
     """A state of the model with contact as one of the model without it."""
     out = state.copy()
     rows = sum(size for *_, size in model.memories)
-    out.memory, out.work, out.power = state.memory[:rows], state.work[: len(model.laws)], state.power[: len(model.laws)]
+    out.memory, own = state.memory[:rows], [*range(len(model.laws)), *([-1] if len(model.grips) else [])]
+    out.work, out.power = state.work[own], state.power[own]
     return out

@@ -68,6 +68,13 @@ def load(tree: Tree, n: int, force: vec3, w: int):
 @wp.func
 def pose(tree: Tree, w: int):
     """Places and velocities of all bodies from coordinates and rates; clears what forces are added to."""
+    pose_root(tree, w)
+    pose_rest(tree, w)
+
+
+@wp.func
+def pose_root(tree: Tree, w: int):
+    """Place and velocity of the root alone."""
     s = tree.data
     o = w * tree.width
     zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
@@ -92,6 +99,15 @@ def pose(tree: Tree, w: int):
     put_vec(s, o + tree.gain, gain)
     put_vec(s, o + tree.force, zero)
     put_vec(s, o + tree.moment, zero)
+
+
+@wp.func
+def pose_rest(tree: Tree, w: int):
+    """Places and velocities of what the root carries."""
+    s = tree.data
+    o = w * tree.width
+    zero = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
+    origin = vec_at(s, o + tree.y)
     for b in range(1, tree.bodies):
         p = tree.parent[b]
         j = b - 1

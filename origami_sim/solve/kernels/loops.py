@@ -36,8 +36,8 @@ def constrain(tree: Tree, stage: int, w: int):
             put(s, row + k, scalar(0.0))
         axis = tree.axes[3 * tree.roots + i]
         reference = vec_at(s, o + tree.reference + 3 * tree.joined[i, 0])
-        gap = scalar(0.0)
-        bias = scalar(0.0)
+        gap = at(s, o + tree.aim + 3 * i)
+        bias = at(s, o + tree.aim + 3 * i + 2)
         here = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
         for side in range(2):
             b = int(tree.joined[i, 1 + side])
@@ -63,7 +63,7 @@ def constrain(tree: Tree, stage: int, w: int):
                 along = wp.dot(axis, wp.cross(vec_at(s, o + tree.hinge + 3 * (b - 1)), arm))
                 put(s, entry, at(s, entry) + sign * along)
                 b = tree.parent[b]
-        rate = scalar(0.0)
+        rate = at(s, o + tree.aim + 3 * i + 1)
         for k in range(m):
             rate += at(s, row + k) * at(s, o + tree.u + k)
         copy(s, solved, row, m)

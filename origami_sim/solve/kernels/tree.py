@@ -113,12 +113,17 @@ class Tree:
     gram: int  # [R, R], or [m, m] if there are more constraints than rates
     pull: int  # [R] constraint forces
     found: int  # [m] accelerations by them
+    aim: (
+        int  # [R, 3] how far, how fast and how much faster grips have moved what loops close to, and the root, along it
+    )
+    wrench: int  # [6] force and moment about O of all supports, where there are grips
+    closing: int  # [m] what loops add to the momenta of the coordinates
 
 
 PARTS = tuple(
     "reference middle axis pivot start mass centre inertia steady y u y0 u0 dy du damping rigidity damped factor0 "
     "stiff age span angles0 memory0 feet feet0 power0 spent turned placed hinge joint omega speed alpha gain force "
-    "moment torque heavy first second factor jacobian solved gram pull found".split()
+    "moment torque heavy first second factor jacobian solved gram pull found aim wrench closing".split()
 )
 """Parts of a world's stretch, in order."""
 

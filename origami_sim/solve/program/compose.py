@@ -16,7 +16,7 @@ import warp as wp
 
 from origami_sim.effects import CONTACTS, DISTORTIONS, HINGES, PAIRS, SHELLS, Effect, get
 from origami_sim.physics import kinematics, magnetostatics
-from origami_sim.solve.kernels import articulated, plates, runge_kutta, sources, touching
+from origami_sim.solve.kernels import articulated, grips, plates, runge_kutta, sources, touching
 from origami_sim.solve.kernels.wave import wave
 from origami_sim.solve.program import templates
 from origami_sim.solve.program.compose_rigid import Rigid, is_steady
@@ -126,6 +126,7 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
         "shells": plates,
         "touching": touching,
         "fields": sources,
+        "clamps": grips,
         "NATURAL": articulated.NATURAL,
     }
     for e in effects:
@@ -139,8 +140,8 @@ def written(source: str, name: str, effects: tuple[Effect, ...]) -> wp.Kernel:
 
 
 class _Composer(Rigid, Sheets, Touching):
-    def __init__(self, effects: tuple[Effect, ...], shared: bool = False):
-        self.effects, self.shared = effects, shared
+    def __init__(self, effects: tuple[Effect, ...], shared: bool = False, gripped: bool = False):
+        self.effects, self.shared, self.gripped = effects, shared, gripped
         self.slots = FIXED_SLOTS + tuple((e.name, p.name) for e in effects for p in e.parameters)
         self.index = {s: i for i, s in enumerate(self.slots)}
         self.drives = {d for e in effects for d in e.drives}
@@ -572,22 +573,26 @@ class _Composer(Rigid, Sheets, Touching):
         given = {"arguments": self.arguments(), "hoist": self.hoist()}
         mass, rigid = self.value("inertia", "total", "n"), {"steady": self.steady(), **self.asked()}
         texts = (templates.HALT, templates.HALT_RIGID, templates.SWEPT_RIGID)
+        total = self.index["inertia", "total"]
+        moved = templates.GRIPS if self.gripped else templates.STANDING
+        moved = {**moved, "put": moved["put"].format(mass=f"o{total}, e{total}")}
         halt, stop, swept = ("\n" + s if self.family("pair") else "" for s in texts)
         return {
-            "rollout": templates.ROLLOUT.format(**given, body=self.body("rollout"), mass=mass, halt=halt),
-            "rigid": templates.RIGID.format(**given, **rigid, body=self.body("rigid"), halt=stop, swept=swept),
+            "rollout": templates.ROLLOUT.format(**given, **moved, body=self.body("rollout"), mass=mass, halt=halt),
+            "rigid": templates.RIGID.format(**given, **rigid, **moved, body=self.body("rigid"), halt=stop, swept=swept),
             "evaluate": templates.EVALUATE.format(**given, body=self.body("evaluate")),
             "total": templates.TOTAL.format(**given, body=self.body("total")),
         }
 
 
 @functools.cache
-def compose(names: tuple[str, ...], shared: bool = False) -> Program:
+def compose(names: tuple[str, ...], shared: bool = False, gripped: bool = False) -> Program:
     """The program of these effects. Raises InputError for an unknown effect.
 
     Args:
         shared: by models of which some lack effects; laws are then passed over in worlds where they have no strength.
+        gripped: whether kernels that go on in time take grips that move.
     """
     effects = tuple(e for e in map(get, names) if e.family not in DISTORTIONS)
-    composer = _Composer(effects, shared)
+    composer = _Composer(effects, shared, gripped)
     return Program(effects, composer.slots, composer.sources())

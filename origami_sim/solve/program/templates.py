@@ -22,6 +22,32 @@ HALT_RIGID = """                if pressed >= 0:  # by the end of the step; a st
                     status[1, w] = pressed
                     going = int(0)"""
 
+GRIPS = {
+    "extra": "\n    grips: clamps.Grips,",
+    "put": """
+        begins = int(0)
+        if s < 0:
+            begins = int(1)
+        clamps.place(grips, X, V, mask, work, P, {mass}, time, begins, w)""",
+    "counted": """
+        clamps.count(grips, F, V, mask, work, power, half, w)""",
+    "posed": """articulated.pose_root(tree, w)
+                clamps.root(grips, tree, time, w)
+                articulated.pose_rest(tree, w)
+                clamps.aim(grips, tree, time, w)""",
+    "supported": """
+                if stage >= first_stage:
+                    supporting = clamps.support(grips, tree, slot, w)
+                    spent = w * tree.width + tree.spent + grips.row
+                    tree.data[spent & NATURAL] = tree.data[spent & NATURAL] + weighs * supporting
+                    if last:
+                        power[grips.row, w] = supporting""",
+}
+"""What kernels have in addition where grips move."""
+
+STANDING = {**dict.fromkeys(GRIPS, ""), "posed": "articulated.pose(tree, w)"}
+"""The same where none does."""
+
 SWEPT_RIGID = """                error = runge_kutta.larger(error, allowed * wp.pow(swept, scalar(5.0)))"""
 
 
@@ -44,7 +70,7 @@ def rollout({arguments}
     power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, steps: int, dt: scalar, speed_limit: scalar,
     every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar), carried: wp.array3d(dtype=vec3),
-    noted: wp.array(dtype=wp.int32), notes: wp.array3d(dtype=scalar),
+    noted: wp.array(dtype=wp.int32), notes: wp.array3d(dtype=scalar),{extra}
 ):
     w = (first_world + wp.tid()) & NATURAL
     if status[0, w] >= 0:
@@ -78,8 +104,8 @@ def rollout({arguments}
             ahead = V[n, w] + half * A[n, w]
             X[n, w] = X[n, w] + h * ahead
             V[n, w] = ahead + half * A[n, w]
-            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0))
-{body}
+            F[n, w] = vec3(scalar(0.0), scalar(0.0), scalar(0.0)){put}
+{body}{counted}
         # second kick, with the new acceleration
         for row in range(mask.shape[0]):
             n = row & NATURAL
@@ -142,7 +168,7 @@ def rigid({arguments}
     tree: articulated.Tree, F: wp.array2d(dtype=vec3), work: wp.array2d(dtype=scalar),
     power: wp.array2d(dtype=scalar), status: wp.array2d(dtype=wp.int32),
     first_world: int, first_step: int, fresh: int, steps: int, dt: scalar, tolerance: scalar, size: scalar,
-    finest: scalar, every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar),
+    finest: scalar, every: int, film: wp.array3d(dtype=vec3), film_angles: wp.array3d(dtype=scalar),{extra}
 ):
     w = (first_world + wp.tid()) & NATURAL
     if status[0, w] >= 0:
@@ -211,14 +237,14 @@ def rigid({arguments}
                     weighs = articulated.at(tree.tableau, final * (tree.stages + 1) + 1 + stage)
                 time = dt * scalar(first_step + wp.max(s, 0)) + clock + h
                 last = stage == final
-                articulated.pose(tree, w)
+                {posed}
                 laid = asked
                 if still == 1 or (last and ends == 1):  # a film needs them where a frame ends
                     laid = tree.moving.shape[0]
                 articulated.place(tree, X, V, F, laid, w)
 {body}
                 articulated.gather(tree, F, X, asked, w)
-                articulated.accelerate(tree, slot, w)
+                articulated.accelerate(tree, slot, w){supported}
                 if stage < first_stage:
                     runge_kutta.probed(tree, first_stage - 1 - stage, size, w)
             allowed = tolerance

@@ -10,8 +10,10 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import centred, eccentric
+from origami_sim.solve import grips
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels.tree import PARTS, POSE, Tree
+from origami_sim.solve.rigid.shares import closing, of_grips
 from origami_sim.solve.rigid.tableaus import EXPLICIT, additive
 from origami_sim.solve.rigid.topology import Topology, check_inertia
 
@@ -56,7 +58,9 @@ class RigidBatch(Batch):
         implicit: bool = False,
         **options,
     ):
-        self.tree_of = tree or Topology(model)
+        gripped = grips.moving(model, drive)
+        self.tree_of = tree or Topology(model, gripped)
+        self._gripped = of_grips(model, self.tree_of) if gripped else None
         self.implicit = implicit
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
@@ -65,6 +69,7 @@ class RigidBatch(Batch):
             state = replace(state, x=state.x + self._eccentric(state.x))
             parameters = centred(model, parameters)
         super().__init__(model, parameters, drive, state, **options)
+        self._drive = drive
         self.tolerance, self.finest = tolerance, FINEST
         self._fresh = 1
         self._tree = self._made(state)
@@ -78,7 +83,7 @@ class RigidBatch(Batch):
         held = not len(t.turns)
         tree.first_body, tree.first_number = int(held), int(POSE) if held else 0
         tree.hinges, tree.memories = len(state.angles), len(state.memory)
-        tree.feet_count, tree.effects = len(model.contacts), len(self.program.effects)
+        tree.feet_count, tree.effects = len(model.contacts), len(self.program.effects) + self.gripped
         tree.follows, tree.stabilisation, tree.softness = int(t.follows), STABILISATION, SOFTNESS
 
         def constant(a, dtype):
@@ -87,8 +92,9 @@ class RigidBatch(Batch):
         tree.parent, tree.body_of = constant(t.parent, wp.int32), constant(t.body_of, wp.int32)
         points = np.arange(len(t.body_of)) >= len(t.body_of) - len(model.carriers)  # after the corners
         order = np.lexsort((t.body_of, points))
-        tree.moving = constant(order[t.body_of[order] >= tree.first_body].astype(np.int32), wp.int32)
-        tree.corners = int(np.sum(~points & (t.body_of >= tree.first_body)))
+        least = 0 if self.gripped else tree.first_body  # a root in a grip moves as well
+        tree.moving = constant(order[t.body_of[order] >= least].astype(np.int32), wp.int32)
+        tree.corners = int(np.sum(~points & (t.body_of >= least)))
         tree.joint_of = constant(t.joint_of, wp.int32)
         tree.axes = constant(np.concatenate([t.turns, t.shifts, t.pivots, t.row_axis]), wp.vec3d)
         tree.joined = constant(np.concatenate([t.row_node[:, None], t.row_body], axis=1), wp.int32)
@@ -145,7 +151,7 @@ class RigidBatch(Batch):
             },
             **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
             **{"heavy": tree.bodies, "factor": rates**2, "gram": min(tree.rows, rates) ** 2},
-            **{"pull": tree.rows, "found": rates},
+            **{"pull": tree.rows, "found": rates, "aim": 3 * tree.rows, "wrench": 6, "closing": rates},
         }
         columns, place = [], 0
         for name in PARTS:
@@ -159,7 +165,50 @@ class RigidBatch(Batch):
         data[:, :place] = np.concatenate(columns, axis=1)
         tree.data = constant(data.ravel(), wp.float64)
         self.size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
+        if self._gripped is not None:
+            clamp, (root, rows) = self._clamps[0], self._gripped
+            clamp.root, clamp.rows = root, constant(rows, wp.int32)
+            self._from = state, origin, axis, pivot
         return tree
+
+    def _begin_in_grips(self, time: float):
+        """Sets where paths begin, and the rates of the coordinates [m, W] there.
+
+        They are those that fit the velocities of the state; where none do, as of a device at rest in a grip that moves
+        at once, those after the blow: of all motions that the grips allow, the one nearest by mass (Gauss's principle).
+        """
+        state, origin, axis, pivot = self._from
+        root, rows = self._gripped or (-1, np.zeros(0, int))
+        motion = grips.along(self.model, self._drive, time, self.worlds)
+        self._clamps[0].begun = wp.array(motion[0], dtype=wp.float64, device=self.device)
+        t, x, corners = self.tree_of, state.x, len(state.x) - len(self.model.carriers)
+        going = [
+            motion[1, g, :, None] * (way[3:] + np.cross(way[:3], x)) for g, way in enumerate(self.model.grip_screws)
+        ]
+        base = going[root] if root >= 0 else np.zeros_like(x)
+        by, mass = self.jacobian(x, origin, axis, pivot), np.broadcast_to(self._mass, x.shape[:2])
+        data = self._tree.data.numpy().reshape(self.worlds, -1)
+        for w in range(self.worlds):
+            own, wanted = by[:, :, w], (state.v - base)[:, w]
+            u = np.linalg.lstsq(own[:, :corners].reshape(len(by), -1).T, wanted[:corners].ravel(), rcond=None)[0]
+            left = np.abs(np.einsum("mna,m->na", own, u) - wanted)[:corners].max(initial=0.0)
+            if left > 1e-9 * max(np.abs(base[:, w]).max(), np.abs(state.v[:, w]).max()):
+                heavy = np.einsum("mna,n,kna->mk", own, mass[:, w], own)
+                right = np.einsum("mna,n,na->m", own, mass[:, w], wanted)
+                slope = closing(t, x[:, w])
+                nodes = zip(rows.tolist(), t.row_node.tolist(), t.row_axis, strict=True)
+                goal = [a @ ((going[g][n, w] if g >= 0 else 0.0) - base[n, w]) if g > -2 else 0.0 for g, n, a in nodes]
+                whole = np.block([[heavy, slope.T], [slope, np.zeros((len(slope),) * 2)]])
+                u = np.linalg.lstsq(whole, np.append(right, goal), rcond=1e-13)[0][: len(by)]
+            data[w, self._tree.u : self._tree.u + len(u)] = u
+        self._tree.data.assign(data.ravel())
+
+    def supporting(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment about the origin of all supports [W, 6], and what loops add to the coordinates [m, W]."""
+        data, t = self._tree.data.numpy().reshape(self.worlds, -1), self._tree
+        wrench, at = data[:, t.wrench : t.wrench + 6].copy(), data[:, t.y : t.y + 3]
+        wrench[:, 3:] += np.cross(at, wrench[:, :3])
+        return wrench, data[:, t.closing : t.closing + t.rates].T.copy()
 
     def _bodies(self, x: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Centres [B, W, 3], masses [B, W] and inertia tensors about the centres [B, W, 3, 3] of the bodies."""
@@ -227,6 +276,8 @@ class RigidBatch(Batch):
 
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried, notes=()):
         fixed = self.tolerance == 0.0
+        if self._fresh and self._gripped is not None:
+            self._begin_in_grips(max(self.step, 0) * dt)
         self._launch(
             "rigid",
             [
@@ -246,6 +297,7 @@ class RigidBatch(Batch):
                 every,
                 film,
                 angles,
+                *self._clamps,
             ],
         )
         self._fresh = 0

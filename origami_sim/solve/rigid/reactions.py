@@ -7,6 +7,7 @@ of them has to be known. How several supports of rigid bodies share R is not det
 import numpy as np
 
 from origami_sim.model import Model
+from origami_sim.solve.rigid.shares import closing
 from origami_sim.solve.rigid.topology import Topology, mass_matrix
 
 ALONG = 1e-5
@@ -51,18 +52,12 @@ def support_of_all(model: Model, mass: np.ndarray, x: np.ndarray, v: np.ndarray,
     for w in range(x.shape[1]):
         a, b = heavy[w], right[w]
         if len(tree.row_node):  # loops stay closed
-            closing = _closing(tree, x[:, w])
-            change = _closing(tree, ends[0][:, w]) - _closing(tree, ends[1][:, w])
-            rows = len(closing)
-            a = np.block([[a, closing.T], [closing, np.zeros((rows, rows))]])
+            slopes = closing(tree, x[:, w])
+            change = closing(tree, ends[0][:, w]) - closing(tree, ends[1][:, w])
+            rows = len(slopes)
+            a = np.block([[a, slopes.T], [slopes, np.zeros((rows, rows))]])
             b = np.append(b, -(change @ u[:, w]) / (2.0 * step))
         rate = np.linalg.lstsq(a, b, rcond=1e-13)[0][:count]
         acceleration = np.einsum("mna,m->na", by[:, :, w], rate) + turning[:, w]
         out[w] = still[w] + mass @ acceleration
     return out
-
-
-def _closing(tree: Topology, x: np.ndarray) -> np.ndarray:
-    """[R, m] derivatives of the loops' gaps by the coordinates at positions [N, 3]."""
-    count = len(tree.turns) + len(tree.joints)
-    return tree.closures(x, np.zeros((count, 1)))[1][:, :, 0].T

@@ -18,8 +18,9 @@ from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.model.distort import distorted
 from origami_sim.model.motions import screw
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid.statics import NEUTRAL, REDUNDANT, STEP
-from origami_sim.solve.rigid.topology import Topology
+from origami_sim.solve.grips import moving
+from origami_sim.solve.rigid.statics import NEUTRAL, STEP
+from origami_sim.solve.rigid.topology import REDUNDANT, Topology
 
 Design = tuple[Model, Parameters, Drive]
 
@@ -34,6 +35,11 @@ class _Near:
     def __init__(self, design: Design, time: float):
         self.model, self.parameters, drive = design
         self.drive = distorted(self.model, self.parameters, drive, time)
+        if moving(self.model, self.drive):
+            allowed = "panels='elastic', or supports that stand still"
+            raise InputError(
+                "derivatives of rigid panels in grips that move are not known", field="grip", allowed=allowed
+            )
         self.tree = Topology(self.model)
         self.time, self.roots = time, len(self.tree.turns)
         self.joints = [c for c, _ in self.tree.joints]

@@ -4,8 +4,11 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State, dihedral_angles
+from origami_sim.model.motions import screw
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid.topology import Topology
+from origami_sim.solve.rigid.shares import of_grips
+from origami_sim.solve.rigid.topology import REDUNDANT, Topology
 from origami_sim.solve.skin import clear_share
 
 STEP = 1e-5
@@ -20,10 +23,6 @@ NEUTRAL = 1e-9
 CLOSED = 1e-11
 """Gap of a loop, in units of the device's size, below which it is closed."""
 
-REDUNDANT = 1e-7
-"""Part of the largest singular value of the loops' Jacobian below which a constraint repeats others: the flat state of
-a sheet has such constraints, and so has every symmetric one; above by 10^4 where measured on folded sheets."""
-
 
 class RigidSystem:
     """Moments of one world as functions of its coordinates: shifts and turns of the root, then fold angles [rad].
@@ -34,8 +33,11 @@ class RigidSystem:
     """
 
     def __init__(self, model: Model, parameters: Parameters, drive: Drive, state: State):
-        self.model, self.parameters, self.state = model, parameters, state
-        self.tree = t = Topology(model)
+        self.model, self.parameters, self.state, self._drive = model, parameters, state, drive
+        self._gripped = grips.moving(model, drive)
+        self.tree = t = Topology(model, self._gripped)
+        if self._gripped:
+            of_grips(model, t)
         self.x, self.folds = state.x[:, 0], state.angles[: len(model.creases), 0].copy()
         self.size = float(np.ptp(self.x, axis=0).max(initial=0.0)) or 1.0
         self.count = len(t.turns) + len(t.joints)
@@ -82,7 +84,24 @@ class RigidSystem:
         return out
 
     def settle(self, time: float, tolerance: float, max_iterations: int, unstable: bool) -> dict:
-        """The equilibrium near the start, as the fields of an `Equilibrium`."""
+        """The equilibrium near the start, as the fields of an `Equilibrium`, with its grips in their places."""
+        found = None
+        if self._gripped:
+            end = grips.along(self.model, self._drive, time, 1)[0]
+            for at in grips.way_to(self.model, self.x[:, None], end, self.size)[1:]:
+                x = led(self.model, self.tree, self.x, at)
+                if x is None:
+                    found = self._settled(time, tolerance, 1, unstable)
+                    said = "the grips tear the rigid panels: no shape of theirs reaches from one to the other"
+                    return {**found, "converged": False, "stable": False, "message": f"{said}."}
+                angles = dihedral_angles(x[:, None], self.model.creases)[:, 0]
+                self.folds = angles + 2 * np.pi * np.round((self.folds - angles) / (2 * np.pi))
+                self.x = x
+                found = self._settled(time, tolerance, max_iterations, unstable)
+        return found or self._settled(time, tolerance, max_iterations, unstable)
+
+    def _settled(self, time: float, tolerance: float, max_iterations: int, unstable: bool) -> dict:
+        """The equilibrium near where it is."""
         start, shift, pushes, history, message = np.zeros(self.count), 0.0, 0, [], ""
         converged, values, mode = False, np.full(1, np.nan), np.zeros(self.count)
         scale = target = 0.0
@@ -171,13 +190,34 @@ class RigidSystem:
         return bool(np.all(np.isfinite(f)) and (along.T @ step) @ f >= -0.5 * abs(work))
 
 
-def closed(tree: Topology, start: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """The coordinates (m,) nearest to q (m,), from positions [N, 3], at which loops are closed; None if not found."""
+def led(
+    model: Model, tree: Topology, x: np.ndarray, paths: np.ndarray, reference: np.ndarray | None = None
+) -> np.ndarray | None:
+    """Positions [N, 3] of panels next to x [N, 3] whose held nodes are where grips at paths [G, 1] have them.
+
+    The root goes along with its grip, and all panels with it, before loops are closed. None if they cannot be.
+    """
+    root, _ = of_grips(model, tree)
+    aims = grips.held_at(model, x[:, None], paths, reference)[:, 0]
+    ahead = paths - grips.levels_at(model, x[:, None], reference)
+    if root >= 0:
+        turn, go = screw(ahead[root][:, None] * model.grip_screws[root, :3])
+        x = x @ turn[0].T + ahead[root] * (go[0] @ model.grip_screws[root, 3:])
+    q = closed(tree, x, np.zeros(len(tree.turns) + len(tree.joints)), aims)
+    return None if q is None else tree.moved(x, q[:, None])[:, 0]
+
+
+def closed(tree: Topology, start: np.ndarray, q: np.ndarray, aims: np.ndarray | None = None) -> np.ndarray | None:
+    """The coordinates (m,) nearest to q (m,), from positions [N, 3], at which loops are closed; None if not found.
+
+    Args:
+        aims: [N, 3] where held nodes are to be, if not where they are at the start.
+    """
     if not len(tree.row_node):
         return q
     size = float(np.ptp(start, axis=0).max(initial=0.0)) or 1.0
     for _ in range(20):
-        gap, slope = tree.closures(start, q[:, None])
+        gap, slope = tree.closures(start, q[:, None], aims)
         if np.abs(gap).max(initial=0.0) <= CLOSED * size:
             return q
         q = q - np.linalg.lstsq(slope[:, :, 0].T, gap[:, 0], rcond=REDUNDANT)[0]

@@ -7,6 +7,10 @@ from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.motions import FARTHER, possible, screw
 
+REDUNDANT = 1e-7
+"""Part of the largest singular value of the loops' Jacobian below which a constraint repeats others: the flat state of
+a sheet has such constraints, and so has every symmetric one; above by 10^4 where measured on folded sheets."""
+
 NAMED = 3
 """Panels that a sentence names; more are counted."""
 
@@ -22,7 +26,8 @@ class Topology:
         root_nodes: nodes of the root. row_node, row_body, row_axis: constraints, see `kernels.tree.Tree`.
     """
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, gripped: bool = False):
+        """Of a model whose grips move if it is `gripped`: then every held axis is a constraint."""
         arm = Articulation(model)
         panels = arm.order
         apart = sorted(set(range(max(model.panel_count, 1))) - set(panels))
@@ -51,7 +56,7 @@ class Topology:
         self.root_nodes = np.flatnonzero(self.body_of == 0)
         self.floating = not np.any(model.free[self.root_nodes] == 0.0)
         self.turns, self.shifts, self.pivots, self.follows = self._root(model)
-        self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body)
+        self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body, gripped)
 
     def beyond(self, body: int) -> np.ndarray:
         """A body and all that it carries."""
@@ -139,13 +144,22 @@ class Topology:
             moves = moves + np.cross(self.turns, centre[:, None] - self.pivots)
         return np.concatenate([np.tile(self.turns, (count, 1, 1)), moves], axis=2)
 
-    def closures(self, start: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W]."""
+    def closures(
+        self, start: np.ndarray, q: np.ndarray, aims: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps [R, W] [m] by which loops are open at coordinates q [m, W], and their derivatives [m, R, W].
+
+        Args:
+            aims: [N, 3] where held nodes are to be, if not where they are at the start.
+        """
         gap, slope = 0.0, 0.0
         for sign, bodies in zip((1.0, -1.0), self.row_body.T, strict=True):
             x, by = self.positions(start, q, start[self.row_node], bodies)
             gap = gap + sign * np.einsum("rwa,ra->rw", x, self.row_axis)
             slope = slope + sign * np.einsum("mrwa,ra->mrw", by, self.row_axis)
+        if aims is not None:
+            off = np.einsum("ra,ra->r", (start - aims)[self.row_node], self.row_axis)
+            gap = gap + np.where(self.row_body[:, 1] < 0, off, 0.0)[:, None]
         return np.asarray(gap), np.asarray(slope)
 
     def _root(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
@@ -188,7 +202,7 @@ class Topology:
             moves = np.where(kept[:, None], moves - moves @ span.T, moves)
         return turns, moves * size, np.tile(centre, (len(basis), 1)), follows
 
-    def _loops(self, model: Model, arm: Articulation, body: dict[int, int]):
+    def _loops(self, model: Model, arm: Articulation, body: dict[int, int], gripped: bool):
         """Rows of the constraints: ends of creases that close loops, and held nodes of other panels than the root."""
         nodes, pairs, axes = [], [], []
 
@@ -212,8 +226,8 @@ class Topology:
                 add(int(n), one, other, range(3))
         held = (model.free == 0.0) & (self.body_of != 0)[:, None]
         # what no motion of the tree violates, anywhere, such as a plane that all creases cross, needs no force
-        violated = np.zeros_like(held)
-        for angle in FARTHER * np.array([0.0, 1.0, -2.0]) if np.any(held) else ():
+        violated = held if gripped else np.zeros_like(held)
+        for angle in FARTHER * np.array([0.0, 1.0, -2.0]) if np.any(held) and not gripped else ():
             q = np.full((len(self.turns) + len(self.joints), 1), angle)
             _, by = self.positions(model.position, q)
             idle = np.abs(by[:, :, 0]).max(axis=0, initial=0.0) < 1e-9 * np.abs(by).max(initial=0.0)
