@@ -253,8 +253,8 @@ def refuse_jump(model: Model, x: np.ndarray, levels: np.ndarray) -> None:
         )
 
 
-def torn(model: Model, x: np.ndarray, levels: np.ndarray) -> list[str]:
-    """[W] why the grips tear rigid panels apart, where nodes at x [N, W, 3] are not where paths [G, W] ask; else ""."""
+def torn(model: Model, x: np.ndarray, levels: np.ndarray) -> list[tuple[int, str]]:
+    """[W] the node farthest from its grip, at x [N, W, 3] and paths [G, W], and why panels are torn; "": none is."""
     size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
     off = np.linalg.norm(held_at(model, x, levels) - x, axis=-1)
     out = []
@@ -262,7 +262,7 @@ def torn(model: Model, x: np.ndarray, levels: np.ndarray) -> list[str]:
         far = off[worst, w]
         name = paths(model)[int(model.grips[worst])].partition("_")[2] if model.grips[worst] >= 0 else ""
         said = f"the grips tear the rigid panels: node {worst} is {far * 1e3:.3g} mm from its grip '{name}'"
-        out.append(said if not far <= TEARS * size else "")
+        out.append((worst, said if not far <= TEARS * size else ""))
     return out
 
 

@@ -10,15 +10,17 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.effects import get
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
 from origami_sim.quantities import converted
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.lumping import lumped_masses
 from origami_sim.solve.motion.accuracy import check_accuracy, energy_error, refined, warning
 from origami_sim.solve.motion.frames import check_frames, check_memory
+from origami_sim.solve.motion.gripped import check_start, exerted, tears
 from origami_sim.solve.motion.implicit import TOLERANCE, Implicit
 from origami_sim.solve.oversights import (
     below_the_ground,
@@ -88,6 +90,9 @@ class Trajectory:
         wall: seconds that the solver took.
         energy_error: [W] largest error of the energy balance over the energy exchanged (`solve.accuracy`); nan where a
             world went unstable; None for motions without inertia.
+        grip_wrenches: [F, G, W, 6] force [N] and moment [N m] of each grip on the device, see `grip_load`; None where
+            none moves. Moments are about the middle of its nodes, or a point on the axis about which it turns; nan
+            marks what rigid panels between several supports leave open. Their work is `work["grips"]`.
     """
 
     model: Model
@@ -108,6 +113,7 @@ class Trajectory:
     wall: float = 0.0
     notes: list[str] = field(default_factory=list)
     energy_error: np.ndarray | None = None
+    grip_wrenches: np.ndarray | None = None
 
     def __repr__(self) -> str:
         from origami_sim.view.summary import trajectory_line  # only who looks pays for it
@@ -129,6 +135,30 @@ class Trajectory:
     def creases(self) -> np.ndarray:
         """Fold angles of the creases [F, C, W] [rad], valley positive."""
         return self.angles[:, : len(self.model.creases)]
+
+    def grip_path(self, name: str) -> np.ndarray:
+        """How far a grip has moved from the reference state [F, W]: [m], or [rad] of one that turns."""
+        return grips.along_frames(self.model, self.drive, self.times, self.x.shape[2])[:, self._grip(name)]
+
+    def grip_load(self, name: str) -> np.ndarray:
+        """What a grip exerts on the device along its path [F, W]: a force [N], or a moment about its axis [N m].
+
+        Of a test machine that pulls a sheet it is positive.
+
+        Raises:
+            InputError: there is no such grip, or none that moves.
+        """
+        k = self._grip(name)
+        if self.grip_wrenches is None:
+            raise InputError("no grip moves in this motion", field="grip", value=name)
+        return grips.on_path(self.model, self.grip_wrenches)[:, k]
+
+    def _grip(self, name: str) -> int:
+        names = self.model.names.get("grip", ())
+        if name not in names:
+            allowed = ", ".join(names) or "Sheet.grip(name, ...)"
+            raise InputError(f"there is no such grip{nearest(name, names)}", field="grip", value=name, allowed=allowed)
+        return names.index(name)
 
     def centre_of_mass(self) -> np.ndarray:
         """[F, W, 3] [m]."""
@@ -168,7 +198,7 @@ class Trajectory:
                 total -= self.work[name]
             else:
                 total += self.energies[name]
-        return total
+        return total - self.work.get(grips.ROW, 0.0)
 
 
 def simulate(
@@ -220,7 +250,8 @@ def simulate(
 
     Raises:
         InputError: duration or rate not positive, more frames than there is memory for, no such method, a step above
-            the limit, a drive that ends early, worlds that differ, no such accuracy, a start inside the ground;
+            the limit, a drive that ends early, worlds that differ, no such accuracy, a start inside the ground, paths
+            of grips that the model lacks, that the start is not on or that no rigid panel can follow;
             implicit: another device, spectral radius or tolerance out of bounds.
     """
     dt = converted(dt, "s", "dt")
@@ -331,13 +362,17 @@ def _simulated(
     if state is None:
         worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
+        if grips.alone(model) is not None:  # that grip has the whole device where its path begins
+            at = grips.along(model, drive, 0.0, worlds)[0]
+            state.x = grips.carried_along(model, state.x, np.zeros_like(at), at)
     check_memory(model, state.worlds, duration, rate)
     first = max(state.step, 0)
     drive_end = (first * step if state.step > 0 else 0.0) + frames * frame_time
     drive.require(drive_end)
     applied = distorted(model, parameters, drive, drive_end)
     refuse_start_outside_tables(model, parameters, applied, state.x, first * step)
-    tree = Topology(model) if model.panels == "rigid" and np.any(model.free) else None
+    gripped = check_start(model, applied, state, first * step, drive_end)
+    tree = Topology(model, gripped) if model.panels == "rigid" and np.any(model.free) else None
     if implicit:
         batch = Implicit(
             model,
@@ -363,10 +398,13 @@ def _simulated(
     watch, said = watch_of(model, parameters, state, reference=rests, device=device)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     record: list[tuple[State, Evaluation]] = []
+    mass, pulls = node_mass(model, parameters), []
     began = clock.perf_counter()
     for i in range(frames + 1):
         batch.advance(substeps if i else 0, step, speed_limit)  # no steps: only the first force evaluation
         record.append((batch.state(), batch.evaluate(batch.step * step)))
+        if gripped:
+            pulls.append(exerted(batch, applied, mass, *record[-1], batch.step * step))
         if i == 0 and rests and "ground" in model.laws:
             refuse_start_inside_the_ground(model, parameters, record[0][0].x, record[0][1].energies["ground"])
         if watch is not None:
@@ -386,12 +424,15 @@ def _simulated(
         for time, cause in [stopped.get(w) or (float(s * step), _cause(model, parameters, last, w, step, chosen))]
         for cause in [_left(model, parameters, applied, last, w, time) or cause]
     ]
+    times = (first + np.arange(frames + 1) * substeps) * step
+    torn = tears(model, applied, times, np.stack([s.x for s, _ in record])) if gripped and tree is not None else {}
+    failures = [f for f in failures if f.world not in torn] + [Failure(w, *why) for w, why in torn.items()]
     zero = np.zeros((len(model.position), last.worlds, 3))
     out = Trajectory(
         model=model,
         parameters=parameters,
         drive=drive,
-        times=(first + np.arange(frames + 1) * substeps) * step,
+        times=times,
         x=np.stack([s.x for s, _ in record]),
         v=np.stack([s.v for s, _ in record]),
         angles=np.stack([e.angles for _, e in record]),
@@ -399,7 +440,11 @@ def _simulated(
             "kinetic": np.stack([e.kinetic for _, e in record]),
             **{n: np.stack([e.energies[n] for _, e in record]) for n in record[0][1].energies},
         },
-        work={n: np.stack([s.work[i] for s, _ in record]) for i, n in enumerate(model.laws)},
+        work={
+            n: np.stack([s.work[i] for s, _ in record])
+            for i, n in enumerate((*model.laws, grips.ROW) if gripped else model.laws)
+        },
+        grip_wrenches=np.stack(pulls) if gripped else None,
         gaps=np.stack([e.gaps for _, e in record]),
         contact_forces=np.stack([sum((e.forces[c] for c in contact), zero) for _, e in record]),
         failures=failures,

@@ -34,6 +34,7 @@ import warp as wp
 from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.program.averaging import kernel
 from origami_sim.solve.statics.system import STEP, System
@@ -219,6 +220,8 @@ class _World:
         self._slopes: sp.csc_array | None = None
         self._factors, self._factored, self._scale = None, 0.0, 0.0
         self._past: list[tuple[float, np.ndarray]] = []
+        held = (model.free == 0.0) & (model.grips[:, None] >= 0) if len(model.grips) else model.free < 0.0
+        self._drive, self._gripped = drive, held if grips.moving(model, drive) else None
         self._next = START * self.first
         self.counts = Counts()
         s = state
@@ -240,7 +243,18 @@ class _World:
         """Velocity and acceleration at the end of a step that moves by u [N, 3]."""
         s, m = self.scheme, self.now
         a = (u - h * m.v - h**2 * (0.5 - s.beta) * m.acceleration) / (s.beta * h**2) * self.model.free
-        return m.v + h * ((1 - s.gamma) * m.acceleration + s.gamma * a), a
+        v = m.v + h * ((1 - s.gamma) * m.acceleration + s.gamma * a)
+        if self._gripped is not None:
+            motion = grips.along(self.model, self._drive, m.time + h, 1)
+            v = np.where(self._gripped, grips.velocities(self.model, (m.x + u)[:, None], motion)[:, 0], v)
+        return v, a
+
+    def _led(self, u: np.ndarray, h: float) -> np.ndarray:
+        """A move [N, 3] within a step of h in which nodes in grips end on their paths."""
+        if self._gripped is None:
+            return u
+        there = grips.placed(self.model, grips.along(self.model, self._drive, self.now.time + h, 1)[0])[:, 0]
+        return np.where(self._gripped, there - self.now.x, u)
 
     def _place(self, copies: _Copies, u: np.ndarray, v: np.ndarray, h: float):
         """Sets positions, velocities and slips of copies whose step moves by u [N, W, 3] and ends with v."""
@@ -248,6 +262,9 @@ class _World:
         copies.x0[:] = self.now.x
         copies.x[:] = self.now.x[:, None] + u
         copies.v[:] = self.now.v[:, None] + within * (v - self.now.v[:, None])
+        if self._gripped is not None:  # within a step they go evenly, as it counts the work of losses
+            even = self._gripped[:, None] & (copies.shares < 1.0)[None, :, None]
+            copies.v[:] = np.where(even, u / h, copies.v)
         copies.a[:] = copies.v - u / h
 
     def _residual(self, u: np.ndarray, h: float) -> np.ndarray:
@@ -369,6 +386,10 @@ class _World:
             hinges = np.concatenate([self.model.creases, self.model.bends])
             worst = int(hinges[np.abs(e.angles[:, 2] - m.angles).argmax(), 0]) if turned > TURN else 0
             raise _Unsolved("a hinge turns too far in one step" if turned > TURN else "a force is not a number", worst)
+        work = m.work + h * 0.5 * (e.power[:, 0] + e.power[:, 1])
+        if self._gripped is not None:
+            taken = 0.5 * self.mass * (v**2 - m.v**2) - 0.5 * (e.f[:, 0] + e.f[:, 1]) * u
+            work[-1] = m.work[-1] + taken[self._gripped].sum()
         a = a if self.scheme.radius < 1 else np.zeros_like(a)  # without damping only its mean over the step counts
         return _Motion(
             time=m.time + h,
@@ -377,7 +398,7 @@ class _World:
             acceleration=a,
             angles=e.angles[:, 2].copy(),
             memory=e.memory[:, 2].copy(),
-            work=m.work + h * 0.5 * (e.power[:, 0] + e.power[:, 1]),
+            work=work,
             force=e.f[:, 2].copy(),
             power=e.power[:, 2].copy(),
         )
@@ -404,8 +425,9 @@ class _World:
         while (left := end - self.now.time) > 1e-9 * dt:
             took = left if h >= left * (1 - 1e-9) else (0.5 * left if 2 * h > left else h)
             guess, share = self._guess(took)
+            guess = self._led(guess, took)
             try:
-                within = self.system.reach(self.now.x, guess) * guess
+                within = self._led(self.system.reach(self.now.x, guess) * guess, took)
                 after = self._advanced(self._solve(within, took), took)
             except _Unsolved:
                 self._slopes = None
