@@ -258,16 +258,18 @@ def _at_rest(d: Device, way: Way) -> Found:
 def _alike(d: Device) -> str:
     """Digest of what worlds of one batch must share: all of the model but positions, and the instants of the drive.
 
-    Shells keep their reference shape, and magnets that act on each other their neighbours, in the model.
+    Shells keep their reference shape, magnets that act on each other their neighbours, and grips the places of their
+    nodes, in the model.
     """
     h = hashlib.sha256()
-    fixed = any(get(e).family in SHELLS or get(e).interacts for e in d.model.laws)
+    fixed = any(get(e).family in SHELLS or get(e).interacts for e in d.model.laws) or bool(len(d.model.grips))
     for f in fields(d.model):
         if f.name != "position" or fixed:
             value = getattr(d.model, f.name)
             h.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
     for name, s in d.drive.signals.items():
         h.update(name.encode() + (b"" if s.times is None else s.times.tobytes()))
+        h.update(b"smooth" * (s.slopes is not None))
     h.update(d.drive.fingerprint)
     return h.hexdigest()
 
@@ -312,6 +314,9 @@ def _joined(drives: Sequence[Drive]) -> Drive:
             values = each[0] if all(np.array_equal(v, each[0]) for v in each[1:]) else np.stack(each, axis=1)
         scale = together([s.scale for s in signals])
         out[name] = Signal(**waves, times=first.times, values=values, scale=scale)
+        if first.slopes is not None:  # of a path
+            slopes = np.stack([np.asarray(s.slopes) for s in signals], axis=1)
+            out[name] = replace(out[name], slopes=slopes if np.ndim(np.asarray(values)) == 2 else slopes[:, 0])
     return drives[0].replace(**out)
 
 
@@ -328,6 +333,7 @@ def _one(motion: Trajectory, d: Device, w: int) -> Found:
         angles=motion.angles[:, :, [w]],
         gaps=motion.gaps[:, :, [w]],
         contact_forces=motion.contact_forces[:, :, [w]],
+        grip_wrenches=None if motion.grip_wrenches is None else motion.grip_wrenches[:, :, [w]],
         failures=[replace(f, world=0) for f in motion.failures if f.world == w],
         state=motion.state.select(np.array([w])),
         energy_error=None if motion.energy_error is None else motion.energy_error[[w]],

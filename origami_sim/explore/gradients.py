@@ -19,6 +19,7 @@ from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, fo
 from origami_sim.model import State
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.grips import along, held_at
 from origami_sim.solve.rigid.sensitivity import followed
 from origami_sim.solve.statics.equilibria import tangent
 from origami_sim.solve.statics.system import NULL_SHIFT, STENCIL, WEIGHTS
@@ -130,8 +131,7 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
         near = devices[1 + u * len(STENCIL) :][: len(STENCIL)]
         pushed = []
         for d in near:  # forces with free nodes where they were and held ones where the design has them
-            held = rest.x + (1 - first.model.free) * (d.model.position - first.model.position)
-            start = State.at_rest(d.model, position=held)
+            start = State.at_rest(d.model, position=_supported(first, d, rest.x, time))
             start.angles, start.memory = state.angles.copy(), state.memory.copy()
             batch = Batch(d.model, d.parameters, distorted(d.model, d.parameters, d.drive, time), start, threads=1)
             pushed.append(batch.total_force(time)[:, 0].ravel()[free])
@@ -142,8 +142,14 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
         for s, d in zip(STENCIL, near, strict=True):
             move = np.zeros(rest.x.size)
             move[free] = s * h * towards
-            x = rest.x + move.reshape(-1, 3) + (1 - first.model.free) * (d.model.position - first.model.position)
+            x = _supported(first, d, rest.x, time) + move.reshape(-1, 3)
             there = State.at_rest(d.model, position=x)
             turned = there.angles[:, 0] + 2 * np.pi * np.round((rest.angles - there.angles[:, 0]) / (2 * np.pi))
             out.append(Found(d.model, d.parameters, d.drive, x, turned, time=time))
     return out
+
+
+def _supported(first: Device, near: Device, x: np.ndarray, time: float) -> np.ndarray:
+    """Positions x [N, 3] of the first device, with held nodes where another one's supports and grips have them."""
+    x = x + (1 - first.model.free) * (near.model.position - first.model.position)
+    return held_at(near.model, x[:, None], along(near.model, near.drive, time, 1)[0])[:, 0]

@@ -7,8 +7,10 @@ import numpy as np
 from origami_sim.drive import Signal
 from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.motion.dynamics import Trajectory
+from origami_sim.solve.motion.gripped import exerted_at_rest
 from origami_sim.solve.timestep import AT_REST, TimeStep
 
 if TYPE_CHECKING:
@@ -43,6 +45,12 @@ def frames(path: "Path") -> Trajectory:
             along = np.asarray(path.factor if len(times) > 1 else np.repeat(path.factor, 2), float)
             s = Signal(offset=s.offset, times=np.arange(float(len(along))), values=along, scale=s.scale)
         signals[n] = s
+    pulls = None
+    if grips.moving(model, drive):
+        at = grips.along_frames(model, drive, path.factor, 1)
+        total = sum(forces.values(), np.zeros_like(x))
+        pulls = np.stack([exerted_at_rest(model, None, *a) for a in zip(x, at, total, strict=True)])
+        work[grips.ROW] = grips.work(at, grips.on_path(model, pulls))
     contact = [n for n in model.laws if get(n).family in CONTACTS]
     return Trajectory(
         model=model,
@@ -56,6 +64,7 @@ def frames(path: "Path") -> Trajectory:
         work=work,
         gaps=np.stack([e.gaps for e in found]),
         contact_forces=sum((forces[n] for n in contact), zero),
+        grip_wrenches=pulls,
         failures=[],
         dt=1.0,
         step=TimeStep(np.inf, np.inf, 0, AT_REST),

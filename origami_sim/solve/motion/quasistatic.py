@@ -22,8 +22,10 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.contact import engaged
 from origami_sim.model.distort import distorted
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Evaluation
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
+from origami_sim.solve.motion.gripped import exerted_at_rest
 from origami_sim.solve.oversights import (
     below_the_ground,
     beyond_breakdown,
@@ -357,6 +359,8 @@ class March:
             at = self.time if time is None else time
             where = "that it keeps" if self._falls[w] >= FALLS else "nor anywhere that it could fall to"
             cause = f"no stable equilibrium at frame {frame}, {where}"
+            if self.search.torn[w]:
+                cause = f"the grips tear the rigid panels before frame {frame}: no shape of theirs reaches both"
             self.failures.append(Failure(int(w), at, self._worst(int(w), at), cause))
         self.alive = self.alive & found
         out = new.copy()
@@ -419,6 +423,12 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
         work[n] = np.concatenate([np.zeros((1, worlds)), np.cumsum(spent, axis=0)])
         if not get(n).exchanges_work:
             work[n][:] = 0.0
+    pulls = None
+    if march.search.gripped:
+        tree, by = getattr(march.search, "tree", None), grips.along_frames(model, march.drive, times, worlds)
+        total = sum(forces.values(), np.zeros_like(x))
+        pulls = np.stack([exerted_at_rest(model, tree, *a) for a in zip(x, by, total, strict=True)])
+        work[grips.ROW] = grips.work(by, grips.on_path(model, pulls))
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     zero = np.zeros_like(x)
     out = QuasiStatic(
@@ -441,6 +451,7 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
         step=TimeStep(np.inf, np.inf, 0, AT_REST),
         state=states[-1],
         wall=wall,
+        grip_wrenches=pulls,
         jumps=march.jumps,
         steps=march.steps,
     )

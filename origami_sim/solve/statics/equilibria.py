@@ -10,6 +10,7 @@ import math
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from origami_sim.model import Model, Parameters, State, check_state
 from origami_sim.model.clearance import gaps
 from origami_sim.model.contact import engaged, may_touch
 from origami_sim.model.distort import distorted
+from origami_sim.solve import grips
 from origami_sim.solve.oversights import refuse_start_outside_tables
 from origami_sim.solve.rigid.statics import RigidSystem
 from origami_sim.solve.statics.system import NEUTRAL, NULL_SHIFT, Equilibrium, System, resting
@@ -206,9 +208,22 @@ def _settled(model, parameters, drive, time, state, world, tolerance, max_iterat
         given = _one_world(model, parameters, drive or Drive(), time, state, world)
         return Equilibrium(**RigidSystem(*given).settle(time, tolerance, max_iterations, unstable))
     system, x, angles = _start(model, parameters, drive or Drive(), time, state, world)
-    found = system.settle(x, angles, time, tolerance, max_iterations, unstable)
+    found = None
+    for led in _ways(model, system, x, time):
+        found = system.settle(led(x), angles, time, tolerance, max_iterations, unstable)
+        x, angles = (found.x, found.angles) if found.converged else (led(x), angles)
+    assert found is not None
     found.energies = {n: float(e[0]) for n, e in system.energies([(found.x, found.angles, time)]).items()}
     return found
+
+
+def _ways(model: Model, system: System, x: np.ndarray, time: float) -> list[Callable[[np.ndarray], np.ndarray]]:
+    """What moves nodes [N, 3] with their grips, one part of the way to where these are after the other."""
+    drive = system.inputs[1]
+    if not grips.moving(model, drive):
+        return [lambda x: x]
+    at = grips.way_to(model, x[:, None], grips.along(model, drive, time, 1)[0], system.length)
+    return [lambda x, a=a, b=b: grips.carried_along(model, x[:, None], a, b)[:, 0] for a, b in pairwise(at)]
 
 
 def continuation(
@@ -231,9 +246,10 @@ def continuation(
     """Follows equilibria under proportional loading, through limit points.
 
     Every channel of the drive is base + factor (drive - base), at one instant; `base` is no drive unless given, so
-    that the factor scales fields, voltages and loads. It may turn back and become negative. Pseudo-arclength
-    continuation with tangent predictor and orthogonal corrector (Keller 1977; Crisfield 1981); limit points are found
-    where the tangent's factor component vanishes (regula falsi). Laws that depend on time itself see the factor.
+    that the factor scales fields, voltages, loads and paths of grips. It may turn back and become negative.
+    Pseudo-arclength continuation with tangent predictor and orthogonal corrector (Keller 1977; Crisfield 1981); limit
+    points are found where the tangent's factor component vanishes (regula falsi). Laws that depend on time itself see
+    the factor.
 
     Panels of which it was not stated whether they touch keep each other off: where any two meet on the way, it is
     followed again with contact, and `touching` says so. Friction holds nothing on a path.
@@ -265,6 +281,7 @@ def continuation(
 
     def followed(model: Model, parameters: Parameters, state: State | None) -> Path:
         system, x, angles = _start(model, parameters, drive, time, state, world, _line(*worlds))
+        system.follows = grips.moving(model, system.inputs[1])
         tracer = _Tracer(system, span, step or span / 20, move or 0.1 * system.length, tolerance)
         return tracer.follow(x, angles, start, end, max_points, stop)
 
@@ -398,6 +415,7 @@ class _Tracer:
         s, last = self.system, math.inf
         h = 1e-3 * self.span
         for iteration in range(TOUCHING if s.touches else ROUNDS):
+            x = s.led(x, factor)
             f, angles = s.force(x, angles, factor)
             k, largest, symmetric = s.reduced(x, angles, factor)
             if not (np.all(np.isfinite(f)) and np.all(np.isfinite(k.data))):
@@ -474,7 +492,7 @@ class _Tracer:
     def follow(self, x, angles, start, end, max_points, stop) -> Path:
         """See `continuation`."""
         s, sign = self.system, math.copysign(1.0, end - start)
-        first = s.settle(x, angles, start, self.tolerance, 200, True)
+        first = s.settle(s.led(x, start), angles, start, self.tolerance, 200, True)
         point = None
         if first.converged:
             point = self.correct(first.x, first.angles, start, np.zeros_like(x), sign)

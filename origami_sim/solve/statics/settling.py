@@ -16,8 +16,10 @@ from origami_sim.drive import Drive
 from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
+from origami_sim.solve import grips
+from origami_sim.solve.rigid.shares import of_grips
 from origami_sim.solve.rigid.statics import STEP as TURN
-from origami_sim.solve.rigid.statics import closed, loops_kept
+from origami_sim.solve.rigid.statics import closed, led, loops_kept
 from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import clear_share
 from origami_sim.solve.statics.equilibria import equilibrium
@@ -58,6 +60,10 @@ class Settling(ABC):
         among: effects of the program, see `Batch`.
         viscous: whether laws of the rate act, with the velocity at the end of a step.
         keeping: whether a step begins with the tangents of the one before, which is many times faster.
+        gripped: whether grips will move that stand in the drive given.
+
+    Attributes:
+        torn: [W] worlds whose grips had gone, in the last step, where no shape of their rigid panels reaches.
     """
 
     far, iterations, close = FAR, ITERATIONS, CLOSE
@@ -72,6 +78,7 @@ class Settling(ABC):
         threads: int | None = None,
         viscous: bool = False,
         keeping: bool = False,
+        gripped: bool = False,
     ):
         self.worlds, self.among, self.threads, self.viscous = worlds, among, threads, viscous
         self.keeping, self._kept = keeping, [None] * len(worlds)
@@ -84,6 +91,9 @@ class Settling(ABC):
         every = 1 if state.worlds < 64 else threads
         self.held = Held(self.model, parameters, per_world(drive, self.levels), state, among=among, threads=every)
         self.slips = bool(np.any(self.held.friction))
+        self.gripped = grips.moving(self.model, drive) or gripped
+        self.torn = np.zeros(len(worlds), bool)
+        self.reference = np.stack([m.position for m, _ in worlds], axis=1)
         self._copied: dict[int, Held] = {}
 
     @property
@@ -120,16 +130,22 @@ class Settling(ABC):
         self.start, self.dt, self.time, self.levels = start, dt, time, level
         self.moving, self.past = self.viscous and gradual, past
         self.held.batch.hold(level)
+        begin, every = start.x, wanted
+        if self.gripped:
+            paths = grips.level_of(self.model, self.drive, level)
+            (guess, reached), (begin, again) = self._led(guess, paths), self._led(begin, paths)
+            wanted, self.torn = wanted & reached & again, ~(reached & again)
         x, done = self._newton(guess, wanted & (gradual or not self.slips), ROUNDS)
         lost = wanted & ~done
         if np.any(lost) and self.slips:
-            x, again = self._crept(np.where(lost[None, :, None], start.x, x), lost)
+            x, again = self._crept(np.where(lost[None, :, None], begin, x), lost)
             done |= again
             lost &= ~again
         if np.any(lost) and search:
-            x, again = self._newton(np.where(lost[None, :, None], start.x, x), lost, PATIENT)
+            x, again = self._newton(np.where(lost[None, :, None], begin, x), lost, PATIENT)
             done |= again
             lost &= ~again
+        wanted, lost = every, lost | (every & ~wanted)
         if np.any(lost) and search:
             x, found = self._searched(x, lost)
             if self.held.remembers and np.any(found):  # found with the memory of the step's beginning
@@ -140,6 +156,11 @@ class Settling(ABC):
         out.v[:], out.a[:] = 0.0, 0.0
         out.step, out.status = -1, np.full_like(out.status, -1)
         return out, done
+
+    def _led(self, x: np.ndarray, paths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [N, W, 3] after grips have gone to paths [G, W], and the worlds in which panels can follow [W]."""
+        at = grips.levels_at(self.model, x, self.reference)
+        return grips.carried_along(self.model, x, at, paths, self.reference), np.ones(x.shape[1], bool)
 
     def _newton(self, x: np.ndarray, wanted: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
         """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
@@ -402,7 +423,9 @@ class SettlingPanels(Settling):
 
     def __init__(self, worlds, drive: Drive, state: State, **options):
         super().__init__(worlds, drive, state, **options)
-        self.tree = t = Topology(self.model)
+        self.tree = t = Topology(self.model, self.gripped)
+        if self.gripped:
+            of_grips(self.model, t)
         self.count = len(t.turns) + len(t.joints)
         if not self.count:
             raise InputError("statics needs a panel that is free to move", field="free", value=0)
@@ -417,6 +440,12 @@ class SettlingPanels(Settling):
     @property
     def size(self) -> float:
         return 1.0
+
+    def _led(self, x, paths):
+        out = [led(self.model, self.tree, x[:, w], paths[:, [w]], self.reference[:, [w]]) for w in range(x.shape[1])]
+        return np.stack([x[:, w] if a is None else a for w, a in enumerate(out)], axis=1), np.array(
+            [a is not None for a in out]
+        )
 
     def _unbalanced(self, x):
         return np.einsum("mnwa,nwa->mw", self.tree.rates(x), self._force(x))

@@ -18,6 +18,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from origami_sim.drive import Drive
 from origami_sim.effects import CONTACTS, PAIRS, get
 from origami_sim.model import Model, Parameters, State, curvature
+from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.skin import clear_share, near_pairs, surface
 from origami_sim.solve.timestep import gradient_norms
@@ -257,9 +258,18 @@ class System:
 
     # --- forces
 
+    follows = False
+    """Whether nodes in grips are where these are at the time asked for, wherever they are put."""
+
+    def led(self, x: np.ndarray, time: float) -> np.ndarray:
+        """Positions x [N, 3], with nodes in grips on their paths at that time if it `follows` these."""
+        if not self.follows:
+            return x
+        return grips.held_at(self.model, x[:, None], grips.along(self.model, self.inputs[1], time, 1)[0])[:, 0]
+
     def force(self, x: np.ndarray, angles: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Total force [N, 3] and the angles continued from the given ones [H]."""
-        self._one.place(x[:, None], angles[:, None])
+        self._one.place(self.led(x, time)[:, None], angles[:, None])
         f = self._one.total_force(time)[:, 0]
         return f, self._one.state().angles[:, 0] if len(angles) else angles
 
