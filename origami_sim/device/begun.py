@@ -10,6 +10,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.recording import Recording
+from origami_sim.solve.grips import along, carried_along, levels_at, moving
 from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.statics.equilibria import equilibrium
 
@@ -55,6 +56,8 @@ def begun(
 ) -> State | None:
     """The state in which a recording begins; None where the model starts as it does by itself.
 
+    What is held is where the drive has its grips in the first frame.
+
     Where the sidecar states an equilibrium, it is that in the drive of the first frame, the nearest to what is seen.
     Else it is as `seen` tells; where it may be moving, nearer to it by `matched`.
 
@@ -64,11 +67,22 @@ def begun(
     Raises:
         InputError: there is no such equilibrium.
     """
+    found = _begun(model, parameters, drive, recording, roll)
+    if not moving(model, drive):
+        return found
+    found = State.at_rest(model) if found is None else found
+    paths = along(model, drive, 0.0, found.worlds)[0]
+    found.x = carried_along(model, found.x, levels_at(model, found.x), paths)
+    return found
+
+
+def _begun(model: Model, parameters: Parameters, drive: Drive, recording: Recording, roll: Roll | None) -> State | None:
+    """The same, with grips where they were in the reference state, unless an equilibrium is stated."""
     told, read = recording.start, seen(model, recording)
     state = None if read is None else state_of(model, *read)
     if told is None or told.state != "equilibrium":
-        moving = roll is not None and read is not None and (told is None or told.state == "moving")
-        return matched(model, recording, *read, roll) if moving else state  # type: ignore[misc]
+        rolls = roll is not None and read is not None and (told is None or told.state == "moving")
+        return matched(model, recording, *read, roll) if rolls else state  # type: ignore[misc]
     found = equilibrium(model, parameters, drive, state=state)
     if not found.converged:
         raise InputError(

@@ -303,7 +303,7 @@ def _module(name: str, path: Path, build: Callable, own: Mapping[str, Any]) -> M
     def replicate(s: Settings, recording: Recording, progress: Progress | None = None) -> tuple[Trajectory, Settings]:
         """What was recorded, from where it begins, in the drive that was recorded over the device's own."""
         model, parameters, drive, *_ = out.build(s)
-        told = {n: as_signal(v) for n, v in recorded_signals(recording).items()}
+        told = {n: as_signal(v, name=n) for n, v in recorded_signals(recording).items()}
         told = {n: v for n, v in told.items() if n in drive.signals or not v.is_zero}  # of what a device lacks: nothing
         drive = surrounded(drive, recording).replace(**told)
         s = s.with_motion(recording.motion or s.motion)
@@ -491,6 +491,12 @@ def outcome_of(motion: Trajectory) -> Outcome:
                 f"{names[past]} turns past half a turn, to {far[past]:.1f} deg: panels that do not lie beside each "
                 "other have passed through; Sheet.touch(False) lets them, and Sheet.ground() holds them from below."
             )
+    for name in model.names.get("grip", ()) if motion.grip_wrenches is not None else ():
+        load, turns = motion.grip_load(name)[:, 0], f"turn_{name}" in motion.drive.signals
+        if np.all(np.isfinite(load)):
+            unit = "N m" if turns else "N"
+            numbers |= {f"{name}_least_load": float(load.min()), f"{name}_largest_load": float(load.max())}
+            summary.append(f"{name} exerts {load.min():.3g} to {load.max():.3g} {unit} along its path")
     if len(model.contacts) and "ground" in model.laws:
         went = (motion.centre_of_mass()[-1, 0] - motion.centre_of_mass()[0, 0]) * 1e3
         numbers |= {f"moved_{a}_mm": float(v) for a, v in zip("xyz", went, strict=True)}

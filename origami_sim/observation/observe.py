@@ -11,10 +11,14 @@ from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
+from origami_sim.observation.grips import grip_of, of_grip, refuse_moving
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.grips import along, moving
 from origami_sim.solve.motion.dynamics import Trajectory
+from origami_sim.solve.motion.gripped import exerted_at_rest
 from origami_sim.solve.rigid.reactions import held_nodes, support_of_all
+from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
 
 STAMPS = 1e-3
@@ -153,7 +157,13 @@ class Poses:
 
 def channel_frames(trajectory: Trajectory, channel: Channel, *, world: int = 0) -> np.ndarray:
     """One simulated channel at the frames of the run: (F,) or (F, d) [SI]."""
-    state, drive = _frames(trajectory, world) if channel.kind == "force" else (None, None)
+    grip = "grip" in channel.attachment
+    if trajectory.grip_wrenches is not None and (grip or channel.kind == "force"):
+        refuse_moving(trajectory.model, channel)
+        if grip:
+            k = grip_of(trajectory.model, channel)
+            return of_grip(trajectory.model, channel, trajectory.grip_wrenches[:, k, world])
+    state, drive = _frames(trajectory, world) if grip or channel.kind == "force" else (None, None)
     parameters = trajectory.parameters
     poses = Poses(
         model=trajectory.model,
@@ -174,7 +184,8 @@ def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
     - marker: a point of the body, see `body_point`. marker_2d: its projection on the channel's camera plane.
     - tip_displacement: what the point has moved since the first frame: a vector (three components), its part along the
       attachment's direction, or its length.
-    - force: of the support or the ground on the object, see `support_force`: a vector, or its part along the direction.
+    - force: of the support or the ground on the object, see `support_force`: a vector, or its part along the direction;
+      of a grip as well, or along its path. moment: of a grip about the axis about which it turns.
 
     Raises:
         InputError: a channel attached to something that the model does not have, or that says too little.
@@ -184,6 +195,8 @@ def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
         return poses.angles[:, _index(model, channel, "crease", len(model.creases))]
     if channel.kind == "panel_angle":
         return panel_angle(model, x, _index(model, channel, "panel", int(model.triangle_panel.max()) + 1))
+    if "grip" in channel.attachment:
+        return of_grip(model, channel, grip_wrench(poses, channel))
     if channel.kind == "force":
         return _part(channel, support_force(poses, channel))
     point = body_point(model, x, channel)
@@ -341,6 +354,17 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     return force.sum(axis=0) if ground else -(held[:, None] * force[nodes]).sum(axis=0)
 
 
+def grip_wrench(poses: Poses, channel: Channel) -> np.ndarray:
+    """Force [N] and moment about its pole [N m] of a channel's grip on what is at rest: (F, 6)."""
+    model, grip = poses.model, grip_of(poses.model, channel)
+    if poses.state is None or poses.drive is None:
+        raise InputError("a force needs states and a drive", field=f"channels.{channel.name}")
+    x, paths = poses.state.x, along(model, poses.drive, 0.0, poses.state.worlds)[0]
+    force = Batch(model, poses.parameters, poses.drive, poses.state).total_force(0.0)
+    tree = Topology(model, moving(model, poses.drive)) if model.panels == "rigid" else None
+    return exerted_at_rest(model, tree, x, paths, force)[grip]
+
+
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:
     """Absolute angle of a panel about the y axis, from the upright (+z) towards +x, continuous: (F,) [rad].
 
@@ -368,6 +392,9 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
     zero = State.at_rest(model)
     notes = []
     for name, channel in recording.channels.items():
+        if "grip" in channel.attachment:
+            of_grip(model, channel, np.zeros((1, 6)))
+            continue
         if channel.kind == "force":
             many = channel.attachment.get("nodes", [channel.attachment.get("node")])
             if not channel.attachment.get("ground"):

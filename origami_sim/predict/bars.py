@@ -148,7 +148,7 @@ def calmed(model: Model, parameters: Parameters) -> tuple[Model, Parameters]:
 
 def _with_effects(state: State, model: Model, step: int | None = None) -> State:
     """A state for a model whose further effects have no memory; work is counted anew."""
-    count = len(model.laws)
+    count = len(model.laws) + bool(len(model.grips))
     return replace(
         state.copy(),
         work=np.zeros((count, state.worlds)),

@@ -26,6 +26,7 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.grips import moving
 from origami_sim.solve.statics.settling import coupled, levels, per_world, settling
 from origami_sim.solve.statics.system import System
 from origami_sim.threads import told
@@ -260,7 +261,7 @@ class Static(Curves):
         before = model.position
         drives = self._resting(r, model, Parameters.join([p for _, p in worlds]))
         every = per_world(drives[0], levels(drives[0], 0.0, count))
-        options = {"among": self.shared, "threads": self.threads}
+        options = {"among": self.shared, "threads": self.threads, "gripped": any(moving(model, d) for d in drives)}
         search = settling(worlds, every, state, system=self._system(model, worlds), keeping=True, **options)
         for k in range(steps):
             guess = state.x.copy()
@@ -317,7 +318,7 @@ def clocked(effect: str) -> bool:
 
 def measures_force(recording: Recording) -> bool:
     """Whether a channel reads a force, for which the drive of every frame is needed."""
-    return any(c.kind == "force" for c in recording.channels.values())
+    return any(c.kind == "force" or "grip" in c.attachment for c in recording.channels.values())
 
 
 def channels_of(

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from origami_sim.drive import Drive, Signal, series
+from origami_sim.drive import PATHS, Drive, Signal, series
+from origami_sim.drive.refining import refined
 from origami_sim.drive.starts import shifted
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
@@ -26,7 +26,8 @@ def drive_of(recording: Recording, default: Drive) -> Drive:
     for name, drive in recording.drive.items():
         clock = (recording.times if drive.times is None else drive.times) - recording.times[0]
         for channel, values in by_component(name, drive, file=file).items():
-            if channel not in default.signals:
+            path = channel.partition("_")[0] in PATHS
+            if channel not in default.signals and not path:
                 raise InputError(
                     "the model has no such drive channel",
                     file=file,
@@ -34,29 +35,9 @@ def drive_of(recording: Recording, default: Drive) -> Drive:
                     value=channel,
                     allowed=", ".join(default.signals),
                 )
-            changed[channel] = Signal(offset=float(values[0])) if drive.constant else series(*refined(clock, values))
+            sampled = (clock, values) if path or drive.constant else refined(clock, values)
+            changed[channel] = Signal(offset=float(values[0])) if drive.constant else series(*sampled, smooth=path)
     return default.replace(**changed)
-
-
-FINER = 6
-"""Samples that replace one of a smooth drive."""
-
-
-def refined(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """More samples of a smooth drive, by a cubic spline: lines between samples would cut its peaks.
-
-    Every other sample is predicted from those between; a spline must do so five times better than lines. A drive
-    with steps, or one as noisy as it is curved, is left as it is.
-    """
-    if len(times) < 16 or np.any(np.diff(times) <= 0):
-        return times, values
-    even, odd = slice(None, None, 2), slice(1, 2 * ((len(times) - 1) // 2), 2)
-    line = np.interp(times[odd], times[even], values[even]) - values[odd]
-    curve = CubicSpline(times[even], values[even])(times[odd]) - values[odd]
-    if np.abs(curve).max() > 0.2 * np.abs(line).max():
-        return times, values
-    fine = np.interp(np.arange(FINER * (len(times) - 1) + 1) / FINER, np.arange(len(times)), times)
-    return fine, CubicSpline(times, values)(fine)
 
 
 def reaching(

@@ -16,6 +16,7 @@ from origami_sim.hypotheses.suspects import at_several_times, told_apart
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.observation.channels import angle_mask, stacked
+from origami_sim.observation.grips import refuse_unfollowed
 from origami_sim.predict.begun import with_begins
 from origami_sim.predict.drives import drive_of, reaching
 from origami_sim.predict.filming import even, film_step, interpolated
@@ -38,6 +39,7 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
+from origami_sim.solve.grips import along, moving, ridden
 from origami_sim.solve.rigid.batch import batch_of
 from origami_sim.solve.statics.equilibria import equilibrium
 from origami_sim.threads import default_threads, sharing, side_by_side
@@ -76,6 +78,8 @@ class Rollouts(Worlds, ABC):
         super().__init__(subject, recordings, threads)
         self.start = start
         self.drives = [drive_of(r, self.drive) for r in self.recordings]
+        for one, drive in zip(self.recordings, self.drives, strict=True):
+            refuse_unfollowed(self.model, one, drive)
         self._recorded: dict[int, Motion | None] = {}
         self.readings = Readings(self.model, self.articulation, self.recordings)
         self.local = 2 * self.articulation.size if start == "fit" else 0
@@ -317,6 +321,8 @@ class Rollouts(Worlds, ABC):
             v[:, at] = np.einsum("mnwa,mw->nwa", arm.jacobian(pose, own_x), u)
         state = State.at_rest(model, x.shape[1], position=x, placed=True)
         state.v[:] = v
+        if moving(model, self.drives[shots.recording]):
+            ridden(model, state, along(model, self.driven(shots), 0.0, state.worlds))
         return remembering(state, shots)
 
     def batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:

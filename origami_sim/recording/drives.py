@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.drive import CHANNELS, Drive, held_to, series
+from origami_sim.drive import CHANNELS, PATHS, Drive, held_series, path_to
 from origami_sim.drive import UNITS as CHANNEL_UNITS
 from origami_sim.errors import InputError
 from origami_sim.recording.placed import surrounded
@@ -25,8 +25,9 @@ double leaves out those of 8 %.
 def applied_drive(recording: Recording, *, step: int | None = None) -> Drive:
     """What was applied, for a simulation that starts with the first frame.
 
-    Drives are linear between their samples and keep the last value beyond the end of the recording. Drives of other
-    names (a current, gravity) are left out; `diagnose` refuses them.
+    Drives are linear between their samples and keep the last value beyond the end of the recording; paths of grips
+    (`grip_top`, `turn_top`) go through theirs on a cubic spline. Drives of other names (a current, gravity) are left
+    out; `diagnose` refuses them.
 
     Args:
         recording: the recording.
@@ -102,13 +103,13 @@ def by_component(name: str, drive: DriveChannel, *, file: object = None) -> dict
     """
     family, field = name.split("_")[0], f"drive.{name}"
     columns = np.reshape(np.asarray(drive.values, float), (1 if drive.constant else len(drive.values), -1)).T
-    names = [name] if name in CHANNELS or re.fullmatch(r"voltage_\d+", name) else []
+    names = [name] if name in CHANNELS or re.fullmatch(r"voltage_\d+|(grip|turn)_.+", name) else []
     if name in ("field", "gradient"):
         names = [channel for channel in CHANNELS if channel.startswith(name)]
     elif name == "voltage":
         names = [f"voltage_{k}" for k in range(len(columns))]
     if not names:
-        allowed = ", ".join(UNITS) + ", or a component such as field_z, gradient_zx or voltage_1"
+        allowed = ", ".join(UNITS) + ", or a component such as field_z, gradient_zx, voltage_1 or grip_top"
         raise InputError("the simulator knows no such drive", file=file, field=field, allowed=allowed)
     if drive.unit != UNITS[family]:
         raise InputError("the drive has another unit", file=file, field=field, value=drive.unit, allowed=UNITS[family])
@@ -130,9 +131,11 @@ def _signals(name: str, drive: DriveChannel, recording: Recording, step: int | N
     components = by_component(name, drive, file=recording.metadata.get("sidecar"))
     if drive.constant:
         return {channel: float(values[0]) for channel, values in components.items()}
+    family = name.partition("_")[0]
     times = recording.times if drive.times is None else drive.times
     clock = times - recording.times[0]
     if clock[0] > 0:
         raise InputError("the drive starts after the recording", field=f"drive.{name}", value=float(times[0]))
     end = 2 * max(clock[-1], recording.times[-1] - recording.times[0])
-    return {channel: series(*held_to(end, clock, values)) for channel, values in components.items()}
+    joined = path_to if family in PATHS else held_series
+    return {channel: joined(end, clock, values) for channel, values in components.items()}

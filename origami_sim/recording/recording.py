@@ -31,7 +31,7 @@ CHANNEL_KINDS: dict[str, tuple[str, tuple[int, ...]]] = {
 - crease_angle: fold angle between the two panels of a crease.
 - marker: point on the body, 3D. marker_2d: the same in a camera plane, in metres, right and up.
 - tip_displacement: how far a point moved since the first frame: the distance, the part along a direction, or a vector.
-- force: of the support or the ground on the object: the part along a direction, or a vector.
+- force: of the support, the ground or a grip (along its path) on the object: along a direction, or a vector.
 - moment: applied to a crease to hold it, positive towards valley.
 """
 

@@ -12,7 +12,7 @@ from origami_sim.errors import InputError
 from origami_sim.recording.table import LARGEST_NUMBER
 from origami_sim.recording.units import UNITS, unit_factor
 
-CARRIERS = ("panel", "crease", "node", "nodes", "ground")
+CARRIERS = ("panel", "crease", "node", "nodes", "ground", "grip")
 ATTACHMENT_KEYS = (*CARRIERS, "point", "from", "distance", "along", "height", "direction")
 
 
@@ -158,7 +158,7 @@ class Section:
             ):
                 fault = "must be a list of names or numbers" if key == "nodes" else "must be a name or a number"
                 self.refuse(fault, self.prefix + key, found[key])
-            if key in ("nodes", "ground") and kind != "force":
+            if key in ("nodes", "ground", "grip") and kind != "force" and (key, kind) != ("grip", "moment"):
                 self.refuse("is only for a force", self.prefix + key, found[key])
         if "point" in found:
             point = found["point"]

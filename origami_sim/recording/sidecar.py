@@ -30,7 +30,7 @@
     sign = 1                            # value = sign * (reading - offset)
     offset = 0.0                        # reading at zero, in `unit`, e.g. the encoder zero
     unwrap = false                      # true: remove jumps of whole turns from an angle
-    panel = "arm1"                      # what is observed: panel, crease, node, nodes or ground, and
+    panel = "arm1"                      # what is observed: panel, crease, node, nodes, ground or grip, and
     point = [0.0, 0.0, 0.01]            # on a panel, the body point from its centroid, in the reference axes [m]
     from = "hinge1"                     # or, in place of the point, measured from a crease of the panel: its
     distance = "45 mm"                  # distance [m] from it, and where it lies along it: from its middle to the right
@@ -47,7 +47,7 @@
     scale = 0.0002                      # metres per pixel, for readings in px
     height = 1080                       # of the picture, where rows count down from its upper edge
 
-    [drive.field]                       # optional: what was applied
+    [drive.field]                       # optional: what was applied; grip_top, turn_top: by how much a grip moved
     columns = ["bx", "by", "bz"]        # or column, or value = [0.0, 0.0, 5.0] for a constant
     unit = "mT"
     direction = [0.0, 0.0, 1.0]         # turns one number into a vector
@@ -151,6 +151,8 @@ _DRIVEN = {
     "voltage": "voltage",
     "temperature": "temperature",
     "load": "ratio",
+    "grip": "length",
+    "turn": "angle",
     "crease_angle": "angle",
 }
 _TRACKED = {"marker": "xyz", "marker_2d": "xy"}

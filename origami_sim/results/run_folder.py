@@ -31,7 +31,7 @@ import pyarrow.parquet as pq
 from origami_sim.drive import Drive, Signal
 from origami_sim.drive.gridded import FieldTable
 from origami_sim.errors import InputError, unwritable
-from origami_sim.model import PADS, Model, Parameters, State
+from origami_sim.model import GRIPS, PADS, Model, Parameters, State
 from origami_sim.solve.motion.dynamics import Failure, Trajectory
 from origami_sim.solve.timestep import TimeStep
 from origami_sim.view.film import HasTrajectory, trajectory_of
@@ -48,7 +48,7 @@ MANIFEST, STATES, TABLES, REPLAY = "manifest.json", "states.npz", "tables", "rep
 _PACKAGES = ("origami-sim", "warp-lang", "numpy", "scipy", "rerun-sdk", "pyarrow")
 _FRAMES = ("times", "x", "v", "angles", "gaps", "contact_forces")
 _SIGNAL = tuple(f.name for f in fields(Signal))
-_LATER = (*PADS, "start")
+_LATER = (*PADS, *GRIPS, "start")
 _MODEL = tuple(
     f.name for f in fields(Model) if f.name not in ("effects", "names", "channels", "panels", "carriers", *_LATER)
 )
@@ -330,7 +330,7 @@ def _with_plain_names(model: Model) -> Model:
 
 
 def _arrays(t: Trajectory) -> dict[str, np.ndarray]:
-    out = {name: getattr(t, name) for name in _FRAMES}
+    out: dict[str, Any] = {n: a for n in (*_FRAMES, "grip_wrenches") if (a := getattr(t, n)) is not None}
     out |= {f"energies.{n}": v for n, v in t.energies.items()} | {f"work.{n}": v for n, v in t.work.items()}
     out |= {f"model.{n}": getattr(t.model, n) for n in (*_MODEL, *_LATER, "channels", "panels", "carriers")}
     out |= {f"parameters.{owner}.{name}": t.parameters[owner, name] for owner, name in t.parameters}
@@ -565,18 +565,17 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
                 value=a.shape,
                 allowed=f"({count}, ...)",
             )
-    nodes, worlds = len(model.position), arrays["state.x"].shape[1]
+    shape = (count, len(model.position), arrays["state.x"].shape[1], 3)
     for name in ("x", "v", "contact_forces"):
-        if frames[name].shape != (count, nodes, worlds, 3):
+        if frames[name].shape != shape:
             raise InputError(
                 "has the wrong shape",
                 file=arrays.file,
                 field=name,
                 value=frames[name].shape,
-                allowed=f"{(count, nodes, worlds, 3)}",
+                allowed=f"{shape}",
             )
-    state: dict[str, Any] = {f.name: arrays[f"state.{f.name}"] for f in fields(State)}
-    state["step"] = int(state["step"])
+    state: dict[str, Any] = {n: a if n != "step" else int(a) for n, a in arrays.under("state.").items()}
     step = manifest["time_step"]
     return Trajectory(
         model=model,
@@ -592,6 +591,7 @@ def _trajectory(arrays: _Arrays, manifest: dict[str, Any]) -> Trajectory:
         wall=float(manifest["wall"]),
         notes=list(manifest["notes"]),
         energy_error=None if (error := manifest.get("energy_error")) is None else np.array(error, float),
+        grip_wrenches=arrays.values.get("grip_wrenches"),
     )
 
 

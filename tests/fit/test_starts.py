@@ -10,6 +10,7 @@ from origami_sim.diagnose.arrange import steady
 from origami_sim.diagnose.menu import menu
 from origami_sim.diagnose.prepare import prepared
 from origami_sim.drive import Drive, ramp, series, sine
+from origami_sim.drive.refining import refined
 from origami_sim.drive.starts import shifted
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
@@ -17,7 +18,7 @@ from origami_sim.model import Parameters
 from origami_sim.observation.rates import local_line
 from origami_sim.predict.at_rest import starting
 from origami_sim.predict.bars import BarRollouts
-from origami_sim.predict.drives import reaching, refined
+from origami_sim.predict.drives import reaching
 from origami_sim.predict.measured import lateness
 from origami_sim.predict.starts import seen_first
 from origami_sim.recording import Recording
