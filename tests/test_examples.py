@@ -57,6 +57,16 @@ def test_the_tubes_stiffness_has_the_gradient_of_tubes_built_anew(name):
     assert slope == pytest.approx(np.array([8, -8, -1, 1]) @ around / 12 / h, rel=1e-6)
 
 
+def test_the_arch_stays_through_from_the_stated_rise():
+    snap = example("snap")
+    found = solve_for(lambda rise: snap.build(rise, depth=1.5), snap.hold, 0.0, {"rise": ("1 mm", "8 mm")})
+    assert found.reached and found.values["rise"] == pytest.approx(1.15e-3, abs=5e-6)
+    inner = slice(10, None)
+    assert snap.curve(1.08e-3)[1][inner].min() > 0 > snap.curve(1.25e-3)[1][inner].min()
+    _, force = snap.curve("1.5 mm")
+    assert force.max() == pytest.approx(4.5e-4, abs=1e-5) and force.min() == pytest.approx(-1.7e-4, abs=1e-5)
+
+
 def test_the_walker_starts_on_its_feet_and_nothing_is_noted():
     walker = example("walker")
     sheet, drive = walker.build()
