@@ -67,14 +67,14 @@ def mistaken(subject: Subject, recordings: Sequence[Recording], o: Options, forw
 
 
 def missed(forward: Predictor) -> tuple[float, float]:
-    """What the model as given misses, and what moves, over the noise (root mean square)."""
+    """What the model as given misses, and what moves, over the noise (root mean square); inf where it goes unstable."""
     theta = np.array([f.start for f in forward.subject.nominals])
     local = np.zeros((1, len(forward.blocks), forward.local))
     shot = forward.predict(Hypothesis(), theta[None], local)
     left = np.concatenate([(b.values - v[0]) / b.noise for b, v in zip(forward.blocks, shot, strict=True)])
     read = np.concatenate([b.values / b.noise for b in forward.blocks])
-    every = [np.sqrt(np.nanmean(v**2)) for v in (left, read - np.nanmean(read, axis=0))]
-    return (float(every[0]) if np.isfinite(every[0]) else np.inf), float(every[1])
+    moved = float(np.sqrt(np.nanmean((read - np.nanmean(read, axis=0)) ** 2)))
+    return (float(np.sqrt(np.nanmean(left**2))) if np.any(np.isfinite(left)) else np.inf), moved
 
 
 def changes(recording: Recording, clocks: Sequence[tuple[str, Change]]) -> Iterator[tuple[str, str, Change]]:

@@ -55,6 +55,14 @@ def with_further_numbers(f: Fit) -> tuple[Hypothesis, np.ndarray] | None:
     return (hypothesis, np.concatenate(theta)) if len(hypothesis.free) > len(f.hypothesis.free) else None
 
 
+def near_zero(f: Fit, credible: float) -> np.ndarray:
+    """(P,) whether each number of a fit may be zero, by a Wald test with that probability.
+
+    A number that lies on its bound has no deviation there: it is told, unless it is zero.
+    """
+    return np.square(f.theta) <= chi2.ppf(credible, 1) * np.square(f.deviations())
+
+
 def without_unseen_components(f: Fit, credible: float) -> tuple[Hypothesis, np.ndarray] | None:
     """The effects of a fit and its numbers, without components that may be zero; None if all are told.
 

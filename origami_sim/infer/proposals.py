@@ -95,10 +95,10 @@ def most_reached(pairs: Sequence[tuple[float, float]], room: float) -> float:
     Args:
         pairs: of sets that were fitted, the room from estimate to promise, and how far above the estimate they came.
     """
-    if len(pairs) < 2 or room <= 0.0:
+    rooms, came = np.array(pairs).reshape(-1, 2).T
+    square = float(rooms @ rooms)
+    if len(pairs) < 2 or room <= 0.0 or not square:  # sets that had no room do not tell which part of it is reached
         return room
-    rooms, came = np.array(pairs).T
-    square = max(float(rooms @ rooms), 1e-300)
     part = float(rooms @ came) / square
     doubt = np.sqrt(np.sum((came - part * rooms) ** 2) / (len(pairs) - 1) * (1.0 + room**2 / square))
     return min(room, part * room + float(student.ppf(1.0 - UNFITTED, len(pairs) - 1)) * doubt)

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import chi2
 
 from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
@@ -24,7 +23,12 @@ from origami_sim.hypotheses.spectra import without_idle
 from origami_sim.infer.basins import Calm, elsewhere, loosened, tightened
 from origami_sim.infer.budget import FAR, astray, over_noise
 from origami_sim.infer.columns import Columns
-from origami_sim.infer.components import with_further_numbers, with_single_components, without_unseen_components
+from origami_sim.infer.components import (
+    near_zero,
+    with_further_numbers,
+    with_single_components,
+    without_unseen_components,
+)
 from origami_sim.infer.foresight import Foresight
 from origami_sim.infer.judged import judged
 from origami_sim.infer.placement import enter, log_prior_of, log_priors, members_of, place
@@ -306,7 +310,7 @@ def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None
     """Fits a set with shorter spectra as well, where branches of a Prony series may be nothing by a Wald test."""
     f, place, every = out.nodes[key].fit, len(forward.subject.nominals), [s.suspect for s in out.signatures]
     suspects, theta = [], [f.theta[:place]]
-    unseen = np.square(f.theta / f.deviations()) < chi2.ppf(CREDIBLE, 1)
+    unseen = near_zero(f, CREDIBLE)
     for s in f.hypothesis.suspects:
         mine, strong = slice(place, place + len(s.free)), [n in s.strengths for n in s.free]
         shorter, kept = without_idle(s, np.where(unseen[mine] & strong, 0.0, f.theta[mine]), every)

@@ -1,6 +1,8 @@
 """Mistakes in the channels of a recording end a diagnosis with a sentence, and nothing else does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from test_curves import COUPON, REST, SETTINGS, K, torque
 
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.axes import mistaken
+from origami_sim.diagnose.axes import mistaken, missed
 from origami_sim.recording import Recording
 
 ONE = Options(threads=1)
@@ -59,3 +61,14 @@ def test_a_recording_of_another_device_is_no_mistake_of_axes():
     recording = record(panels=3, duration=3.0)
     noise = {n: np.random.default_rng(k).normal(size=len(recording.times)) for k, n in enumerate(recording.channels)}
     assert found(subject(3), with_values(recording, noise)) is None
+
+
+def test_a_model_that_goes_unstable_explains_nothing():
+    """As a slow gait does whose times are read as a thousandth of what they are."""
+    blocks = [SimpleNamespace(values=np.array([[0.0], [2.0]]), noise=np.ones(1))]
+    subject = SimpleNamespace(nominals=())
+    for one, given in ((np.nan, np.inf), (1.0, 1.0)):
+        lost = SimpleNamespace(
+            subject=subject, blocks=blocks, local=0, predict=lambda *_, v=one: [np.full((1, 2, 1), v)]
+        )
+        assert missed(cast(Any, lost)) == (given, 1.0)

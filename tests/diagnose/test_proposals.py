@@ -148,3 +148,8 @@ def test_a_set_is_fitted_from_other_shapes_only_if_it_promises_more():
     labels = out.labels
     out.labels = lambda key: labels(key - {ZERO})
     assert proposed(out, 1) is None
+
+
+def test_sets_that_had_no_room_do_not_tell_how_far_another_comes():
+    with np.errstate(all="raise"):
+        assert most_reached([(0.0, 1.0), (0.0, -2.0)], 63.0) == 63.0

@@ -1,6 +1,8 @@
 """Slow motions with a clock: predictions against integrations of their own, choice of the motion, verdicts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.spectra import with_spectra, without_idle
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.infer.components import near_zero
 from origami_sim.predict.slow import Slow
 from origami_sim.recording import Channel, Recording, read_recording
 from origami_sim.recording.recording import DriveChannel
@@ -165,6 +168,12 @@ def test_branches_that_a_fit_leaves_at_nothing_are_left_out():
     assert len(shorter.free) == 6 and kept.tolist() == [scale, 1.0, 2 * scale, 50.0, -1.0, -3.0]
     whole = np.array([scale, 1.0, scale, 10.0, scale, 50.0])
     assert without_idle(three, whole, every) == (three, whole)
+
+
+def test_a_number_on_its_bound_is_told_from_zero_unless_it_is_zero():
+    f = SimpleNamespace(theta=np.array([5.0, 0.0, 1.0, 3.0]), deviations=lambda: np.array([0.0, 0.0, 1.0, 1.0]))
+    with np.errstate(all="raise"):
+        assert near_zero(cast(Any, f), 0.95).tolist() == [False, True, True, False]
 
 
 # --- which motion
