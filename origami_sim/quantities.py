@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 
 from origami_sim.errors import InputError
-from origami_sim.units import PLAIN, UNITS, in_unit, spelled
+from origami_sim.units import ANY, PLAIN, UNITS, in_unit, spelled
 
 _TEXT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d.\s].*|1/.*)?")
 _FACTORS = {unit: (kind, factor) for kind, units in UNITS.items() for unit, factor in units.items()}
-
-ANY = "SI"
-"""Unit of a number whose kind nobody stated: any unit converts it."""
 
 
 class Quantity(float):

@@ -41,6 +41,9 @@ UNITS: dict[str, dict[str, float]] = {
 PLAIN = ("", "-", "1")
 """How units of plain numbers are written."""
 
+ANY = "SI"
+"""Unit of a number whose kind nobody stated: any unit converts it, and none is said."""
+
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "·": " ", "⋅": " ", "*": " ", "°": "deg", "²": "^2", "³": "^3"})
 _TOGETHER = {unit.replace(" ", ""): unit for units in UNITS.values() for unit in units if " " in unit}
 
@@ -75,7 +78,7 @@ def si_unit(unit: str) -> str:
 
 def of_unit(text: str, unit: str) -> str:
     """A number or a range as a text, followed by its unit: "0 to 5 mm"; a plain number has none to be followed by."""
-    return text if unit in PLAIN else f"{text} {unit}"
+    return text if unit in (ANY, *PLAIN) else f"{text} {unit}"
 
 
 def in_unit(text: str, unit: str) -> str:
@@ -89,7 +92,7 @@ def with_prefix(value: float, unit: str) -> tuple[float, str]:
         factor, prefixed = with_prefix(1e3 * value, "g")
         return 1e3 * factor, prefixed
     first = unit.split("/")[0].split(" ")[0]
-    if first in ("1", "K", "kg", "SI") or "^" in first or not np.isfinite(value) or value == 0.0:
+    if first in ("1", "K", "kg", ANY) or "^" in first or not np.isfinite(value) or value == 0.0:
         return 1.0, unit  # nothing that takes a prefix, or a power of it
     prefixes = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
     exponent = int(np.clip(3 * np.floor(np.log10(abs(value)) / 3), -9, 9))
