@@ -22,11 +22,9 @@ from origami_sim.results.printing import print_json as _print_json
 
 if TYPE_CHECKING:  # the parser must not wait for the numerical libraries
     from origami_sim.device.scene import Outcome
-    from origami_sim.recording import Recording
     from origami_sim.solve.motion.dynamics import Trajectory
 
 OK, NO, BAD_INPUT, UNSTABLE, INTERRUPTED = 0, 1, 2, 3, 130
-STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
 
 
 class _Parser(argparse.ArgumentParser):
@@ -123,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
-    p.add_argument("--duration", type=float, help="seconds compared (default 5, or what is left of the recording)")
+    p.add_argument("--duration", type=float, help="seconds compared (default: what is left of the recording)")
     p.add_argument(
         "--threshold", type=float, default=5.0, help="parting, in standard deviations of the noise (default 5)"
     )
@@ -358,54 +356,9 @@ def _replay(args) -> int:
 
 
 def _compare(args) -> int:
-    from origami_sim.device.device import device_module, modelled
-    from origami_sim.device.scene import check_recorded_scene, recorded_model, scene_settings
-    from origami_sim.observation.compare import plot_overlay
-    from origami_sim.recording import read_recording
-    from origami_sim.results.run_folder import check_writable
+    from origami_sim.commands import compare
 
-    for name in ("duration", "threshold"):
-        value = getattr(args, name)
-        if value is not None and not 0 < value < float("inf"):
-            raise InputError("must be positive", field=f"--{name}", value=value, allowed="a finite number above 0")
-    sidecar = args.sidecar or _sidecar(Path(args.recording))
-    given, recording = args.scene, None
-    if given is None:
-        recording = read_recording(args.recording, sidecar)
-        given = recorded_model(recording, "--scene")
-    given, calibration = modelled(given, args.calibration, "--model")
-    module = device_module(given)
-    scene = module.__name__.rpartition(".")[2]
-    if not hasattr(module, "replicate"):
-        allowed = "pendulum_chain, or a device of yours; 'origami-sim diagnose' takes all"
-        raise InputError("this scene cannot replicate a recording", field="--scene", value=scene, allowed=allowed)
-    settings = scene_settings(module, calibration).override(args.set, "--set")
-    recording = recording or read_recording(args.recording, sidecar)  # what is wrong with names is told before
-    check_recorded_scene(recording, scene, "origami-sim diagnose --model")
-    if recording.by_step:
-        raise InputError(
-            "load steps without times cannot be laid over a run",
-            file=args.recording,
-            field="time",
-            allowed="a clock in the table or the sidecar ([time]); origami-sim diagnose compares curves",
-        )
-    duration = _duration(args, recording)
-    folder = Path(args.out or "runs/compare")
-    check_writable(folder)
-    comparison, motion, used, part = _replicate(module, settings, recording, args.start, duration, args.threshold)
-    _save_comparison(folder, scene, comparison, motion, used, part, args.set)
-    plot_overlay(comparison, folder / "overlay.png")
-    if args.json:
-        print(comparison.to_json())
-    else:
-        for note in recording.metadata.get("notes", ()):
-            print(f"note: {note}")
-        first, last = (comparison.instant(float(part.times[k])) for k in (0, -1))
-        print(f"compared from {first} to {last}: {len(part.times)} of {len(recording.times)} frames")
-        print(comparison.table())
-        print(comparison.sentence())
-        print(f"run folder: {folder}")
-    return _soundness(motion)
+    return compare.run(args)
 
 
 def _diagnose(args) -> int:
@@ -517,66 +470,6 @@ def _soundness(motion: "Trajectory") -> int:
     for failure in motion.failures:
         print(f"origami-sim: {failure}", file=sys.stderr)
     return UNSTABLE if motion.failures else OK
-
-
-def _shipped_sidecar(name: str) -> Path:
-    from importlib import resources
-
-    return Path(str(resources.files("origami_sim.scenes") / f"{name}.toml"))
-
-
-def _sidecar(recording: Path) -> Path | None:
-    """The shipped sidecar of a known recording, unless one lies beside the file."""
-    if not recording.name:  # a folder, as reading it will say
-        return None
-    shipped = _shipped_sidecar(f"{recording.resolve().parent.name}_{recording.stem}")
-    return shipped if not recording.with_suffix(".toml").exists() and shipped.exists() else None
-
-
-def _duration(args, recording: "Recording") -> float:
-    """Seconds to compare; InputError where the recording has none from --start on, or fewer than asked for."""
-    length = float(recording.times[-1] - recording.times[0])
-    left = length - args.start
-    if not 0 <= args.start <= length:
-        raise InputError(
-            "is outside of the recording",
-            file=args.recording, field="--start", value=args.start, allowed=f"0 to {length:g} s",
-        )  # fmt: skip
-    if args.duration is None:
-        return min(COMPARED_SECONDS, left)
-    if args.duration > left + length / max(len(recording.times) - 1, 1):  # the last frame may be counted as lasting
-        raise InputError(
-            "is longer than the recording",
-            file=args.recording, field="--duration", value=args.duration, allowed=f"up to {left:g} s",
-        )  # fmt: skip
-    return args.duration
-
-
-def _replicate(module, settings, recording: "Recording", start: float, duration: float, threshold: float):
-    from origami_sim.observation.compare import compare
-    from origami_sim.observation.observe import observe
-
-    first = float(recording.times[0]) + start
-    part = recording.window(first, first + duration)
-    motion, used = module.replicate(settings, part, progress=Bar("replicate"))
-    return compare(part, observe(motion, part), threshold=threshold), motion, used, part
-
-
-def _save_comparison(folder: Path, scene: str, comparison, motion, used, part, overrides: list[str]) -> None:
-    from origami_sim.results.run_folder import save_run
-
-    columns = {"time_s": comparison.times}
-    for c in comparison.channels.values():
-        columns |= {f"{c.name}_recorded": c.recorded[:, 0], f"{c.name}_simulated": c.predicted[:, 0]}
-    save_run(
-        folder,
-        motion,
-        scene=scene,
-        tables={"comparison": columns},
-        units={"time_s": "s"},
-        settings={**used.as_dict(), "overrides": dict(o.split("=", 1) for o in overrides)},
-        replay={"recording": part, "title": scene},
-    )
 
 
 if __name__ == "__main__":

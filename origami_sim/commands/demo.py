@@ -5,18 +5,8 @@ import json
 import time
 from pathlib import Path
 
-from origami_sim.commands.cli import (
-    COMPARED_SECONDS,
-    OK,
-    STAND_IN_SECONDS,
-    _print_json,
-    _replicate,
-    _save,
-    _save_comparison,
-    _shipped_sidecar,
-    _soundness,
-    _tell,
-)  # fmt: skip
+from origami_sim.commands.cli import OK, _print_json, _save, _soundness, _tell
+from origami_sim.commands.compare import replicated, save_comparison, shipped_sidecar
 from origami_sim.commands.demo_page import Section, write_report
 from origami_sim.commands.progress import Bar
 from origami_sim.device.scene import recordings_folder, scene_module, scene_settings
@@ -25,6 +15,9 @@ from origami_sim.recording.stand_in import write_stand_in_sidecar
 from origami_sim.results.run_folder import check_writable
 
 SCENES = ("box", "crawler", "fold_file")
+
+STAND_IN_SECONDS, COMPARED_SECONDS = 20.0, 5.0
+"""Of the recording that is made here, and of what is compared of a recording [s]."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,14 +48,16 @@ def run(args: argparse.Namespace) -> int:
     folder = recordings_folder()
     real = folder / "pendulum_chain" / "double.csv" if folder else None
     if real is not None and real.is_file():
-        source, described, note = real, _shipped_sidecar("pendulum_chain_double"), "real recording"
+        source, described, note = real, shipped_sidecar("pendulum_chain_double"), "real recording"
     else:
         note = "stand-in recording, made here because the real ones are absent (they are not part of this package)"
         source, described = stand_in, sidecar
     say(f"{note}: {source.name}")
     recording = read_recording(source, described)
-    comparison, motion, used, part = _replicate(module, scene_settings(module), recording, 0.0, COMPARED_SECONDS, 5.0)
-    _save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
+    part = recording.window(recording.times[0], recording.times[0] + COMPARED_SECONDS)
+    comparison, motion, used = replicated(module, scene_settings(module), part, 5.0)
+    assert comparison is not None
+    save_comparison(out / "pendulum_chain", "pendulum_chain", comparison, motion, used, part, [])
     worst = max(worst, _soundness(motion))
     say(comparison.table())
     say(comparison.sentence())

@@ -28,22 +28,20 @@ from origami_sim.device.scene import (
 from origami_sim.diagnose.diagnose import diagnose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import attempt
-from origami_sim.diagnose.observed import assumed, check_recording, switched
+from origami_sim.diagnose.observed import check_recording
 from origami_sim.diagnose.options import Options
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.hypotheses.hypothesis import Free, Subject
-from origami_sim.hypotheses.subject import alignments, divided, numbers, split, spreads, with_units
+from origami_sim.hypotheses.hypothesis import Subject
+from origami_sim.hypotheses.subject import known_before, with_units
 from origami_sim.infer.unlisted import UNLISTED
-from origami_sim.model import Model, Parameters
-from origami_sim.observation.observe import check_scene
+from origami_sim.observation.doubts import doubts, naming
 from origami_sim.quantities import ANY
 from origami_sim.recording import DataSet, lint_report, read_dataset
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page import geometry_of, write_report
 from origami_sim.report.page.next_experiment import finding
 from origami_sim.report.patch import patched, write_patch
-from origami_sim.solve.timestep import stable_step
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
 
@@ -81,19 +79,17 @@ def run(args: Namespace) -> int:
         settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
     settings = _assigned(settings, args.set, "--set")
     model, parameters, drive, *_ = module.build(settings)
-    step = stable_step(model, parameters).dt
     recordings = []
     for recording in data:
-        with _naming(recording.metadata.get("sidecar")):
-            notes = [*assumed(recording, drive), *switched(recording), *check_scene(recording, model)]
-        with _naming(recording.metadata.get("file")):
-            notes += check_recording(recording, model, step)
+        notes = doubts(recording, model, parameters, drive)
+        with naming(recording.metadata.get("file")):
+            check_recording(recording, model)
         for note in notes:
             say(f"note: {note}")
         recordings.append(
             replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
         )
-    known, single, aligned = _priors(settings, data, args.prior, model, parameters)
+    known, single, aligned = known_before(settings, data[0], args.prior, model, parameters)
     subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
     if not subject.nominals:
         say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
@@ -220,40 +216,6 @@ def _assigned(settings: Settings, assignments: Sequence[str], source: object) ->
     changed = Settings(list(settings.values()), Path(str(source)), settings.effects).override(assignments)
     out = Settings(list(changed.values()), settings.file, settings.effects, accuracy=settings.accuracy)
     return out.with_panels(settings.panels).with_motion(settings.motion, settings.until)
-
-
-@contextmanager
-def _naming(file: str | None) -> Iterator[None]:
-    """Errors that name no file name this one."""
-    try:
-        yield
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=file) from None
-
-
-def _priors(
-    settings: Settings, data: DataSet, given: Sequence[str], model: Model, parameters: Parameters
-) -> tuple[dict[str, float], list[Free], list[Free]]:
-    """Standard deviations [SI] by the sidecar, and over them by the command line; single entities; what is aligned."""
-    first = data[0].metadata
-    sidecar = first.get("sidecar")
-    own, further = divided(first.get("priors") or {}, model)
-    own, single = split(settings, own)
-    out, aligned = spreads(settings, own, source=sidecar), alignments(further, parameters, source=sidecar)
-    stated: dict[str, float | str] = {}
-    for text in given:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise InputError(
-                "not a prior", field="--prior", value=text, allowed="name=sd, e.g. length_1=0.5mm or mass_1=1%"
-            )
-        stated[name] = value
-    own, further = divided(stated, model)
-    own, over = split(settings, own)
-    tuned = numbers({n: v for n, v in single.items() if n not in over}, model, parameters, source=sidecar)
-    tuned += numbers(over, model, parameters, source="--prior")
-    aligned = [*(f for f in aligned if f.name not in further), *alignments(further, parameters, source="--prior")]
-    return out | spreads(settings, own, source="--prior"), tuned, aligned
 
 
 def _options(args: Namespace, settings: Settings) -> Options:

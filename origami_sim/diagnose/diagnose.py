@@ -18,7 +18,7 @@ from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
-from origami_sim.diagnose.observed import assumed, unobserved
+from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import among, prepared
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
@@ -43,6 +43,7 @@ from origami_sim.locate.onset import onset
 from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located
 from origami_sim.observation.channels import stacked, units_of
+from origami_sim.observation.doubts import assumed
 from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis

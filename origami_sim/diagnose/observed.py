@@ -4,18 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.drive import Drive
-from origami_sim.drive.sources import STRENGTHS
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
 from origami_sim.observation.channels import stacked
 from origami_sim.observation.observe import _index, body_point
 from origami_sim.predict.starts import channel_tangent, seen_first
-from origami_sim.predict.track import PATH
-from origami_sim.recording import Channel, Recording, by_component
-from origami_sim.recording.drives import UNITS, switches
-from origami_sim.recording.units import quantity
+from origami_sim.recording import Channel, Recording
 from origami_sim.verdict.words import joined
 
 BENT = 0.3
@@ -26,9 +21,6 @@ MOST = 8
 
 FEWEST, FEWEST_STEPS = 16, 8
 """Frames and load steps with a value that a diagnosis needs."""
-
-SLOW = 1e5
-"""Steps of the solver in one frame from which a note says so."""
 
 OFF = 20.0
 """How many times a distance on a panel may be off before its unit is refused; a length scale of 50 % is a suspect."""
@@ -74,14 +66,14 @@ def unobserved(forward: Predictor) -> str | None:
     return f"{text[0].upper()}{text[1:]}: what is missing there can be told only by its effect on the rest."
 
 
-def check_recording(recording: Recording, model: Model, step: float = np.inf) -> list[str]:
-    """Refuses a recording that cannot be of this model, or that says too little; else notes, one sentence each.
+def check_recording(recording: Recording, model: Model) -> None:
+    """Refuses a recording that cannot be of this model, or that says too little.
 
     A point of a device that is held cannot move farther than twice the sum of its panels; two points of one panel keep
     their distance, so that one many times as large or as small is in another unit.
 
     Args:
-        recording, model: what is to be diagnosed. step: the solver's step for this model [s].
+        recording, model: what is to be diagnosed.
 
     Raises:
         InputError: too few frames with a value; lengths in another unit.
@@ -109,13 +101,6 @@ def check_recording(recording: Recording, model: Model, step: float = np.inf) ->
                 allowed=f"lengths up to {reach:.3g} m (millimetres or pixels read as metres?)",
             )
     _check_distances(recording, model, panels)
-    frame = float(np.median(np.diff(recording.times)))
-    if recording.by_step or frame < SLOW * step or "crease_angle" in recording.drive:
-        return []
-    return [
-        f"A frame of '{recording.name}' lasts {frame:.3g} s, {frame / step:.2g} steps of the solver, which takes long: "
-        "are the times in ms? A slow motion is followed along equilibria: motion = 'quasistatic' in the sidecar."
-    ]
 
 
 def _check_distances(recording: Recording, model: Model, panels: Sequence[np.ndarray]) -> None:
@@ -174,41 +159,3 @@ def in_ranges(names: Sequence[str]) -> str:
         else:
             runs.append([name])
     return joined([n for r in runs for n in ([f"{r[0]} to {r[-1]}"] if len(r) > 3 else r)])
-
-
-def assumed(recording: Recording, drive: Drive) -> list[str]:
-    """A note on what the scene drives that the recording does not state; curves take nothing of the scene's own drive.
-
-    Raises:
-        InputError: what `by_component` refuses.
-    """
-    if recording.by_step or PATH in recording.drive:
-        return []
-    file = recording.metadata.get("sidecar")
-    stated = {c for name, d in recording.drive.items() for c in by_component(name, d, file=file)}
-    own = {}
-    units = UNITS | {f"source_{k}_strength": STRENGTHS[kind][1] for k, (kind, _) in enumerate(drive.placed)}
-    for name in drive.levels:
-        s = drive[name]
-        if name not in stated and not s.is_zero and not (recording.sources and name.startswith("source_")):
-            sampled = 0.0 if s.values is None else np.abs(s.scale) * np.abs(s.values).max()
-            largest = float(np.max(np.abs(s.offset) + np.abs(s.amplitude) + sampled))
-            own[name] = f"{name} up to {quantity(largest, units.get(name) or UNITS[name.split('_')[0]])}"
-    if not own:
-        return []
-    return [f"'{recording.name}' states no {', '.join(own)}: the scene's own is assumed ({', '.join(own.values())})."]
-
-
-def switched(recording: Recording) -> list[str]:
-    """A note on drives that were switched between two rows which do not tell when, to a tenth of a frame."""
-    notes, frame = [], float(np.median(np.diff(recording.times)))
-    for name, (before, after) in switches(recording).items():
-        if np.max(after - before) < 0.1 * frame:
-            continue
-        notes.append(
-            f"The drive '{name}' of '{recording.name}' is switched between two rows, first after {before[0]:.6g} s: "
-            f"when is known to {quantity(float(np.max(after - before)), 's')} only, and what is found as a lag or a "
-            "delay of that size may be this."
-            + ("" if recording.drive[name].times is not None else " A log at a higher rate (file = ...) tells when.")
-        )
-    return notes

@@ -16,7 +16,8 @@ from origami_sim.hypotheses.hypothesis import ANCHORS, NOMINAL, Free, Subject, S
 from origami_sim.model import Model, Parameters
 from origami_sim.model.entities import WAYS, located
 from origami_sim.quantities import ANY
-from origami_sim.units import in_unit
+from origami_sim.recording import Recording
+from origami_sim.units import PLAIN, in_unit
 
 STEP = 1e-3
 """Relative change of a setting that shows which parameters it is; any that rounding does not hide finds the same."""
@@ -175,11 +176,47 @@ def _aligned(s: Setting, given: float | str, source: object) -> float:
     """A standard deviation of such a number [SI]."""
     text = str(given).strip()
     allowed = f"{in_unit('a standard deviation', s.unit)}, or with a unit"
+    _refuse_unitless(s, given, source)
     if s.unit == "-" and text.endswith("%"):
         return 0.01 * _positive(s.name, text[:-1], given, allowed, source)
     return _positive(
         s.name, str(_parse(s, text, None if source is None else Path(str(source)))), given, allowed, source
     )
+
+
+def known_before(
+    settings: Settings, recording: Recording, given: Sequence[str], model: Model, parameters: Parameters
+) -> tuple[dict[str, float], list[Free], list[Free]]:
+    """What is known of a scene's numbers: by the sidecar of a recording, and over that by the command line.
+
+    Args:
+        given: "name=sd" of the command line, where a number without a unit is in SI.
+
+    Returns:
+        Standard deviations [SI] of settings by name; numbers of single entities; what is aligned.
+
+    Raises:
+        InputError: what `spreads`, `numbers` and `alignments` refuse, no prior.
+    """
+    first = recording.metadata
+    sidecar = first.get("sidecar")
+    own, further = divided(first.get("priors") or {}, model)
+    own, single = split(settings, own)
+    out, aligned = spreads(settings, own, source=sidecar), alignments(further, parameters, source=sidecar)
+    stated: dict[str, float | str] = {}
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise InputError(
+                "not a prior", field="--prior", value=text, allowed="name=sd, e.g. length_1=0.5mm or mass_1=1%"
+            )
+        stated[name] = float(value) if _is_number(value) else value
+    own, further = divided(stated, model)
+    own, over = split(settings, own)
+    tuned = numbers({n: v for n, v in single.items() if n not in over}, model, parameters, source=sidecar)
+    tuned += numbers(over, model, parameters, source="--prior")
+    aligned = [*(f for f in aligned if f.name not in further), *alignments(further, parameters, source="--prior")]
+    return out | spreads(settings, own, source="--prior"), tuned, aligned
 
 
 def split(settings: Settings, priors: Mapping[str, float | str]) -> tuple[dict, dict]:
@@ -231,7 +268,12 @@ def numbers(
 def _is_share(given: float | str) -> bool:
     """Whether a prior is a share: in per cent, or a bare number."""
     text = str(given).strip()
-    return text.endswith("%") or re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", text.lower()) is not None
+    return text.endswith("%") or _is_number(text)
+
+
+def _is_number(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    return re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", text.strip().lower()) is not None
 
 
 def _factor(parameters: Parameters, name: str, given: float | str) -> Free:
@@ -275,12 +317,25 @@ def _spread(s: Setting, given: float | str, settings: Settings, source: object) 
         if not s.value:
             raise InputError("no share of zero", file=source, field=f"priors.{s.name}", value=given, allowed=s.unit)
         return _positive(s.name, text[:-1], given, allowed, source) * 0.01 * abs(float(s.value))
+    _refuse_unitless(s, given, source)
     try:
         number = str(_parse(s, text, Path(str(source or settings.file))))
     except InputError as error:
         share = f"{error.allowed}, or 10% for a share of {s.value:g}"
         raise InputError(error.what, file=error.file, field=f"priors.{s.name}", value=given, allowed=share) from None
     return _positive(s.name, number, given, allowed, source)
+
+
+def _refuse_unitless(s: Setting, given: float | str, source: object) -> None:
+    """Refuses a text without a unit for a number that has one: "5" for a modulus, which a number 5 is in pascal."""
+    if isinstance(given, str) and s.unit not in (ANY, *PLAIN) and _is_number(given):
+        raise InputError(
+            "a text without a unit",
+            file=source,
+            field=f"priors.{s.name}",
+            value=given,
+            allowed=f"'{given.strip()} {s.unit}', '{given.strip()} %' of the value, or the number alone, in {s.unit}",
+        )
 
 
 def _positive(name: str, text: str, given: object, allowed: str, source: object = None) -> float:

@@ -10,9 +10,7 @@ from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.observation.channels import angle_mask, channel_values, stacked
 from origami_sim.observation.observe import body_point
 from origami_sim.recording import Recording
-
-PATH = "crease_angle"
-"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
+from origami_sim.recording.drives import PATH
 
 ROUNDS = 25
 """Newton steps from the pose that markers give to that which fits all channels."""

@@ -7,12 +7,15 @@ import numpy as np
 
 from origami_sim.drive import CHANNELS, PATHS, Drive, held_series, path_to
 from origami_sim.drive import UNITS as CHANNEL_UNITS
-from origami_sim.errors import InputError
+from origami_sim.errors import InputError, nearest
 from origami_sim.recording.placed import surrounded
 from origami_sim.recording.recording import DriveChannel, Recording
 
 UNITS = {family: unit for family, unit in CHANNEL_UNITS.items() if family != "origin"}
 """SI unit of the drives that a recording may have; `field_x`, `gradient_zx`, `voltage_1` name single components."""
+
+PATH = "crease_angle"
+"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
 
 SWITCH = 0.05
 """Share of a drive's range by which it changes between two rows where it is said to be switched.
@@ -110,6 +113,7 @@ def by_component(name: str, drive: DriveChannel, *, file: object = None) -> dict
         names = [f"voltage_{k}" for k in range(len(columns))]
     if not names:
         allowed = ", ".join(UNITS) + ", or a component such as field_z, gradient_zx, voltage_1 or grip_top"
+        allowed += nearest(name, UNITS)
         raise InputError("the simulator knows no such drive", file=file, field=field, allowed=allowed)
     if drive.unit != UNITS[family]:
         raise InputError("the drive has another unit", file=file, field=field, value=drive.unit, allowed=UNITS[family])

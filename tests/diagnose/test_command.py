@@ -14,12 +14,12 @@ import origami_sim
 from origami_sim import threads
 from origami_sim.device.scene import NAMES, Settings, read_calibration, recordings_folder, scene_module, scene_settings
 from origami_sim.diagnose import EXIT, Keep, Subject, command, diagnose, overlay, subject_of
-from origami_sim.diagnose.observed import assumed, switched
 from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Prediction
 from origami_sim.hypotheses.subject import spreads
+from origami_sim.observation.doubts import assumed, switched
 from origami_sim.predict import cache
 from origami_sim.recording import Channel, DriveChannel, Recording, read_recording
 from origami_sim.report.page import read_report

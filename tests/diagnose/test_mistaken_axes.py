@@ -11,7 +11,7 @@ from test_curves import COUPON, REST, SETTINGS, K, torque
 
 from origami_sim.diagnose import Options, Subject, diagnose
 from origami_sim.diagnose.arrange import arranged
-from origami_sim.diagnose.axes import mistaken, missed
+from origami_sim.diagnose.axes import missed, mistaken
 from origami_sim.recording import Recording
 
 ONE = Options(threads=1)
