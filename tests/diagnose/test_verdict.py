@@ -374,3 +374,11 @@ def test_where_numbers_explain_more_the_one_that_moved_farthest_is_said(numbers,
     text = explains(Budget(shares, 1.0), "", f)
     assert text.startswith(f"explains {1.0 - numbers:.0%} of the mismatch, numbers of the model {numbers:.0%}")
     assert ("above all stiffness, from 3.00 mN m/rad to 3.20 mN m/rad" in text) == words and "mass" not in text
+
+
+def test_numbers_far_from_what_was_known_are_said_in_the_headline():
+    known = tuple(Free("", n, "kg", 0.02, 1e-3, spread=1e-3) for n in ("mass", "modulus", "width"))
+    f = cast(Fit, SimpleNamespace(free=known, theta=np.full(3, 0.03), strain=np.array([6.24, 8.46, 2.9])))
+    text = explains(Budget([Share("", "effect", 1.0)], 1.0), "", f)
+    said = "modulus is 8.5 and mass is 6.2 standard deviations from what was known"
+    assert text == f"explains 100% of the mismatch; then {said}"
