@@ -12,7 +12,7 @@ from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.observation.channels import units_of
 from origami_sim.report.diagnosis import Candidate, Correlation, Fold, Number, Suspected, Trace
 from origami_sim.verdict.decide import log_odds
-from origami_sim.verdict.sentences import Judgement
+from origami_sim.verdict.sentences import STRAINED, Judgement
 
 
 def table(
@@ -81,7 +81,7 @@ def _distrust(f: Fit) -> str:
     for n, t, b, strain in zip(f.free, f.theta, f.at_bound, f.strain, strict=True):
         if b:
             out.append(f"{n.label} lies on its bound ({t:.3g} {n.unit})")
-        elif strain > 3.0:
+        elif strain > STRAINED:
             out.append(f"{n.label} left its prior by {strain:.1f} sd")
     strong = {id(n) for s in f.hypothesis.suspects for n in s.strengths}
     for n, t, d in zip(f.free[own:], f.theta[own:], f.deviations()[own:], strict=True):
@@ -163,8 +163,9 @@ def by_fold(forward: Predictor, given: Fit, refitted: HeldOut, after: HeldOut) -
         names = list(dict.fromkeys(forward.recordings[b.recording].name for b in blocks))
         name = ", ".join(names)
         if len(forward.recordings) == 1:
-            times = forward.recordings[0].times
-            name += f", {times[blocks[0].first]:.4g} to {times[blocks[-1].first] + blocks[-1].times[-1]:.4g} s"
+            times, by_step = forward.recordings[0].times, forward.recordings[0].by_step
+            ends = f"{times[blocks[0].first]:.4g} to {times[blocks[-1].first] + blocks[-1].times[-1]:.4g}"
+            name += f", load steps {ends}" if by_step else f", {ends} s"
         out.append(Fold(name, *(e.folds[n].tolist() for e in (before, refitted, after))))
     return out
 

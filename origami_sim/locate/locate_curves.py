@@ -10,8 +10,12 @@ from origami_sim.locate.places import Curve, Place
 from origami_sim.predict.curves import Balance
 
 
-def places(found: Sequence[Balance]) -> list[Place]:
-    """Places, most suspicious first; none where the moments are not told."""
+def places(found: Sequence[Balance], *, by_step: bool) -> list[Place]:
+    """Places, most suspicious first; none where the moments are not told.
+
+    Args:
+        by_step: whether times count load steps, along which nothing has a power.
+    """
     out = []
     for k, name in enumerate(found[0].names if found else ()):
         z, power = [], []
@@ -29,7 +33,7 @@ def places(found: Sequence[Balance]) -> list[Place]:
                 name,
                 score,
                 0.0,
-                float(np.mean(np.concatenate(power))),
+                float("nan") if by_step else float(np.mean(np.concatenate(power))),
                 float("nan"),
                 times.tolist(),
                 missing[k].tolist(),

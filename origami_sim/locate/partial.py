@@ -127,7 +127,8 @@ def _ordered(one: tuple[Curve, np.ndarray]) -> float:
 def _places(forward: Predictor, f: Fit, thetas: Sequence[np.ndarray]) -> list[list[Place]]:
     """Places of what a fit's hypothesis lacks with each of some numbers."""
     if forward.curve:
-        return [places(forward.balance(f.hypothesis, theta)) for theta in thetas]  # type: ignore[attr-defined]
+        steps = forward.recordings[0].by_step
+        return [places(forward.balance(f.hypothesis, theta), by_step=steps) for theta in thetas]  # type: ignore[attr-defined]
     assert isinstance(forward, Rollouts)
     each: list[list[Motion]] = [[] for _ in thetas]
     for r in range(len(forward.recordings)):

@@ -30,8 +30,8 @@ class Place:
 
     Attributes:
         site: name. score: how much structure its residual moment has, in standard deviations. share: its part
-            of all structure. power: mean unexplained power [W], negative: lost. onset: first time at which it departs
-            [s], nan: never.
+            of all structure. power: mean unexplained power [W], negative: lost; nan along load steps. onset: first time
+            at which it departs [s], nan: never.
         times, moment, error: residual moment in time [N m] (thinned) and its standard deviation.
         curves: the residual moment against angle, rate, what drives, its phase if it is periodic, and time since the
             last step of a drive and the last reversal (then the moment along the motion).

@@ -7,6 +7,9 @@ from origami_sim.model import Model, dihedral_angles
 from origami_sim.observation.observe import _index, body_axes, body_point
 from origami_sim.recording import Camera, Channel, Recording
 
+PATH = "crease_angle"
+"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
+
 
 def read(
     model: Model, channel: Channel, x: np.ndarray, angles: np.ndarray | None, begin: np.ndarray | None = None

@@ -9,9 +9,10 @@ from origami_sim.drive import Drive, Signal, as_signal
 from origami_sim.drive.sources import STRENGTHS
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters
+from origami_sim.observation.channels import PATH
 from origami_sim.observation.observe import check_scene
 from origami_sim.recording import Recording, by_component
-from origami_sim.recording.drives import PATH, UNITS, recorded_signals, switches
+from origami_sim.recording.drives import UNITS, recorded_signals, switches
 from origami_sim.recording.units import quantity
 from origami_sim.solve.timestep import stable_step
 

@@ -10,10 +10,10 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.distort import distorted
+from origami_sim.observation.channels import PATH
 from origami_sim.observation.observe import _index
 from origami_sim.predict.curves import HOLD, PIECES, Balance, Curves, Static
 from origami_sim.recording import Recording
-from origami_sim.recording.drives import PATH
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.statics.settling import levels, per_world
 

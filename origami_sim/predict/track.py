@@ -7,10 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation, Pose
-from origami_sim.observation.channels import angle_mask, channel_values, stacked
+from origami_sim.observation.channels import PATH, angle_mask, channel_values, stacked
 from origami_sim.observation.observe import body_point
 from origami_sim.recording import Recording
-from origami_sim.recording.drives import PATH
 
 ROUNDS = 25
 """Newton steps from the pose that markers give to that which fits all channels."""

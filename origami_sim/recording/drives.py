@@ -14,9 +14,6 @@ from origami_sim.recording.recording import DriveChannel, Recording
 UNITS = {family: unit for family, unit in CHANNEL_UNITS.items() if family != "origin"}
 """SI unit of the drives that a recording may have; `field_x`, `gradient_zx`, `voltage_1` name single components."""
 
-PATH = "crease_angle"
-"""Drive channel that prescribes the fold angles [rad], one column per crease of the tree, from the root outwards."""
-
 SWITCH = 0.05
 """Share of a drive's range by which it changes between two rows where it is said to be switched.
 

@@ -81,8 +81,8 @@ def lint(
         raise InputError(f"the recording has {len(times)} frames, at least 3 are needed", file=file, field="time")
     notes = _lint_times(times, file, place, allow_gaps)
     for name, one in series.items():
-        notes += _lint_missing(name, one, times, file, allow_gaps)
-        notes += _lint_values(name, one, times, file)
+        notes += _lint_missing(name, one, times, file, allow_gaps, by_step)
+        notes += _lint_values(name, one, times, file, by_step)
         if by_step and one.noise is None:
             notes.append(
                 f"The noise of channel '{name}' is the roughness of {len(times)} load steps, an upper bound: "
@@ -162,7 +162,12 @@ def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], al
     return [sentence + "."]
 
 
-def _lint_missing(name: str, one: Series, times: np.ndarray, file: object, allow_gaps: bool) -> list[str]:
+def _at(time: float, by_step: bool) -> str:
+    """An instant of a recording in words."""
+    return f"load step {time:.6g}" if by_step else f"t = {time:.6g} s"
+
+
+def _lint_missing(name: str, one: Series, times: np.ndarray, file: object, gaps: bool, steps: bool) -> list[str]:
     lost = np.asarray(~np.isfinite(one.readings.reshape(len(times), -1)).all(axis=1))
     seen = np.flatnonzero(~lost)
     if seen.size < 3:
@@ -173,22 +178,22 @@ def _lint_missing(name: str, one: Series, times: np.ndarray, file: object, allow
         runs = 1 + np.count_nonzero(np.diff(interior) > 1)
         sentence = (
             f"channel '{name}' misses {interior.size} values in {runs} run{'s' if runs > 1 else ''} between others, "
-            f"first at t = {times[interior[0]]:.6g} s"
+            f"first at {_at(times[interior[0]], steps)}"
         )
         if runs > 1:
             lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[-2], interior, [len(times) + 2]])) > 1))
             sentence += f", the longest of {lengths.max()}"
-        if not allow_gaps:
+        if not gaps:
             raise InputError(sentence, file=file, field=name, allowed="gaps only with allow_gaps = true in the sidecar")
         notes.append(sentence + ".")
     if seen[0] > 0:
-        notes.append(f"Channel '{name}' starts only at t = {times[seen[0]]:.6g} s.")
+        notes.append(f"Channel '{name}' starts only at {_at(times[seen[0]], steps)}.")
     if seen[-1] < len(times) - 1:
-        notes.append(f"Channel '{name}' ends already at t = {times[seen[-1]]:.6g} s.")
+        notes.append(f"Channel '{name}' ends already at {_at(times[seen[-1]], steps)}.")
     return notes
 
 
-def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> list[str]:
+def _lint_values(name: str, one: Series, times: np.ndarray, file: object, by_step: bool) -> list[str]:
     notes = []
     columns = one.readings.reshape(len(times), -1)
     largest = float(np.nanmax(np.abs(columns)))
@@ -222,7 +227,7 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
         jumps = np.flatnonzero(np.abs(np.diff(columns[seen, 0])) * unit_factor(one.unit) > np.pi)
         if jumps.size and not one.unwrap:
             when = times[seen][jumps[0] + 1]
-            notes.append(f"Channel '{name}' jumps by more than half a turn at t = {when:.6g} s: unwrap = true?")
+            notes.append(f"Channel '{name}' jumps by more than half a turn at {_at(when, by_step)}: unwrap = true?")
     elif one.kind != "force" and one.unit != "px":
         spread = float((np.nanmax(columns, axis=0) - np.nanmin(columns, axis=0)).max()) * unit_factor(one.unit)
         if spread > LARGE:
@@ -231,7 +236,7 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
                 "or pixels."
             )
     if not constant:
-        notes += _lint_levels(name, one, columns, times)
+        notes += _lint_levels(name, one, columns, times, by_step)
     if not constant and one.noise is None:
         bursts = _burst_ratio(times, columns)
         if bursts > 1.5:
@@ -242,7 +247,7 @@ def _lint_values(name: str, one: Series, times: np.ndarray, file: object) -> lis
     return notes
 
 
-def _lint_levels(name: str, one: Series, columns: np.ndarray, times: np.ndarray) -> list[str]:
+def _lint_levels(name: str, one: Series, columns: np.ndarray, times: np.ndarray, by_step: bool) -> list[str]:
     """Notes on readings that come in steps, and on values that stand still while a tracker has lost the point."""
     quantum = max(quantisation(column) for column in columns.T)
     if quantum > 0.0:
@@ -254,8 +259,8 @@ def _lint_levels(name: str, one: Series, columns: np.ndarray, times: np.ndarray)
         return []
     k = int(np.argmax(lengths))
     return [
-        f"Channel '{name}' stands still for {lengths[k]} frames from t = {times[starts[k]]:.6g} s although it is noisy "
-        "elsewhere: was the point lost there?"
+        f"Channel '{name}' stands still for {lengths[k]} frames from {_at(times[starts[k]], by_step)} although it is "
+        "noisy elsewhere: was the point lost there?"
     ]
 
 

@@ -235,6 +235,11 @@ class Diagnosis:
         return EXIT[self.verdict]
 
     @property
+    def by_step(self) -> bool:
+        """Whether times of the recordings count load steps."""
+        return any(t.by_step for t in self.traces)
+
+    @property
     def left_out(self) -> bool:
         """Whether errors are of data that were left out: of one recording that is predicted as a whole, nothing is."""
         return len(self.recordings) != 1 or self.settings.get("segments") != 1

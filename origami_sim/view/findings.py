@@ -78,7 +78,7 @@ def plot_diagnosis(d: "Diagnosis") -> Figure:
         for axes in (motion, rest):
             readable(axes)
             if row == len(first):
-                axes.set_xlabel("time [s]")
+                axes.set_xlabel(t.clock[0] if t.by_step else "time [s]")
         if row == 1:
             motion.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
             rest.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))

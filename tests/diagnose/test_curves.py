@@ -271,6 +271,8 @@ def test_wrong_parameter():
 
 def test_cubic_stiffening():
     d = diagnose(coupon(), [torque(lambda q: K * (q - REST) + 3e-4 * (q - REST) ** 3)])
+    assert d.by_step and d.folds[0].name == "made, load steps 0 to 23"
+    assert d.places and all(np.isnan(p.power) for p in d.places)
     assert (d.verdict, d.chosen) == ("MECHANISM", ["crease_stiffening at hinge"])
     number = next(n for n in d.candidates[0].numbers if n.label == "crease_stiffening.cubic_stiffness")
     assert number.value == pytest.approx(3e-4, rel=0.1)

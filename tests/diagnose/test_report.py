@@ -389,6 +389,20 @@ def test_recorder_and_numbers_show_the_residual_that_they_explain():
         assert "residual [" in evidence
 
 
+def test_load_steps_are_no_time():
+    """They have no seconds, no clock and no power."""
+    steps = example()
+    for t in steps.traces:
+        t.by_step, t.times = True, list(range(len(t.times)))
+    for p in steps.places:
+        p.balance, p.power, p.onset = None, NAN, 12.0
+    steps.onset = 31.0
+    text = " ".join(Read(page(steps)).words)
+    assert "departs lastingly after load step 31" in text and "load step 12" in text and "lag in load steps" in text
+    assert not re.search(r"power|in time|\btime \[", text)
+    assert "Unexplained power" in " ".join(Read(page(example())).words)
+
+
 def test_power_that_is_not_explained_is_drawn_block_by_block():
     text = page(example())
     assert "unexplained power at " in text and "means over 100 ms" in text

@@ -90,6 +90,16 @@ def test_unsorted_rows_are_told_from_a_clock_that_starts_again():
         lint(again, markers(track(0)))
 
 
+def test_load_steps_are_not_said_to_be_seconds():
+    steps, values = np.arange(30.0), np.linspace(0.0, 1.0, 30)
+    lost = np.where(steps < 3, np.nan, values)
+    (note,) = lint(steps, {"fold": Series(lost, "crease_angle", "rad", 1e-3)}, by_step=True)
+    assert note == "Channel 'fold' starts only at load step 3."
+    lost[10] = np.nan
+    with pytest.raises(InputError, match=r"first at load step 10 .*allow_gaps"):
+        lint(steps, {"fold": Series(lost, "crease_angle", "rad", 1e-3)}, by_step=True)
+
+
 def test_runs_of_missing_values_are_counted():
     a = track(0)
     a[50:60] = a[80:82] = a[100:103] = np.nan

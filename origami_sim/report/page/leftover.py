@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from origami_sim.locate.places import clock
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import element, percent
 from origami_sim.report.page.measures import array, limit, outside
@@ -41,8 +42,8 @@ def section(d: Diagnosis) -> list:
                 f"{name} of the residual of {c.component}",
                 span_of(lags, margin=0.02),
                 (-1.05, 1.05),
-                x_name="lag",
-                x_unit="s",
+                x_name="lag in load steps" if d.by_step else "lag",
+                x_unit=clock(d.by_step)[1],
                 y_name=name.split(" with")[0],
                 height=170,
             )

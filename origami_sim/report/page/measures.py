@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from origami_sim.locate.places import clock
 from origami_sim.report.diagnosis import Correlation, Diagnosis, Trace
+from origami_sim.report.page.markup import amount, number
 
 
 def array(values) -> np.ndarray:
@@ -15,6 +17,11 @@ def array(values) -> np.ndarray:
 def known(value: float | None, other: float = np.nan) -> float:
     """The value, or another if it is None or not finite."""
     return float(value) if value is not None and np.isfinite(value) else other
+
+
+def when(d: Diagnosis, time: float) -> str:
+    """An instant of the recordings in words: "0.31 s", or "load step 12"."""
+    return f"{clock(True)[0]} {number(time, 3)}" if d.by_step else amount(time, "s", 3)
 
 
 def padded(values: Sequence[float], d: Diagnosis) -> np.ndarray:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from origami_sim.report.diagnosis import Diagnosis, Trace
-from origami_sim.report.page.markup import Html, amount, element, fit_percent, join
-from origami_sim.report.page.measures import array, fit, known
+from origami_sim.report.page.markup import Html, element, fit_percent, join
+from origami_sim.report.page.measures import array, fit, known, when
 from origami_sim.report.page.pieces import fold, legend, nothing
 from origami_sim.report.page.plots import Plot, span_of
 
@@ -17,15 +17,15 @@ NAMES = (("before", "as given"), ("refitted", "refitted"), ("after", "now"))
 def finding(d: Diagnosis) -> str:
     """Since when the refitted model is wrong."""
     if not d.traces:
-        return "nothing to compare in time"
+        return "nothing to compare"
     if not np.isfinite(known(d.onset)):
         return "the refitted model never departs lastingly"
-    return f"the refitted model departs lastingly after {amount(d.onset, 's', 3)}"
+    return f"the refitted model departs lastingly after {when(d, d.onset)}"
 
 
 def section(d: Diagnosis) -> list:
     if not d.traces:
-        return [nothing("No channel could be compared in time.")]
+        return [nothing("No channel could be compared.")]
     groups = {r: [t for t in d.traces if t.recording == r] for r in dict.fromkeys(t.recording for t in d.traces)}
     single = len(groups) == 1
     keys = [
@@ -34,16 +34,17 @@ def section(d: Diagnosis) -> list:
     ]
     out = [element("div", keys, class_="legendrow")]
     for n, (name, traces) in enumerate(groups.items()):
-        figures = element("div", [overlay(t, d.onset if single else np.nan) for t in traces], class_="figures")
+        drawn = [overlay(t, d.onset if single else np.nan, when(d, d.onset)) for t in traces]
+        figures = element("div", drawn, class_="figures")
         out.append(figures if single else fold(name, figures, open_=n < OPEN))
     return out
 
 
-def overlay(t: Trace, onset: float) -> Html:
+def overlay(t: Trace, onset: float, said: str) -> Html:
     """A channel of a recording over its predictions, and the residuals below.
 
     Args:
-        onset: when the refitted model departs [s], marked if finite.
+        onset: when the refitted model departs [s, steps], marked if finite. said: that in words.
     """
     x = array(t.times)
     y = {kind: array(getattr(t, kind)) for kind in ("recorded", "before", "refitted", "after")}
@@ -83,7 +84,7 @@ def overlay(t: Trace, onset: float) -> Html:
         low.line(x, y["recorded"] - y[kind], kind, breaks=t.breaks, title=f"residual, {title}")
     if np.isfinite(onset):
         for plot in (top, low):
-            plot.mark(onset, "onset", f"departs lastingly at {amount(onset, 's', 3)}")
+            plot.mark(onset, "onset", f"departs lastingly at {said}")
     for b in t.breaks if len(t.breaks) <= 40 else []:
         if 0 < b < len(x):
             for plot in (top, low):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from origami_sim.locate.places import REVERSAL, Curve
+from origami_sim.locate.places import REVERSAL, Curve, clock
 from origami_sim.report.page.markup import Html, amount, element, join, percent, plus_minus
 from origami_sim.report.page.measures import array, known
 from origami_sim.report.page.plots import Plot, span_of
@@ -65,15 +65,18 @@ def moment_of(site: str) -> tuple[str, str]:
     return ("force", "N") if site.startswith("shift ") else ("moment", "N m")
 
 
-def in_time(name: str, site: str, unit: str, times: Sequence, values: Sequence, error: Sequence) -> Plot:
-    """Something at a place in time, with twice its standard deviation where that is known."""
+def in_time(
+    name: str, site: str, unit: str, times: Sequence, values: Sequence, error: Sequence, *, by_step: bool = False
+) -> Plot:
+    """Something at a place in time or by load steps, with twice its standard deviation where that is known."""
+    counted, second = clock(by_step)
     x, y, e = array(times), array(values), array(error)
     plot = Plot(
-        f"{name} at {site} in time",
+        f"{name} at {site} by {counted}",
         span_of(x, margin=0.0),
         span_of(y, zero=True, margin=0.15),
-        x_name="time",
-        x_unit="s",
+        x_name=counted,
+        x_unit=second,
         y_name=name,
         y_unit=unit,
     )

@@ -8,7 +8,7 @@ from origami_sim.locate.acting import DRAWN
 from origami_sim.locate.places import Acting, Impulse, Place
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page.markup import Html, amount, element, number, percent
-from origami_sim.report.page.measures import array, known
+from origami_sim.report.page.measures import array, known, when
 from origami_sim.report.page.pieces import (
     bar,
     curve_figure,
@@ -44,26 +44,28 @@ def section(d: Diagnosis) -> list:
         return blows or [nothing("The missing moment could not be located.")]
     ordered = sorted(d.places, key=lambda p: -known(p.share, -1.0))
     ids = {p.site: f"place-{n}" for n, p in enumerate(ordered[:DETAILED])}
-    head = ("Place", "Share of structure", "Structure [sd]", "Unexplained power", "Departs at")
+    timed = () if d.by_step else ("Unexplained power",)  # by load steps nothing has a power
+    head = ("Place", "Share of structure", "Structure [sd]", *timed, "Departs at")
     body = [
         row(
             head,
             element("a", p.site, href=f"#{ids[p.site]}") if p.site in ids else p.site,
             bar(p.share),
             figure(number(p.score)),
-            figure(amount(p.power, "W")),
-            figure(amount(p.onset, "s", 3) if np.isfinite(known(p.onset)) else "never"),
+            *(figure(amount(known(p.power), "W")) for _ in timed),
+            figure(when(d, p.onset) if np.isfinite(known(p.onset)) else "never"),
         )
         for p in ordered
     ]
     about = (
         "Found without fitting any suspect: the moment that the recorded motion needs minus the moment that the "
-        "refitted model has, at each coordinate. Structure: what noise cannot make. Negative power is lost, positive "
-        "gained."
+        "refitted model has, at each coordinate. Structure: what noise cannot make."
+        + " Negative power is lost, positive gained."
+        * bool(timed)
     )
     out = [quiet(about), table(head, body, "Places")]
     out += [
-        fold(f"Missing {moment_of(p.site)[0]} at {p.site}", _place(p), name=ids[p.site], open_=n == 0)
+        fold(f"Missing {moment_of(p.site)[0]} at {p.site}", _place(d, p), name=ids[p.site], open_=n == 0)
         for n, p in enumerate(ordered[:DETAILED])
     ]
     if len(ordered) > DETAILED:
@@ -72,14 +74,14 @@ def section(d: Diagnosis) -> list:
     return [*out, *_alone(d.acting), *blows]
 
 
-def _place(p: Place) -> Html:
+def _place(d: Diagnosis, p: Place) -> Html:
     name, unit = moment_of(p.site)
     figures = []
     if p.times:
-        plot = in_time(f"missing {name}", p.site, unit, p.times, p.moment, p.error)
+        plot = in_time(f"missing {name}", p.site, unit, p.times, p.moment, p.error, by_step=d.by_step)
         if np.isfinite(known(p.onset)):
-            plot.mark(p.onset, "onset", f"departs at {amount(p.onset, 's', 3)}")
-        caption = element("figcaption", element("b", "in time"), " shaded: ± 2 sd")
+            plot.mark(p.onset, "onset", f"departs at {when(d, p.onset)}")
+        caption = element("figcaption", element("b", "by load step" if d.by_step else "in time"), " shaded: ± 2 sd")
         figures.append(element("figure", caption, plot.html()))
     if p.balance is not None:  # what is left of the change of energy less the work, block by block
         c = p.balance
