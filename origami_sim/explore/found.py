@@ -75,6 +75,11 @@ class Found:
     failure: str = ""
     time: float | None = None
 
+    @property
+    def creases(self) -> np.ndarray:
+        """Fold angles of the creases [C] [rad], valley positive."""
+        return self.angles[: len(self.model.creases)]
+
     def angle(self, crease: int | str) -> float:
         """Fold angle of a crease [rad] by its number or name; the mean of those that share a name.
 

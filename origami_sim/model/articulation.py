@@ -6,13 +6,16 @@ panel is held, the pose of the root.
 """
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from origami_sim.errors import InputError, nearest
 from origami_sim.model.model import Model, beside, carried_sides, dihedral_angles
 from origami_sim.model.motions import possible
+from origami_sim.quantities import converted
 
 
 @dataclass(frozen=True)
@@ -259,6 +262,33 @@ class Articulation:
         _, j, k, _ = self.model.creases[crease]
         axis = x[k] - x[j]
         return sign * axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+
+
+def folded(model: Model, angles: Mapping[str | int, float | str]) -> np.ndarray:
+    """Positions [N, 3] [m] at which creases have fold angles by name or number, as `State.folded` takes them.
+
+    Raises:
+        InputError: what `State.folded` refuses.
+    """
+    arm = Articulation(model)
+    if len(arm.open):
+        raise InputError(
+            "creases that close loops have no free angles",
+            field="angles",
+            value=", ".join(model.name("crease", int(c)) for c in arm.open),
+            allowed="positions of a shape that closes: State.at_rest(model, position=x), such as x of an equilibrium",
+        )
+    pose, names = arm.reference(), [model.name("crease", int(c)) for c in arm.creases]
+    for crease, angle in angles.items():
+        mine = [n for n, c in enumerate(arm.creases) if crease in (int(c), names[n])]
+        if not mine:
+            known = ", ".join(dict.fromkeys(names)) + nearest(str(crease), names)
+            raise InputError("there is no such crease", field="angles", value=crease, allowed=known)
+        value = float(converted(angle, "rad", f"angles.{crease}"))
+        if not abs(value) <= np.pi:
+            raise InputError("beyond half a turn", field=f"angles.{crease}", value=angle, allowed="-180 deg to 180 deg")
+        pose.angles[mine] = value
+    return arm.positions(pose)[:, 0]
 
 
 def turned_by(angles: np.ndarray) -> np.ndarray:

@@ -374,6 +374,23 @@ class State:
             status=np.full((2, worlds), -1, np.int32),
         )
 
+    @classmethod
+    def folded(cls, model: Model, angles: "Mapping[str | int, float | str]", worlds: int = 1) -> "State":
+        """The state at rest in which creases are folded by stated angles and panels stay as they are drawn.
+
+        Panels that are held stay where they are; creases that are not stated have the angles of the pattern.
+
+        Args:
+            angles: fold angle by name or number of the crease, valley positive: [rad], or a text such as "30 deg"; a
+                name that several creases share stands for all of them.
+
+        Raises:
+            InputError: no such crease, an angle beyond half a turn, creases that close loops: their angles are not free.
+        """
+        from origami_sim.model.articulation import folded  # of this module
+
+        return cls.at_rest(model, worlds, folded(model, angles))
+
     def copy(self) -> "State":
         arrays = {f.name: getattr(self, f.name).copy() for f in fields(self) if f.name != "step"}
         return State(**arrays, step=self.step)

@@ -159,6 +159,7 @@ class RigidSystem:
         return {
             "state": state,
             "angles": state.angles[:, 0],
+            "count": len(self.model.creases),
             "residual": history[-1],
             "tolerance": target,
             "iterations": len(history),

@@ -75,7 +75,7 @@ class Equilibrium:
 
     Attributes:
         state: one world at rest, from which a simulation can start.
-        angles: [C + Q] continuous hinge angles, creases first [rad].
+        angles: [C + Q] continuous hinge angles, creases first [rad]. count: C; the first so many are `creases`.
         residual: largest unbalanced force on a free node's axis [N], of rigid panels moment of a coordinate [N m].
         tolerance: what was asked for [N], [N m].
         iterations: tangents evaluated. history: residual before each of them [N].
@@ -110,6 +110,12 @@ class Equilibrium:
     touching: str = ""
     frictionless: bool = False
     energies: dict[str, float] = field(default_factory=dict)
+    count: int = field(default=0, repr=False)
+
+    @property
+    def creases(self) -> np.ndarray:
+        """Fold angles of the creases [C] [rad], valley positive."""
+        return self.angles[: self.count]
 
     @property
     def energy(self) -> float:
@@ -483,6 +489,7 @@ class System:
             mode=mode,
             reactions=np.where(self.model.free > 0, 0.0, -f),
             message=message,
+            count=len(self.model.creases),
         )
 
     def _worst(self, f: np.ndarray) -> int:
