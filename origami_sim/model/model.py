@@ -385,7 +385,7 @@ class State:
                 name that several creases share stands for all of them.
 
         Raises:
-            InputError: no such crease, an angle beyond half a turn, creases that close loops: their angles are not free.
+            InputError: no such crease, an angle beyond half a turn, creases that close loops (whose angles are bound).
         """
         from origami_sim.model.articulation import folded  # of this module
 
