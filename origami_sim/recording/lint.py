@@ -162,9 +162,9 @@ def _lint_times(times: np.ndarray, file: object, place: Callable[[int], str], al
     return [sentence + "."]
 
 
-def _at(time: float, by_step: bool) -> str:
+def _at(time: float | np.ndarray, by_step: bool) -> str:
     """An instant of a recording in words."""
-    return f"load step {time:.6g}" if by_step else f"t = {time:.6g} s"
+    return f"load step {float(time):.6g}" if by_step else f"t = {float(time):.6g} s"
 
 
 def _lint_missing(name: str, one: Series, times: np.ndarray, file: object, gaps: bool, steps: bool) -> list[str]:

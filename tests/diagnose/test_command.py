@@ -18,7 +18,7 @@ from origami_sim.drive import Drive, sine
 from origami_sim.effects import CATALOGUE, Effect, Parameter, scalar
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Prediction
-from origami_sim.hypotheses.subject import spreads
+from origami_sim.hypotheses.subject import known_before, spreads
 from origami_sim.observation.doubts import assumed, switched
 from origami_sim.predict import cache
 from origami_sim.recording import Channel, DriveChannel, Recording, read_recording
@@ -432,7 +432,7 @@ def test_priors_come_in_the_settings_unit_with_a_unit_or_as_a_share(recorded):
     )
     data = command.read_recordings([str(recorded)])
     built = scene_module("pendulum_chain").build(settings)[:2]
-    known, _, aligned = command._priors(settings, data, ["length_1=1mm", "mass_1=0.001"], *built)
+    known, _, aligned = known_before(settings, data[0], ["length_1=1mm", "mass_1=0.001"], *built)
     assert known == pytest.approx(
         {"length_1": 1e-3, "mass_1": 1e-3, "viscosity_1": 5e-5}
     )  # the command line over the sidecar
