@@ -239,7 +239,7 @@ def calibrate(args: argparse.Namespace) -> Done:
 def _deflection(args: argparse.Namespace):
     """The fit of a deflection-field curve."""
     from origami_sim.calibrate import experiment
-    from origami_sim.recording.units import UNITS
+    from origami_sim.units import UNITS
 
     field_name, tip_name = _names(args.columns, 2)
     sizes = {
@@ -369,7 +369,7 @@ def _names(text: str, count: int) -> list[str]:
 
 
 def _number(text: str, dimension: str, option: str) -> float:
-    from origami_sim.recording.units import UNITS, unit_factor
+    from origami_sim.units import UNITS, unit_factor
 
     match = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", str(text).strip())
     if not match or not match[2] or not math.isfinite(float(match[1])):

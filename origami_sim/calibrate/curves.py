@@ -9,7 +9,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.files import read_bytes
-from origami_sim.recording.units import UNITS, unit_factor
+from origami_sim.units import UNITS, unit_factor
 
 
 def read_columns(path: str | Path, columns: Mapping[str, tuple[str | None, str]]) -> dict[str, np.ndarray]:
@@ -17,7 +17,7 @@ def read_columns(path: str | Path, columns: Mapping[str, tuple[str | None, str]]
 
     Args:
         path: the file; its first line names the columns.
-        columns: name -> (unit, dimension), the dimension a key of `recording.units.UNITS`; a unit None is refused,
+        columns: name -> (unit, dimension), the dimension a key of `origami_sim.units.UNITS`; a unit None is refused,
             because a calibration must not guess it.
 
     Returns:

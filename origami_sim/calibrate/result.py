@@ -14,7 +14,7 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.files import read_toml
 from origami_sim.pattern.files import write_atomic
-from origami_sim.recording.units import UNITS
+from origami_sim.units import UNITS
 
 COMMAND = "command"
 """Name of the setting that holds the command which re-creates the file."""

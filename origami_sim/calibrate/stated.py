@@ -9,7 +9,7 @@ from pathlib import Path
 from origami_sim.calibrate.result import Calibration, Quantity
 from origami_sim.errors import InputError
 from origami_sim.files import read_bytes
-from origami_sim.recording.units import UNITS
+from origami_sim.units import UNITS
 
 MORE_UNITS = {
     "kg/m^3": ("kg/m^3", 1.0),

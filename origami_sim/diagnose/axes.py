@@ -19,7 +19,7 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.recording import Recording
 from origami_sim.recording.axes import EXPLAINED, FAR, alike, groups_of, orders, picture_of, reordered, words
 from origami_sim.recording.recording import Channel
-from origami_sim.recording.units import unit_factor
+from origami_sim.units import unit_factor
 
 Change = Callable[[Recording], Recording]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import Channel, Recording
-from origami_sim.recording.units import quantity, with_prefix
+from origami_sim.units import quantity, with_prefix
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

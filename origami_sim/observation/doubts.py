@@ -13,8 +13,8 @@ from origami_sim.observation.channels import PATH
 from origami_sim.observation.observe import check_scene
 from origami_sim.recording import Recording, by_component
 from origami_sim.recording.drives import UNITS, recorded_signals, switches
-from origami_sim.recording.units import quantity
 from origami_sim.solve.timestep import stable_step
+from origami_sim.units import quantity
 
 SLOW = 1e5
 """Steps of the solver in one frame from which a note says so."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import CHANNEL_KINDS, Channel, Recording
-from origami_sim.recording.units import quantity
+from origami_sim.units import quantity
 
 FAR = 3.0
 """How many times closer (root mean square) the changed readings must be to the prediction than those as recorded.

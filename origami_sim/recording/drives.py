@@ -110,18 +110,14 @@ def by_component(name: str, drive: DriveChannel, *, file: object = None) -> dict
         names = [f"voltage_{k}" for k in range(len(columns))]
     if not names:
         allowed = ", ".join(UNITS) + ", or a component such as field_z, gradient_zx, voltage_1 or grip_top"
-        allowed += nearest(name, UNITS)
-        raise InputError("the simulator knows no such drive", file=file, field=field, allowed=allowed)
+        said = allowed + nearest(name, UNITS)
+        raise InputError("the simulator knows no such drive", file=file, field=field, allowed=said)
     if drive.unit != UNITS[family]:
         raise InputError("the drive has another unit", file=file, field=field, value=drive.unit, allowed=UNITS[family])
     if len(columns) != len(names):
-        raise InputError(
-            "the drive has a wrong number of components",
-            file=file,
-            field=field,
-            value=len(columns),
-            allowed=f"{len(names)}" + (", or one with a direction" if name == "field" else ""),
-        )
+        where = {"file": file, "field": field, "value": len(columns)}
+        allowed = f"{len(names)}" + (", or one with a direction" if name == "field" else "")
+        raise InputError("the drive has a wrong number of components", **where, allowed=allowed)
     return dict(zip(names, columns, strict=True))
 
 

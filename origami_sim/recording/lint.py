@@ -7,7 +7,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import CHANNEL_KINDS, Recording, quantisation, scaled_differences
-from origami_sim.recording.units import quantity, unit_factor
+from origami_sim.units import quantity, unit_factor
 
 SAME = 1e-9
 """Part of the median step by which two times differ that are one: rounding of a digitised table."""

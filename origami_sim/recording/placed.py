@@ -13,7 +13,7 @@ from origami_sim.drive.sources import Source
 from origami_sim.errors import InputError
 from origami_sim.recording.recording import Recording
 from origami_sim.recording.table import Table
-from origami_sim.recording.units import si_unit, unit_factor
+from origami_sim.units import si_unit, unit_factor
 
 
 def columns_of(stated: Any) -> Iterator[str]:

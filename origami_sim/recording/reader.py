@@ -18,7 +18,7 @@ from origami_sim.recording.recording import Channel, DriveChannel, Recording
 from origami_sim.recording.sidecar import Sidecar
 from origami_sim.recording.table import Table, read_table
 from origami_sim.recording.trackers import FORMATS, detect, read_export
-from origami_sim.recording.units import si_unit, unit_factor
+from origami_sim.units import si_unit, unit_factor
 
 
 def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> Recording:

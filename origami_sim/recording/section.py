@@ -10,7 +10,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.table import LARGEST_NUMBER
-from origami_sim.recording.units import UNITS, unit_factor
+from origami_sim.units import UNITS, unit_factor
 
 CARRIERS = ("panel", "crease", "node", "nodes", "ground", "grip")
 ATTACHMENT_KEYS = (*CARRIERS, "point", "from", "distance", "along", "height", "direction")

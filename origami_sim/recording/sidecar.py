@@ -113,7 +113,7 @@ from origami_sim.recording.section import ATTACHMENT_KEYS, Section
 from origami_sim.recording.stated import MOTIONS, Gravity, Start, gravity_spec, noise_spec, prior_spec, start_spec
 from origami_sim.recording.table import Table
 from origami_sim.recording.trackers import FORMATS
-from origami_sim.recording.units import unit_factor
+from origami_sim.units import unit_factor
 
 _TOP_KEYS = (
     "name",

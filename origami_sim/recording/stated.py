@@ -9,7 +9,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.recording.section import Section, split_quantity
-from origami_sim.recording.units import unit_factor
+from origami_sim.units import unit_factor
 
 POSES = ("hanging", "upside down", "lying")
 STATES = ("released", "equilibrium", "moving")

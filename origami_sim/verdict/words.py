@@ -8,7 +8,7 @@ from origami_sim.effects import get
 from origami_sim.fit.least_squares import Fit
 from origami_sim.hypotheses.hypothesis import Free, Suspect
 from origami_sim.quantities import ANY
-from origami_sim.recording.units import quantity
+from origami_sim.units import quantity
 
 WHOLE = ("the measurement", "the drive", "the ground")
 """Sites that an effect's title says already."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from origami_sim.recording.units import with_prefix
+from origami_sim.units import with_prefix
 from origami_sim.view.plot import readable
 from origami_sim.view.summary import card, counted, picture_of
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from origami_sim.recording import estimate_noise, noise_report
-from origami_sim.recording.units import quantity
+from origami_sim.units import quantity
 
 
 def signal(times):

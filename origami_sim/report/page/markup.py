@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from origami_sim.quantities import ANY
-from origami_sim.recording.units import with_prefix
+from origami_sim.units import with_prefix
 
 MISSING = "–"
 """Shown where there is no number."""
