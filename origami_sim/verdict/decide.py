@@ -73,7 +73,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     if ended_early(p, chance) and (not lead or (late and left.rest > left.beyond)):
         return as_("TIE", total, tie=True)
     real = UNLISTED in lead or left.over > FAR or missing(p, best, left) > ALONE
-    if left.rest > left.beyond and real:
+    if (left.rest > left.beyond and real) or foreign > 0.5:  # or most probably none of these acts
         return as_("UNKNOWN", np.nan)
     if not top:
         return as_("", classes[top])

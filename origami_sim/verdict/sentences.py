@@ -119,6 +119,7 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     if d.word == "UNKNOWN":
         text = f"Something real is missing that the catalogue does not name: the closest, {say(shown)}, {explained}."
         text += MORE_LAWS if more_laws else ""
+        text += _unlisted(d)
         return Judgement(d.word, text, np.nan, [shown.hypothesis.label], **common)
     if d.tie:
         names = distinct([f for f in tied if f.hypothesis.suspects]) + (

@@ -98,7 +98,8 @@ def test_what_is_left_is_placed_by_the_actions_that_leave_least():
         (0.1, 0.02, 1.0, 0.0, "MECHANISM"),
         (0.001, 0.02, 1.0, 0.99, "UNKNOWN"),  # forces are missing, though numbers explain nearly all
         (0.001, 0.02, 3.0, 0.0, "UNKNOWN"),  # no forces, but three times the noise
-        (0.001, 0.02, 1.0, 0.3, "MECHANISM"),  # nothing shows that the rest is real
+        (0.001, 0.02, 1.0, 0.2, "MECHANISM"),  # nothing shows that the rest is real
+        (0.001, 0.02, 1.0, 0.4, "UNKNOWN"),  # it may well be: what is named is less probable than a law outside
         (0.1, 0.02, 3.0, 0.99, "MECHANISM"),  # more is named than left
     ],
 )
@@ -146,6 +147,8 @@ def test_what_is_left_may_be_the_part_of_one_law_that_is_not_imitated(rest, real
     odds = 0.07 + real * 0.25 / 0.3 if rest else 0.07
     assert odds == pytest.approx(foreign, abs=0.01) and decided.word == "MECHANISM"
     assert decided.probability == pytest.approx(1.0 / (1.0 + odds))
+    two = decide(posterior({("air_drag", "crease_friction"): 0.0, (): -50.0}), lambda key: budget)
+    assert two.word == ("SEVERAL" if odds < 0.5 else "UNKNOWN"), "nothing is found that is less probable than not"
 
 
 @pytest.mark.parametrize(("left", "word"), [(0.1, "SEVERAL"), (0.6, "UNKNOWN")])
