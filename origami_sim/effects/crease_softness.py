@@ -28,7 +28,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "stiffness_change", "dK", "N m/rad", 0.0, (-10.0, 10.0),
-            "added to the crease's stiffness; above minus that", typical=-2e-4,
+            "added to the crease's stiffness; above minus that", typical=-2e-4, takes="crease.stiffness",
         ),
         Parameter("rest_angle", "theta0", "rad", 0.0, (-math.pi, math.pi), "that of the crease", typical=0.0),
     ),

@@ -66,11 +66,11 @@ def suspects(
                 sites = sites[1:]
         fitted = _across(effect, parameters) or effect.fitted
         for site, kind, entities in sites:
-            free = tuple(free_number(name, p, entities) for p in fitted)
+            free = tuple(_within(free_number(name, p, entities), parameters) for p in fitted)
             found.append(Suspect(name, site, kind, free, entities, _among(effect.family, sites, entities)))
         parts = stretches(model, effect.family) if effect.uneven else []
         for site, kind, entities in parts:
-            free = tuple(free_number(name, p, entities) for p in effect.fitted)
+            free = tuple(_within(free_number(name, p, entities), parameters) for p in effect.fitted)
             found.append(Suspect(name, site, kind, free, entities, len(parts) + 1, stretch=True))
     return found
 
@@ -98,6 +98,16 @@ def _more_of(model: Model, name: str, parameters: Parameters | None) -> list[Sus
             )
         out.append(Suspect(name, site, kind, (strength,), entities, len(each), more=True))
     return out
+
+
+def _within(number: Free, parameters: Parameters | None) -> Free:
+    """The number, which leaves no less than nothing of what the model has and it takes away from."""
+    owner, _, name = get(number.owner).parameter(number.name).takes.partition(".")
+    if parameters is None or (owner, name) not in parameters:
+        return number
+    there = parameters[owner, name]
+    least = float(np.min(there if number.entities is None else there[list(number.entities)]))
+    return replace(number, lower=max(number.lower, -least)) if least > 0.0 else number
 
 
 def _across(effect: Effect, parameters: Parameters | None) -> tuple[str, ...]:

@@ -45,6 +45,13 @@ def test_a_mass_on_a_single_panel_is_that_of_all_nodes_that_move():
     assert mass.site == "the body" and after - before == pytest.approx(1e-4 * len(mass.entities))
 
 
+def test_a_crease_loses_no_more_stiffness_than_it_has():
+    sheet = Sheet(strip([0.01, 0.03, 0.02], 0.02), thickness="1 mm", panels="rigid")
+    model, parameters = sheet.crease(stiffness=[2e-3, 5e-4]).gravity().fix(panels=[0]).build()
+    soft = [s for s in asked(model, parameters, Drive(), channels=2) if s.effect == "crease_softness"]
+    assert {s.site: s.free[0].lower for s in soft} == {"crease 0": -2e-3, "crease 1": -5e-4, "all creases": -5e-4}
+
+
 def test_a_beam_is_suspected_in_quarters_and_thirds(scenes):
     model, *_ = scenes["mae_cantilever"]
     every = [s for s in asked(*scenes["mae_cantilever"]) if s.stretch]
