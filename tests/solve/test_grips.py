@@ -257,3 +257,12 @@ def test_worlds_may_differ_in_their_paths():
         one = simulate(model, parameters, Drive(grips={"base": sine(height, often)}), duration=0.1, rate=200)
         np.testing.assert_array_equal(both.x[:, :, [w]], one.x)
         np.testing.assert_array_equal(both.grip_wrenches[:, :, [w]], one.grip_wrenches)
+
+
+@pytest.mark.parametrize("panels", ["elastic", "rigid"])
+def test_the_gpu_moves_grips_as_the_cpu_does(cuda, panels):
+    model, parameters = flap(panels, damping=0.01)
+    drive = Drive(grips={"base": sine("2 mm", "8 Hz")})
+    runs = [simulate(model, parameters, drive, duration=0.3, rate=100, device=device) for device in ("cpu", cuda)]
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-7
+    assert np.abs(runs[0].grip_wrenches - runs[1].grip_wrenches).max() < 1e-4 * np.abs(runs[0].grip_wrenches).max()
