@@ -120,7 +120,7 @@ def _diagnosed(
     unseen = unobserved(forward)
     if unseen is not None:
         noted.append(unseen)
-    unclear = "Whether axes are mistaken could not be told"
+    unclear = "Whether axes or units are mistaken could not be told"
     wrong = attempt(noted, unclear, lambda: mistaken(subject, recordings, o, forward), None)
     tell("nominal", 0.0)
     given, base, weights = nominal_fits(forward)
@@ -130,6 +130,8 @@ def _diagnosed(
         if keep is not None:
             keep.follow(forward)
         given, base, weights = nominal_fits(forward)
+    if wrong is None:
+        wrong = attempt(noted, unclear, lambda: mistaken(subject, recordings, o, forward, base), None)
     if len(recordings) == 1:
         noted.append(ALONE if len(forward.blocks) > 1 else WHOLE)
     base, rough = settled(forward, base)

@@ -75,6 +75,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
     channels = {
         name: _channel(name, spec, series[name], times, cameras.get(name), side) for name, spec in specs.items()
     }
+    stated = specs | {f"drive.{name}": spec for name, spec in side.drive.items()}
     return Recording(
         name=side.name or path.stem,
         times=times,
@@ -90,6 +91,7 @@ def read_recording(csv_path: str | Path, sidecar: str | Path | None = None) -> R
             "scene": side.scene,
             "priors": side.priors,
             "possible": side.possible,
+            "units": {"time": side.time["unit"], **{n: s["unit"] for n, s in stated.items()}},
             **side.free_text,
         },
         gravity=side.gravity,
