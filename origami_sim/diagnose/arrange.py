@@ -11,7 +11,7 @@ from origami_sim.fit.derivatives import linearise
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.recorder import recorder_noise
+from origami_sim.fit.recorder import fast_noise
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
@@ -194,7 +194,7 @@ def rigid_rollouts(
     if bent <= UNNOTICED:
         return found, found.notes if forced else [BENT.format(bent), *found.notes]
     # a recorder that averages over frames has more noise than neighbouring frames show
-    noise = float(np.sqrt(np.mean((recorder_noise(found, nominal_fits(found)[1]) / found.blocks[0].noise) ** 2)))
+    noise = float(np.sqrt(np.mean((fast_noise(found, nominal_fits(found)[1]) / found.blocks[0].noise) ** 2)))
     return (found, [BENT.format(bent / noise), *found.notes]) if bent <= UNNOTICED * noise else None
 
 

@@ -6,6 +6,7 @@ from the recording changed in this way. A clock, which decides how a device gets
 numbers of the model are refitted.
 """
 
+import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,14 @@ from origami_sim.hypotheses.mistakes import Change, Slip, slips
 from origami_sim.infer.budget import pooled
 from origami_sim.recording import Recording
 from origami_sim.recording.axes import EXPLAINED, FAR, alike
+from origami_sim.threads import told
+
+LEAST, PART = 30.0, 0.1
+"""Seconds, and part of the limit of time, in which units but those of time are asked for, whichever is longer.
+
+Rigid panels take 1 to 15 s on one core; of bars that take longer some units are not asked for. Half of both leaves
+fewer of these, double takes a fifth of the time of a search.
+"""
 
 
 @dataclass(frozen=True)
@@ -65,8 +74,11 @@ def mistaken(
 
     # of bars, which take steps of microseconds, a long motion is not predicted
     frames = len(forward.blocks[0].times) if forward.panels == "rigid" else None
+    until = clock.perf_counter() + max(LEAST, PART * o.limit)
     for slip in slips(recordings[0], frames):
         if base is not None and not slip.late:
+            continue
+        if slip.rivals and not slip.late and not told(lambda: clock.perf_counter() < until):
             continue
         left, moved = error(slip.change)
         if left >= (as_given if base is not None else given / FAR) or (base is None and left >= EXPLAINED * moved):
@@ -101,7 +113,7 @@ def missed(forward: Predictor) -> tuple[float, float]:
     shot = forward.predict(Hypothesis(), theta[None], local)
     read = np.concatenate([b.values / b.noise for b in forward.blocks])
     moved = float(np.sqrt(np.nanmean((read - np.nanmean(read, axis=0)) ** 2)))
-    if any(np.any(b.seen() & ~np.isfinite(v[0])) for b, v in zip(forward.blocks, shot, strict=True)):
+    if any(np.any(np.isfinite(b.values) & ~np.isfinite(v[0])) for b, v in zip(forward.blocks, shot, strict=True)):
         return np.inf, moved
     left = np.concatenate([(b.values - v[0]) / b.noise for b, v in zip(forward.blocks, shot, strict=True)])
     return float(np.sqrt(np.nanmean(left**2))), moved

@@ -221,7 +221,7 @@ def _diagnosed(
         recordings=[r.name for r in recordings],
         ended=posterior.ended,
     )
-    if out.ended:
+    if out.ended and cause is None:
         out.sentence += f" The search ended at its limit of {o.limit:g} s: sets of effects that were estimated and not "
         out.sentence += f"fitted hold p = {out.unfitted:.2f}."
         out.notes.insert(0, "With a larger limit (--limit) the same command goes on from where the search ended.")

@@ -189,7 +189,7 @@ def unnamed_verdict(
         unknown: whether a discrepancy is real that the refitted model leaves.
     """
     over = over_noise(forward, base)
-    if unknown:
+    if unknown or over > FAR:  # so far off, no refit is enough
         now, anew = bursts(base), len(forward.blocks) > len(forward.recordings)
         text = f"The refitted model{', begun anew in every stretch,' if anew else ''} misses the recordings by "
         text += f"{over:.2f} times the noise"
