@@ -28,12 +28,12 @@ from origami_sim.fit.held_out import estimated, predicted, refitted
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.nominal import level, nominal_fits
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.recorder import recorder_noise
 from origami_sim.hypotheses.hypothesis import SEPARATOR, Suspect
 from origami_sim.hypotheses.subject import Source, subject_of, untold
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.basins import calmest, settled
 from origami_sim.infer.posterior import Posterior, marginals
+from origami_sim.infer.recorder import recorder_noise
 from origami_sim.infer.screen import LATE, Signature, screen
 from origami_sim.infer.search import search
 from origami_sim.locate.describe import unnamed

@@ -10,8 +10,8 @@ from origami_sim.fit.bursts import bursts
 from origami_sim.fit.hyper import HYPER
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
-from origami_sim.fit.recorder import recorder_noise
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.recorder import recorder_noise
 from origami_sim.infer.unlisted import UNLISTED
 
 FAR = 2.0

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from origami_sim.fit.recorder import flat_level, recorder_noise, recorder_weights
+from origami_sim.fit.recorder import flat_level, recorder_weights
 from origami_sim.fit.weights import Weights
+from origami_sim.infer.recorder import recorder_noise
 
 
 def left_over(seed: int, recordings: int):
