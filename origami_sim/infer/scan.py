@@ -39,8 +39,8 @@ SECANTS, APART = 3, 1.5
 """Times that signatures are simulated again, at most, and the factor between the strength at which one was and that at
 which it explains most that asks for it."""
 
-LEADING = 12
-"""Signatures that are: as many as are paired with others."""
+LEADING, NEXT_TO_NONE = 12, 0.01
+"""Signatures that are: as many as are paired with others; and the part of such a strength that is not simulated."""
 
 COARSE = GRID[2:9]
 """Strengths that are tried where there are many worlds: a tenth to a hundred of the unit."""
@@ -167,7 +167,8 @@ def at_their_strengths(
             if s.parts and not s.status:
                 mine = about.rest(about.whole(s.parts, away=False))
                 found = lsq_linear(mine, rest, s.bounds)
-                explained[n] = -found.cost, found.x
+                # the wrong way, a strength is next to none at its bound
+                explained[n] = -found.cost, np.where(np.abs(found.x) < NEXT_TO_NONE, 0.0, found.x)
         leading = sorted(explained, key=lambda n: -explained[n][0])[:LEADING]
         apart = {n: np.abs(explained[n][1]) for n in leading}
         far = [n for n, x in apart.items() if np.any((x > 0.0) & ((x < 1.0 / APART) | (x > APART)))]
@@ -175,7 +176,7 @@ def at_their_strengths(
             break
         strengths = [explained[n][1] for n in far]
         for n, new in zip(far, simulated_at(forward, [out[n] for n in far], strengths, base, weights), strict=True):
-            out[n] = new
+            out[n] = new if all(np.all(np.isfinite(p)) for p in new.parts) else out[n]
     return rated(out, base)
 
 

@@ -24,7 +24,7 @@ from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.infer.placement import forget
 from origami_sim.infer.posterior import marginals
-from origami_sim.infer.scan import over_shapes
+from origami_sim.infer.scan import at_their_strengths, over_shapes
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import better_within, continued_from, search
 from origami_sim.recording import Channel, DriveChannel, Recording
@@ -352,3 +352,18 @@ def test_what_friction_remembers_is_of_each_worlds_own_motion():
     alone = forward.predict(Hypothesis((one,)), heavier[None], local[:1])
     assert max(np.abs(b[1] - a[0]).max() for b, a in zip(beside, alone, strict=True)) < 1e-12
     assert max(np.abs(b[0] - a[0]).max() for b, a in zip(beside, alone, strict=True)) > 0.02
+
+
+def test_signatures_are_of_the_strengths_that_explain_most():
+    """Friction that holds is no multiple of what a third of it does; drag would have to push, and stays as it was."""
+    effects = {"air_drag": {"drag_coefficient": (1.0, None)}, "crease_friction": {"friction_moment": (2e-5, [0])}}
+    forward, _ = arranged(subject(2), prepared([record(effects, panels=2, duration=4.0, noise=2e-4)], 200.0), Options())
+    _, base, weights = nominal_fits(forward)
+    some = ("crease_friction", "air_drag")
+    every = [s for s in suspects(forward.model, forward.recordings, forward.drive) if s.effect in some]
+    before = screen(forward, every, base, weights)
+    after = at_their_strengths(forward, before, base, weights)
+    size = {s.suspect.effect: (float(s.size[0]), float(t.size[0])) for s, t in zip(before, after, strict=True)}
+    assert size["crease_friction"][0] < 1e-5 and size["crease_friction"][1] == pytest.approx(2e-5, rel=0.2)
+    assert size["air_drag"][0] == size["air_drag"][1]
+    assert not any(s.status for s in after)

@@ -12,7 +12,7 @@ from origami_sim.fit.predictor import Prediction
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.coordinates import Coordinates
 from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis
-from origami_sim.hypotheses.suspects import _free
+from origami_sim.hypotheses.suspects import free_number
 from tests.fit.test_least_squares import made
 
 LENGTH = Free("", "length", "m", 0.2, 0.01, 0.1, 0.4, 0.02)
@@ -82,16 +82,16 @@ def test_a_time_constant_is_found_that_is_far_from_where_it_begins(time):
 
 
 def test_positive_scales_beside_strengths_are_fitted_by_their_logarithms():
-    scales = {(name, p) for name, e in CATALOGUE.items() for p in e.fitted if _free(name, p, None).power == 0.0}
+    scales = {(name, p) for name, e in CATALOGUE.items() for p in e.fitted if free_number(name, p, None).power == 0.0}
     assert {
         ("crease_relaxation", "time_1"),
         ("stribeck", "fading_speed"),
         ("ground_compliance", "reach"),
     } <= scales
     for name, number in scales:
-        f = _free(name, number, None)
+        f = free_number(name, number, None)
         assert f.start > 0.0 and f.lower >= 0.0 and f.spread == pytest.approx(np.log(PLAUSIBLE)), name
-    assert _free("crease_friction", "yield_angle", None).power == 0.5
+    assert free_number("crease_friction", "yield_angle", None).power == 0.5
     # a strength and an angle may be nothing; thresholds lie within what was recorded; a ratio may be nothing
     absent = {
         ("crease_friction", "friction_moment"),
