@@ -128,7 +128,7 @@ def test_the_moment_is_named_in_the_sentence_and_in_the_patch(fallen):
     said = judge(forward, given, base, found, 1.0)
     assert said.verdict == "UNKNOWN" and np.isnan(said.probability)
     assert "a moment by angle and rate that no law of the catalogue gives, at crease 1 (root mean" in said.sentence
-    assert "The closest of the catalogue is dry friction at crease 1" in said.sentence
+    assert "The closest of the catalogue is dry friction at all creases" in said.sentence
     assert UNLISTED in str(patch(said.best))
     assert not any(UNLISTED in n.label for n in numbers(said.best))  # two dozen coefficients say nothing to a reader
 
@@ -148,5 +148,5 @@ def test_what_is_left_beside_named_laws_is_said_to_be_at_its_crease(fallen):
     kept = [k for k in found.nodes if UNLISTED not in found.effects(k)]
     parts = {name: {k: getattr(found, name)[k] for k in kept} for name in ("nodes", "total", "log")}
     said = judge(forward, given, base, replace(found, **parts), 1.0)
-    assert "the closest, dry friction at crease 1" in said.sentence
+    assert "the closest, dry friction at all creases" in said.sentence
     assert "is real and not named, above all at crease 1." in said.sentence
