@@ -144,7 +144,9 @@ def screen(
     for s in suspects:
         if not _together(s, suspects):
             continue
+        names = [f.name for f in s.strengths]
         mine = [v for v in found.values() if v.suspect.effect == s.effect and not v.suspect.more]
+        mine = [v for v in mine if [f.name for f in v.suspect.strengths] == names]
         if any(v.status for v in mine):
             found[id(s)] = Signature(s, [], np.array([f.scale for f in s.strengths]), status=LATE)
             continue

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from origami_sim.diagnose import Options, Subject, diagnose
+from origami_sim.design.build import Sheet
+from origami_sim.diagnose import Options, Subject, diagnose, factor
 from origami_sim.diagnose.arrange import arranged
 from origami_sim.diagnose.baselines import baselines
 from origami_sim.diagnose.experiment import propose
@@ -22,11 +23,13 @@ from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.infer.components import with_single_components
 from origami_sim.infer.placement import forget
 from origami_sim.infer.posterior import marginals
 from origami_sim.infer.scan import at_their_strengths, over_shapes
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import better_within, continued_from, search
+from origami_sim.pattern import strip
 from origami_sim.recording import Channel, DriveChannel, Recording
 from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import record, subject
@@ -367,3 +370,24 @@ def test_signatures_are_of_the_strengths_that_explain_most():
     assert size["crease_friction"][0] < 1e-5 and size["crease_friction"][1] == pytest.approx(2e-5, rel=0.2)
     assert size["air_drag"][0] == size["air_drag"][1]
     assert not any(s.status for s in after)
+
+
+def test_components_of_a_vector_are_screened_alone_as_beside_it():
+    sheet = Sheet(strip([0.02] * 3, 0.02), thickness="1 mm", material="pdms", panels="rigid").fix(panels=[0])
+    sheet.crease(stiffness="1 mN m/rad", loss_time="5 ms").gravity()
+    for panel in (1, 2):
+        sheet.magnetise(panel, remanence="50 mT", volume="400 mm^3", poling=(1, 0, 0))
+    model, parameters = sheet.build()
+    drive = Drive(field=(0.0, 0.0, sine("5 mT", "2 Hz")))
+    run, rng = simulate(model, parameters, drive, duration=1.0, rate=100), np.random.default_rng(0)
+    read = run.creases[:, :, 0] + 1e-3 * rng.normal(size=(len(run.times), 2))
+    channels = {f"fold{k}": Channel(f"fold{k}", "crease_angle", read[:, k], "rad", 1e-3, {"crease": k}) for k in (0, 1)}
+    known = Subject.from_model(model, parameters, drive, [factor("crease.stiffness", 0.05)])
+    forward, _ = arranged(known, prepared([Recording("swing", run.times, channels)], 200.0), Options())
+    _, base, weights = nominal_fits(forward)
+    every = [s for s in suspects(model, forward.recordings, drive, parameters) if s.effect == "poling_error"]
+    found = with_single_components(screen(forward, every, base, weights))
+    again = screen(forward, [s.suspect for s in found], base, weights, sized=True)
+    assert len(found) == 3 * len(every) == 9
+    assert [s.suspect.label for s in again] == [s.suspect.label for s in found]
+    assert [len(s.size) for s in again] == [len(s.size) for s in found] == [2, 1, 1] * 3
