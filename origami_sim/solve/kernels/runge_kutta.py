@@ -158,7 +158,7 @@ def probed(tree: Tree, k: int, size: scalar, w: int):
         copy(s, o + tree.damped, change, m)
         for j in range(tree.bodies - 1):
             slope = (at(s, o + tree.torque + j) - at(s, o + tree.rigidity + j)) / PROBE
-            put(s, o + tree.rigidity + j, wp.max(slope, scalar(0.0)))
+            put(s, o + tree.rigidity + j, wp.max(slope, scalar(0.0)) * scalar(tree.elastic))
     else:
         nudge = nudge_of(tree, k, size)
         for i in range(m):

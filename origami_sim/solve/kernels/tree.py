@@ -51,6 +51,7 @@ class Tree:
     # [S, S] what weights of damped accelerations are more than those of others, on the diagonal their own; empty where
     # all are explicit
     implicit: wp.array2d(dtype=scalar)
+    elastic: int  # 1: steps are implicit in the joints' stiffness as well
     # steps at whose begin a held tree moves on from elsewhere, R of them; what memory and rates were before
     restarts: wp.array(dtype=wp.int32)
     starts: wp.array2d(dtype=scalar)  # [R 2 J, W] coordinates, then rates

@@ -23,6 +23,12 @@ TOLERANCE = 1e-10
 FINEST = 1e-7
 """Part of the asked step below which a world is given up as unstable, unless a batch's `finest` says another."""
 
+ELASTIC = 1e-7
+"""Error of a step from which on steps that are implicit in damping are so in the joints' stiffness, too.
+
+A chain of twelve damped cells then takes 0.27 of the time for 1e-5, 0.9 for 1.5e-7; for 1e-10 it would take 1.5 times.
+"""
+
 STABILISATION = 100.0
 """Rate at which an error of a closed loop decays [1/s]; a loop that is consistent at first only gathers rounding."""
 
@@ -101,6 +107,7 @@ class RigidBatch(Batch):
         tableau, more = additive() if self.implicit else (EXPLICIT, np.zeros((0, 0)))
         tree.tableau, tree.implicit = constant(tableau.ravel(), wp.float64), constant(more, wp.float64)
         tree.stages = stages = len(tableau) - 1
+        tree.elastic = int(self.tolerance == 0.0 or self.tolerance >= ELASTIC)
         tree.restarts = constant(np.zeros(0), wp.int32)
         tree.starts = tree.kept = constant(np.zeros((0, 1)), wp.float64)
         self._begun = state.angles[[c for c, _ in t.joints]]
