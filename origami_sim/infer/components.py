@@ -29,6 +29,8 @@ def with_single_components(signatures: Sequence[Signature]) -> list[Signature]:
             alone = replace(s.suspect, free=(replace(strength, spread=np.inf), *rest))
             mine = slice(n, n + 1)
             parts = [p[:, mine] for p in s.parts]
+            if not any(np.any(p) for p in parts):  # recordings do not show it
+                continue
             out.append(replace(s, suspect=alone, parts=parts, size=s.size[mine], norm=s.norm[mine], raw=s.raw[mine]))
     return out
 

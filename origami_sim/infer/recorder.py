@@ -21,6 +21,8 @@ def recorder_noise(forward: Predictor, f: Fit) -> np.ndarray:
     """
     noise, level = forward.blocks[0].noise, fast_noise(forward, f).copy()
     odd = np.flatnonzero(level > MISREAD * noise).tolist()
+    if not odd:
+        return level
     each = (joined(forward, f), [forward.blocks[b].values for b in f.blocks])  # a prediction may be rough, too
     read = np.min([[n.deviation for n in beyond_motion(forward, w, odd)] for w in each], axis=0)
     level[odd] = np.where(level[odd] > MISREAD * read, np.maximum(read, noise[odd]), level[odd])

@@ -19,7 +19,7 @@ from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
 from origami_sim.infer.profile import along_numbers, missed
-from origami_sim.infer.screen import Signature, rated, simulated_at
+from origami_sim.infer.screen import LATE, Signature, rated, simulated_at
 
 DOUBTED = 0.01
 """Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed.
@@ -159,6 +159,8 @@ def at_their_strengths(
     Each is a secant, and what it promises is true where it was simulated: a magnet that leans by 15 degrees promised
     30 less of log evidence than its fit had, when it was simulated at 6.
     """
+    if any(s.status == LATE for s in signatures):
+        return list(signatures)
     out, about = list(signatures), Cleared(base, weights)
     rest = about.rest(about.whole([r[:, None] for r in about.line.residual], away=True))[:, 0]
     for _ in range(SECANTS):

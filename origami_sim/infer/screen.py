@@ -161,7 +161,7 @@ def screen(
 def simulated_at(
     forward: Predictor, some: Sequence[Signature], strengths: Sequence[np.ndarray], base: Fit, weights: Weights
 ) -> list[Signature]:
-    """Signatures simulated again, each at strengths (k,) over its size; those at zero are as they were."""
+    """Signatures simulated again, each at strengths (k,) over its size; those at zero at the size they had."""
     least = forward.step(base.hypothesis, base.theta) / SLOWEST
     each = [
         (axis, _affordable(forward, base, axis, z * x, least))
@@ -204,8 +204,11 @@ def rated(found: Sequence[Signature], base: Fit) -> list[Signature]:
     norm = np.linalg.norm(whole[:, width:] - q @ (q.T @ whole[:, width:]), axis=0)
     out, place = [], dict(zip(map(id, good), np.cumsum([0, *(len(s.size) for s in good)]).tolist(), strict=False))
     for s in found:
+        if s.status:
+            out.append(s)
+            continue
         if id(s) not in place:
-            out.append(replace(s, parts=[], status=s.status or "its simulation goes unstable"))
+            out.append(replace(s, parts=[], status="its simulation goes unstable"))
             continue
         mine = slice(place[id(s)], place[id(s)] + len(s.size))
         loud = np.linalg.norm(np.concatenate(s.parts), axis=0)

@@ -333,12 +333,9 @@ def _with_seen_components(out: Posterior, forward: Predictor, key: Key) -> None:
     f = out.nodes[key].fit
     if (fewer := without_unseen_components(f, CREDIBLE)) is None:
         return
-    hypothesis, theta = fewer
-    of = {s.suspect.form: s.suspect for s in out.signatures}
-    hypothesis = Hypothesis(tuple(of.get(s.form, s) for s in hypothesis.suspects))
-    if {id(s) for s in hypothesis.suspects} <= {id(s.suspect) for s in out.signatures}:
-        if frozenset(members_of(hypothesis, out)) in out.nodes:
-            return
+    hypothesis, theta = _with_known_forms(out, fewer[0]), fewer[1]
+    if hypothesis is None:
+        return
     _in_another_form(out, forward, fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local), f)
 
 
@@ -347,9 +344,20 @@ def _with_further_numbers(out: Posterior, forward: Predictor, key: Key) -> None:
     f = out.nodes[key].fit
     if (more := with_further_numbers(f)) is None:
         return
-    hypothesis, theta = more
+    hypothesis, theta = _with_known_forms(out, more[0]), more[1]
+    if hypothesis is None:
+        return
     found = fit(forward, hypothesis, level(forward, f), theta=theta, local=f.local)
     _in_another_form(out, forward, elsewhere(forward, found, rough=False), f)
+
+
+def _with_known_forms(out: Posterior, hypothesis: Hypothesis) -> Hypothesis | None:
+    """The hypothesis with the suspects that are known by the same form; None if that set was fitted."""
+    of = {s.suspect.form: s.suspect for s in out.signatures}
+    known = Hypothesis(tuple(of.get(s.form, s) for s in hypothesis.suspects))
+    if all(s.form in of for s in known.suspects) and frozenset(members_of(known, out)) in out.nodes:
+        return None
+    return known
 
 
 def _in_another_form(out: Posterior, forward: Predictor, found: Fit, f: Fit) -> None:

@@ -154,6 +154,7 @@ class RigidRollouts(Rollouts):
             gaps = zip(self.blocks, fine, predicted(more * least), strict=True)
             if sum(np.sum(np.where(b.seen(), (v - u) / b.noise, 0.0) ** 2) for b, u, v in gaps) <= FADED**2:
                 return more * least
+        self._films, self._moved = {}, {}
         return least
 
     def _segments(self, index: int, recording: Recording, segment: float | None, tied: bool) -> list[Block]:
