@@ -56,7 +56,6 @@ def test_a_search_that_ends_at_its_limit_has_a_verdict_and_goes_on_with_more_tim
     assert early["ended"] and early["verdict"] == "TIE" and "crease_friction" not in str(early["patch"])
     assert "search, so far no effect" in said.err
     assert "Not decided yet. " in said.out and "dry friction" in said.out and "its limit of 100000 s" in said.out
-    assert (out / ".resume").exists()
     assert main(*arguments) == EXIT["MECHANISM"]
     assert not json.loads((out / "diagnosis.json").read_text())["ended"]
     assert "so far crease_friction at hinge1" in capfd.readouterr().err
