@@ -19,9 +19,9 @@ class Options:
         start: "fit", "rest" or None (rest if the recording starts at rest in the reference state).
         rate: frames per second that are compared; what was recorded faster is averaged to it.
         fits: sets of effects that are fitted at most since one took the lead; as many more if those are more probable.
-        limit: seconds from the beginning after which no further set is fitted: the verdict is then what is known, and
-            says how probable what was not fitted is. A fit that has begun is ended first. Hard stops take 164 s on a
-            core; of 97 sealed cases two reached it, and took 376 and 392 s.
+        limit: seconds from the beginning after which no further suspect is simulated and no further set is fitted: the
+            verdict is then what is known, and says how probable what was not fitted is. A fit that has begun is ended
+            first. Hard stops take 117 s on a core.
         threads: see `Batch`.
         possible: what the set-up can do in a further recording; None: what the scene says, else the defaults. What a
             sidecar states goes before either.
