@@ -6,7 +6,6 @@ from the recording changed in this way. A clock, which decides how a device gets
 numbers of the model are refitted.
 """
 
-import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,13 +22,13 @@ from origami_sim.hypotheses.mistakes import Change, Slip, slips
 from origami_sim.infer.budget import pooled
 from origami_sim.recording import Recording
 from origami_sim.recording.axes import EXPLAINED, FAR, alike
-from origami_sim.threads import told
 
-LEAST, PART = 30.0, 0.1
-"""Seconds, and part of the limit of time, in which units but those of time are asked for, whichever is longer.
+STEPS = 1e5
+"""Steps of the solver, at most, of recordings for which units but those of time are asked.
 
-Rigid panels take 1 to 15 s on one core; of bars that take longer some units are not asked for. Half of both leaves
-fewer of these, double takes a fifth of the time of a search.
+Up to 15 predictions: of bars 1 to 4 s each with as many steps. Rigid panels take a step a frame or so, and are asked in
+any case that is met; stiff bars of some ten seconds are not. Half leaves out bars of half the length, double takes
+twice as long before the first fit.
 """
 
 
@@ -62,32 +61,28 @@ def mistaken(
         return None  # nothing can be so many times closer, or as it is most is explained
     same, found = replace(o, panels=forward.panels or o.panels), list[tuple[float, Slip]]()
 
-    def predicted(change: Change) -> Predictor | None:
+    def error(change: Change) -> tuple[float, float, Predictor | None]:
+        """What the model as given misses of changed recordings, what of them moves, and what predicts them."""
         try:
-            return arranged(subject, [change(r) for r in recordings], same)[0]
+            one = arranged(subject, [change(r) for r in recordings], same)[0]
         except InputError:
-            return None
-
-    def error(change: Change) -> tuple[float, float]:
-        one = predicted(change)
-        return (np.inf, 0.0) if one is None else missed(one)
+            return np.inf, 0.0, None
+        return *missed(one), one
 
     # of bars, which take steps of microseconds, a long motion is not predicted
     frames = len(forward.blocks[0].times) if forward.panels == "rigid" else None
-    until = clock.perf_counter() + max(LEAST, PART * o.limit)
+    short = _steps(forward) <= STEPS
     for slip in slips(recordings[0], frames):
-        if base is not None and not slip.late:
+        if not slip.late and (base is not None or (slip.rivals and not short)):
             continue
-        if slip.rivals and not slip.late and not told(lambda: clock.perf_counter() < until):
-            continue
-        left, moved = error(slip.change)
+        left, moved, changed = error(slip.change)
         if left >= (as_given if base is not None else given / FAR) or (base is None and left >= EXPLAINED * moved):
             continue
         if any(error(rival)[0] < FAR * max(left, 1.0) for rival in slip.rivals):
             continue
-        if base is not None and (one := predicted(slip.change)) is not None:
+        if base is not None and changed is not None:
             try:
-                left = left_by(one, nominal_fits(one)[1])
+                left = left_by(changed, nominal_fits(changed)[1])
             except InputError:
                 continue
         if FAR * max(left, 1.0) < given and left < EXPLAINED * moved:
@@ -99,6 +94,14 @@ def mistaken(
     who = "the model" if base is None else "the refitted model"
     text = f"{slip.what}: as recorded {who} misses {given:.3g} times the noise, so changed {left:.3g} times."
     return Mistake(f"{text} {slip.remedy}, and diagnose again.", given, left)
+
+
+def _steps(forward: Predictor) -> float:
+    """Steps of the solver that one prediction of all recordings takes; a load step is one."""
+    if forward.curve:
+        return float(sum(len(b.times) for b in forward.blocks))
+    least = forward.step(Hypothesis(), np.array([f.start for f in forward.subject.nominals]))
+    return sum(b.times[-1] for b in forward.blocks) / least if least else np.inf
 
 
 def left_by(forward: Predictor, f: Fit) -> float:

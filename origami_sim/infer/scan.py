@@ -18,8 +18,9 @@ from origami_sim.fit.least_squares import UTMOST, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
+from origami_sim.infer.placement import LEADING
 from origami_sim.infer.profile import along_numbers, missed
-from origami_sim.infer.screen import LATE, Signature, rated, simulated_at
+from origami_sim.infer.screen import LATE, LEAST, MOST, ROUNDS, Signature, rated, simulated_at
 
 DOUBTED = 0.01
 """Probability, under the priors of its numbers, of a departure as far as a fit's, below which they are not believed.
@@ -34,13 +35,6 @@ may be too strong already) up to what blocks.
 
 With steps ten times apart the friction of that crawler is not found.
 """
-
-SECANTS, APART = 3, 1.5
-"""Times that signatures are simulated again, at most, and the factor between the strength at which one was and that at
-which it explains most that asks for it."""
-
-LEADING, NEXT_TO_NONE = 12, 0.01
-"""Signatures that are: as many as are paired with others; and the part of such a strength that is not simulated."""
 
 COARSE = GRID[2:9]
 """Strengths that are tried where there are many worlds: a tenth to a hundred of the unit."""
@@ -157,23 +151,23 @@ def at_their_strengths(
     """Signatures, those that explain most simulated at the strengths with which they do.
 
     Each is a secant, and what it promises is true where it was simulated: a magnet that leans by 15 degrees promised
-    30 less of log evidence than its fit had, when it was simulated at 6.
+    30 less of log evidence than its fit had, when it was simulated at 6. They are as many as are paired with others.
     """
     if any(s.status == LATE for s in signatures):
         return list(signatures)
     out, about = list(signatures), Cleared(base, weights)
     rest = about.rest(about.whole([r[:, None] for r in about.line.residual], away=True))[:, 0]
-    for _ in range(SECANTS):
+    for _ in range(ROUNDS):
         explained: dict[int, tuple[float, np.ndarray]] = {}
         for n, s in enumerate(out):
             if s.parts and not s.status:
                 mine = about.rest(about.whole(s.parts, away=False))
                 found = lsq_linear(mine, rest, s.bounds)
                 # the wrong way, a strength is next to none at its bound
-                explained[n] = -found.cost, np.where(np.abs(found.x) < NEXT_TO_NONE, 0.0, found.x)
+                explained[n] = -found.cost, np.where(np.abs(found.x) < LEAST, 0.0, found.x)
         leading = sorted(explained, key=lambda n: -explained[n][0])[:LEADING]
         apart = {n: np.abs(explained[n][1]) for n in leading}
-        far = [n for n, x in apart.items() if np.any((x > 0.0) & ((x < 1.0 / APART) | (x > APART)))]
+        far = [n for n, x in apart.items() if np.any((x > 0.0) & ((x < 1.0 / MOST) | (x > MOST)))]
         if not far:
             break
         strengths = [explained[n][1] for n in far]
