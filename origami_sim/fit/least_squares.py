@@ -21,13 +21,6 @@ STEPS = (1.0, 0.4, 0.1, 0.01)
 CHORD = (1.0, 0.4)
 """The same while derivatives of an earlier point are in use; if none of them helps, the derivatives are taken anew."""
 
-DAMPINGS = (1.0, 3.0, 10.0)
-"""Levenberg's dampings, over the largest singular value or so, that are tried where no fraction of a step helps.
-
-A step along what data hardly tell, as the turn of a magnet in its plane, may be so long that it spoils what the rest of
-it mends: a lean of 15 degrees stayed at 11, and was not named.
-"""
-
 FAITHFUL = 0.7
 """Part of the promised improvement with which a step must come true for its derivatives to be used again.
 
@@ -266,11 +259,6 @@ def fit(
                 found, gain = there, best - there[0]
             if best - there[0] > owed:
                 break
-        for damping in DAMPINGS if gain < enough and level == ALL else ():
-            change, moves, _ = _proposed(forward, numbers, theta, local, blocks, line, damping)
-            trial = numbers.values(numbers.of(theta) + change)
-            if gain < enough and not too_slow(trial, slowest) and best - (there := at(trial, local + moves))[0] > gain:
-                found, gain = there, best - there[0]
         faithful, stuck = straight > FAITHFUL * whole, gain < enough
         lagging, before = level == STALE and whole > (1.0 - FAITHFUL) * before, whole
         if stuck and level == ALL:
@@ -356,13 +344,9 @@ def settled(forward, f: Fit, most: int = 8) -> tuple[Fit, float]:
 
 
 def _proposed(
-    forward, numbers: Coordinates, theta, local, blocks, line: Linearisation, damping: float = 1e-6
+    forward, numbers: Coordinates, theta, local, blocks, line: Linearisation
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """A Gauss-Newton step within the bounds: of coordinates (P,), of the starts [B, L], and the cost it promises.
-
-    Args:
-        damping: of Levenberg's; of a thousandth or less the coordinates' own sizes count, as Marquardt has it.
-    """
+    """A Gauss-Newton step within the bounds: of coordinates (P,), of the starts [B, L], and the cost it promises."""
     at, prior, width = numbers.of(theta), numbers.precision, line.tangent[0].shape[1]
     change = np.zeros(len(theta))
     chain = line.eliminated
@@ -370,9 +354,7 @@ def _proposed(
     if width:
         a = np.concatenate([whole[:, :-1], np.diag(prior)])
         y = np.concatenate([whole[:, -1], -prior * at])
-        norms = np.linalg.norm(a, axis=0)
-        size = norms if damping < 1e-3 else np.full(len(norms), norms.max())
-        a = np.concatenate([a, np.diag(damping * np.maximum(size, 1e-12))])
+        a = np.concatenate([a, np.diag(1e-6 * np.maximum(np.linalg.norm(a, axis=0), 1e-12))])
         y = np.concatenate([y, np.zeros(len(theta))])
         q, r = np.linalg.qr(a)  # a small system with the same least squares
         low, high = numbers.low - at, numbers.high - at
