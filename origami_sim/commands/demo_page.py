@@ -86,19 +86,17 @@ class Section:
 
     @classmethod
     def of_comparison(
-        cls, name: str, module: ModuleType, comparison: Comparison, motion: Trajectory, note: str, folder: Path,
+        cls, name: str, module: ModuleType, comparison: Comparison | None, motion: Trajectory, note: str, folder: Path,
         commands: list[str],
     ) -> "Section":  # fmt: skip
-        """The section of a recording that was laid beside a simulation."""
-        overlay = plot_overlay(comparison, folder / "overlay.png").read_bytes()
-        out = cls(
-            name,
-            _first_line(module),
-            comparison.table(),
-            [note + ".", comparison.sentence()],
-            [f"origami-sim replay {folder}", *commands],
-            plots=[("recording and simulation", overlay)],
-        )
+        """The section of a recording laid beside a simulation; of the motion alone where that went unstable."""
+        failures = [str(f) for f in motion.failures]
+        commands = [f"origami-sim replay {folder}", *commands]
+        out = cls(name, _first_line(module), "", [note + "."], commands, failures=failures)
+        if comparison is not None:
+            overlay = plot_overlay(comparison, folder / "overlay.png").read_bytes()
+            out.text, out.plots = comparison.table(), [("recording and simulation", overlay)]
+            out.sentences.append(comparison.sentence())
         out._show(motion)
         return out
 

@@ -403,7 +403,7 @@ def ending_as_interrupted() -> Iterator[None]:
 
 def _summary(d: Diagnosis, files: Mapping[str, list[Path] | Path]) -> dict:
     whole = d.to_dict()
-    keys = ("verdict", "sentence", "probability", "chosen", "budget", "compared", "components", "noise")
+    keys = ("verdict", "sentence", "probability", "outside", "chosen", "budget", "compared", "components", "noise")
     errors = ("error_before", "error_refitted", "error_after", "patch", "notes", "seconds")
     return {
         **{k: whole[k] for k in (*keys, *errors)},
@@ -425,6 +425,8 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
         lines.append(f"{c.label:48s} {c.probability:11.3f} {c.odds - best:9.1f}{mark}")
     if d.candidates and round(d.unfitted, 3) > 0.0:
         lines.append(f"{'others, estimated and not fitted':48s} {d.unfitted:11.3f}")
+    if round(d.outside, 3) > 0.0:
+        lines.append(f"{'a law that the catalogue lacks':48s} {d.outside:11.3f}")
     shown = patched(d)
     for n in shown.numbers if shown is not None else []:
         bound = ", at its bound" if n.at_bound else ""

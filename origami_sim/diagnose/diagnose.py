@@ -196,6 +196,7 @@ def _diagnosed(
         verdict=judged.verdict,
         sentence=judged.sentence,
         probability=judged.probability,
+        outside=judged.outside,
         chosen=judged.chosen,
         candidates=table(forward, posterior, base, judged, errors),
         screening=[suspected(s, z, missed) for s, z in scores],

@@ -34,7 +34,7 @@ def table(
                 [s.effect for s in f.hypothesis.suspects],
                 [s.site for s in f.hypothesis.suspects],
                 numbers(f),
-                judged.chance.get(key, 0.0),
+                judged.of(key),
                 log_odds(p, key),
                 errors[key].tolist(),
                 fit_percent(forward, node.fit).tolist(),

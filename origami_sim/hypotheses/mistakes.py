@@ -81,12 +81,11 @@ def _turns(recording: Recording) -> Iterator[Slip]:
 def _units(recording: Recording) -> Iterator[Slip]:
     """Readings of one dimension, or a drive, in another unit than the stated one."""
     stated = recording.metadata.get("units", {})
-    readings: dict[str, list[str]] = {}
+    readings: dict[tuple[str, str], list[str]] = {}
     for c in recording.channels.values():
-        if stated.get(c.name) != "px":  # whose scale is a number of the camera
-            readings.setdefault(CHANNEL_KINDS[c.kind][0], []).append(c.name)
-    for dimension, names in readings.items():
-        own = stated.get(names[0], recording.channels[names[0]].unit)
+        if (own := stated.get(c.name, c.unit)) != "px":  # whose scale is a number of the camera
+            readings.setdefault((CHANNEL_KINDS[c.kind][0], own), []).append(c.name)
+    for (dimension, own), names in readings.items():
         for factor in _factors(dimension):
             what = f"{_named(names)}: the {'reading is' if len(names) == 1 else 'readings are'} {_off(factor)}"
             remedy = f"State {_unit(own, factor)} of the channel{'s' if len(names) > 1 else ''} in the sidecar"

@@ -106,8 +106,10 @@ def _within(number: Free, parameters: Parameters | None) -> Free:
     if parameters is None or (owner, name) not in parameters:
         return number
     there = parameters[owner, name]
-    least = float(np.min(there if number.entities is None else there[list(number.entities)]))
-    return replace(number, lower=max(number.lower, -least)) if least > 0.0 else number
+    mine = there if number.entities is None else there[list(number.entities)]
+    if not np.any(mine > 0.0):  # another law may have what this one has not
+        return number
+    return replace(number, lower=max(number.lower, -float(np.min(mine))))
 
 
 def _across(effect: Effect, parameters: Parameters | None) -> tuple[str, ...]:

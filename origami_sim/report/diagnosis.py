@@ -174,7 +174,8 @@ class Diagnosis:
 
     Attributes:
         verdict: one of VERDICTS. sentence: what opens the report. probability: of the chosen explanation (or set); nan
-            for UNKNOWN, where the one that comes closest is chosen but not believed.
+            for UNKNOWN, where the one that comes closest is chosen but not believed. outside: that candidates imitate a
+            law which the catalogue lacks.
         chosen: labels of the chosen explanation; of all in the tie for TIE, of all effects for SEVERAL.
         candidates: ordered, best first. screening: all suspects, best first.
         isolability: labels and matrix |cos| of the best suspects. places: where equation error finds the mismatch.
@@ -215,6 +216,7 @@ class Diagnosis:
     subject: str = ""
     recordings: list[str] = field(default_factory=list)
     changed: list[str] = field(default_factory=list)
+    outside: float = 0.0
     places: list[Place] = field(default_factory=list)
     acting: list[Acting] = field(default_factory=list)
     partials: list[Partial] = field(default_factory=list)
@@ -247,7 +249,7 @@ class Diagnosis:
     @property
     def unfitted(self) -> float:
         """Probability of sets of effects that were estimated and not fitted, such as the best one and more."""
-        return max(0.0, 1.0 - sum(c.probability for c in self.candidates))
+        return max(0.0, 1.0 - self.outside - sum(c.probability for c in self.candidates))
 
     def __repr__(self) -> str:
         from origami_sim.view.findings import diagnosis_line  # only who looks pays for it

