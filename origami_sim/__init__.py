@@ -64,6 +64,7 @@ _HOMES = {
     "explore": "Found Way gradient optimise solve_for sweep",
     "quantities": "si",
     "diagnose": "Diagnosis Subject diagnose",
+    "estimation.estimate": "Estimate estimate",
     "drive": "Drive Signal ramp series sine",
     "effects": "CATALOGUE",
     "errors": "InputError",
@@ -106,7 +107,7 @@ __all__ = [  # noqa: RUF022  (by what they are for)
     "device_module", "Design", "read_design", "write_design",
     "sweep", "solve_for", "optimise", "gradient", "Found", "Way",
     # what a model lacks
-    "diagnose", "Diagnosis", "Subject",
+    "diagnose", "Diagnosis", "Subject", "estimate", "Estimate",
     "InputError",
 ]  # fmt: skip
 

@@ -18,7 +18,7 @@ ORDER = (
     *("solve.kernels", "solve.program", "solve", "solve.rigid", "solve.statics", "solve.motion"),
     *("design", "recording", "device", "observation", "view", "results"),
     *("explore", "folding", "calibrate"),
-    *("hypotheses", "fit", "predict", "infer", "verdict", "locate", "report", "diagnose"),
+    *("hypotheses", "fit", "predict", "infer", "verdict", "locate", "report", "diagnose", "estimation"),
     "commands",
 )
 """Folders, each after those that it imports. A folder within one that is not listed goes with it."""

@@ -134,27 +134,10 @@ def _parser() -> argparse.ArgumentParser:
         "origami-sim diagnose double.csv --model pendulum_chain --prior mass_1=1% --prior viscosity_1=20%",
     )
     p.epilog = f"{p.epilog}\n\n{_DIAGNOSE_HELP}"
-    p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
-    what = "a scene, its calibration (TOML), or my_flap.py (default: what the sidecar names)"
-    p.add_argument("--model", metavar="SCENE", help=what)
-    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a device")
-    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
-    p.add_argument(
-        "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
-    )
-    p.add_argument(
-        "--prior",
-        action="append",
-        default=[],
-        metavar="NAME=SD",
-        help="how well a setting is known (0.5mm, 5%%, or SI), or the alignment (clock_delay.clock_delay=5ms)",
-    )
+    _recorded(p)
     p.add_argument("--suspects", metavar="A,B", help="suspect only these effects (default: all that can act)")
     p.add_argument(
         "--thorough", action="store_true", help="more frames, suspects and combinations; several times as long"
-    )
-    p.add_argument(
-        "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
     )
     p.add_argument(
         "--limit",
@@ -162,24 +145,20 @@ def _parser() -> argparse.ArgumentParser:
         metavar="S",
         help="seconds after which the verdict is on what has been fitted (default 300, thorough 3000)",
     )
-    p.add_argument(
-        "--start-at",
-        choices=("rest", "fit"),
-        help="simulate from rest, or fit every start (default: as recorded)",
-    )
-    p.add_argument(
-        "--panels",
-        choices=("auto", "rigid", "elastic"),
-        default="auto",
-        help="rigid bodies, or bars that bend (default: rigid where bending could not show)",
-    )
-    p.add_argument(
-        "--motion",
-        choices=("auto", "dynamic", "quasistatic"),
-        default="auto",
-        help="with inertia, or equilibria along time (default: as stated, or the latter where inertia could not show)",
-    )
     p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/diagnose)")
+
+    p = command(
+        "estimate",
+        _estimate,
+        "Fit numbers of a device, and effects that are known to act, to recordings of it",
+        'origami-sim estimate swing.csv --model my_flap.py --prior stiffness=30% --effect "crease_friction at hinge1"',
+    )
+    _recorded(p)
+    p.add_argument(
+        "--effect", action="append", default=[], metavar="NAME", help="an effect that acts besides, such as air_drag"
+    )
+    p.add_argument("--out", metavar="FOLDER", help="where everything is written (default runs/estimate)")
+    p.set_defaults(thorough=False, limit=None)
 
     p = command(
         "study",
@@ -223,6 +202,45 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--out", default="runs/demo", metavar="FOLDER", help="where the run folders go (default runs/demo)")
     return parser
+
+
+def _recorded(p: argparse.ArgumentParser) -> None:
+    """Options of what is told of a device by recordings."""
+    p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
+    what = "a scene, its calibration (TOML), or my_flap.py (default: what the sidecar names)"
+    p.add_argument("--model", metavar="SCENE", help=what)
+    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a device")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    p.add_argument(
+        "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
+    )
+    p.add_argument(
+        "--prior",
+        action="append",
+        default=[],
+        metavar="NAME=SD",
+        help="how well a setting is known (0.5mm, 5%%, or SI), or the alignment (clock_delay.clock_delay=5ms)",
+    )
+    p.add_argument(
+        "--segment", type=float, metavar="S", help="seconds simulated from one start (default: what can be predicted)"
+    )
+    p.add_argument(
+        "--start-at",
+        choices=("rest", "fit"),
+        help="simulate from rest, or fit every start (default: as recorded)",
+    )
+    p.add_argument(
+        "--panels",
+        choices=("auto", "rigid", "elastic"),
+        default="auto",
+        help="rigid bodies, or bars that bend (default: rigid where bending could not show)",
+    )
+    p.add_argument(
+        "--motion",
+        choices=("auto", "dynamic", "quasistatic"),
+        default="auto",
+        help="with inertia, or equilibria along time (default: as stated, or the latter where inertia could not show)",
+    )
 
 
 def _studies(parser: argparse.ArgumentParser) -> None:
@@ -367,6 +385,12 @@ def _diagnose(args) -> int:
 
     gc.freeze()
     gc.enable()
+    return command.run(args)
+
+
+def _estimate(args) -> int:
+    from origami_sim.estimation import command
+
     return command.run(args)
 
 

@@ -9,7 +9,7 @@ import time as clock
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
@@ -37,7 +37,7 @@ from origami_sim.hypotheses.subject import known_before, with_units
 from origami_sim.infer.unlisted import UNLISTED
 from origami_sim.observation.doubts import doubts, naming
 from origami_sim.quantities import ANY
-from origami_sim.recording import DataSet, lint_report, read_dataset
+from origami_sim.recording import DataSet, Recording, lint_report, read_dataset
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.report.page import geometry_of, write_report
 from origami_sim.report.page.next_experiment import finding
@@ -45,65 +45,35 @@ from origami_sim.report.patch import patched, write_patch
 
 REPORT, JSON, PATCH, RESUME = "report.html", "diagnosis.json", "patched.toml", ".resume"
 
+EXACT = "note: no setting has a prior, so all are taken as exact; state how well they are known with --prior."
+
 THOROUGH = Options(rate=400.0, fits=48, limit=3000.0)
 
 
 def run(args: Namespace) -> int:
     """The command; returns the verdict's exit code."""
-    said: list[str] = []
-    say = said.append  # printed once nothing can be refused any more
     folder = Path(args.out or "runs/diagnose")
     if args.model:
-        _check_model(folder, args.model)
-    _check_folder(folder)
-    data = read_recordings(args.recordings, args.sidecar)
-    stated = args.model or recorded_model(data[0], "--model")
-    given, calibration = modelled(stated, args.calibration, "--model")
-    for file in filter(None, (stated, given, calibration)):
-        _check_model(folder, file)
+        check_model(folder / PATCH, args.model)
+    check_folder(folder, of_ours=_earlier(folder) is not None, what="a diagnosis")
+    asked = read_arguments(args)
+    for file in filter(None, (args.model, asked.given, asked.calibration)):
+        check_model(folder / PATCH, file)
     replaced = _earlier(folder)
-    if replaced and set(replaced) != {r.name for r in data}:
-        say(f"note: replaces the report of {', '.join(replaced)} in {folder}.")
-    for recording in data:
-        say(lint_report(recording))
-    for note in data.notes:
-        say(f"note: {note}")
-    module, settings = model_of(given, data)
-    settings = settings if calibration is None else scene_settings(module, calibration)
-    name = module.__name__.rpartition(".")[2]
-    overrides = _overrides(data, name)
-    if overrides and (calibration or given.endswith(".toml")):
-        which = "--calibration" if args.calibration else "--model"
-        say(f"note: the sidecar's overrides are left out: {which} states the numbers of this object itself.")
-    else:
-        settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
-    settings = _assigned(settings, args.set, "--set")
-    model, parameters, drive, *_ = module.build(settings)
-    recordings = []
-    for recording in data:
-        notes = doubts(recording, model, parameters, drive)
-        with naming(recording.metadata.get("file")):
-            check_recording(recording, model)
-        for note in notes:
-            say(f"note: {note}")
-        recordings.append(
-            replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
-        )
-    known, single, aligned = known_before(settings, data[0], args.prior, model, parameters)
-    subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
-    if not subject.nominals:
-        say("note: no setting has a prior, so all are taken as exact; state how well they are known with --prior.")
-    options = replace(_options(args, settings), possible=getattr(module, "POSSIBLE", None))
+    if replaced and set(replaced) != {r.name for r in asked.recordings}:
+        asked.said.insert(0, f"note: replaces the report of {', '.join(replaced)} in {folder}.")
+    options = replace(options_of(args, asked.settings), possible=getattr(asked.module, "POSSIBLE", None))
     catalogue = None if args.suspects is None else [get(s.strip()).name for s in args.suspects.split(",")]
     if not args.json:
-        print("\n".join(said), flush=True)
+        print("\n".join(asked.said), flush=True)
     keep, progress = Keep(folder / RESUME), Progress()
-    known_units = with_units(module, settings, parameters)
-    files = keep.write = Files(folder, known_units, given if is_device(given) else name, keep)
+    files = keep.write = Files(folder, asked.known_units, asked.device, keep)
     keep.film = files.film
     try:
         with ending_as_interrupted():
-            found = diagnose(subject, recordings, options, catalogue=catalogue, progress=progress, keep=keep)
+            found = diagnose(
+                asked.subject, asked.recordings, options, catalogue=catalogue, progress=progress, keep=keep
+            )
             progress.stage("page")
             files.finish(found)
     except KeyboardInterrupt:
@@ -123,6 +93,70 @@ def run(args: Namespace) -> int:
 
 
 # input ----------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What a command line states: recordings, the model of their object, and what is known of its numbers.
+
+    Attributes:
+        said: lines to print once nothing can be refused any more. given: the scene, device or calibration.
+        calibration: a file of it, or None. known_units: the settings, with the units that the model tells.
+    """
+
+    subject: Subject
+    recordings: list[Recording]
+    module: ModuleType
+    settings: Settings
+    known_units: Settings
+    given: str
+    calibration: str | None
+    said: list[str]
+
+    @property
+    def device(self) -> str:
+        """What `run` calls the scene or device."""
+        return self.given if is_device(self.given) else self.module.__name__.rpartition(".")[2]
+
+
+def read_arguments(args: Namespace) -> Arguments:
+    """Reads recordings, model, settings and priors from a command line.
+
+    Raises:
+        InputError: what cannot be read, or contradicts.
+    """
+    data = read_recordings(args.recordings, args.sidecar)
+    given, calibration = modelled(args.model or recorded_model(data[0], "--model"), args.calibration, "--model")
+    said = [lint_report(recording) for recording in data]
+    said += [f"note: {note}" for note in data.notes]
+    module, settings = model_of(given, data)
+    settings = settings if calibration is None else scene_settings(module, calibration)
+    name = module.__name__.rpartition(".")[2]
+    overrides = _overrides(data, name)
+    if overrides and (calibration or given.endswith(".toml")):
+        which = "--calibration" if args.calibration else "--model"
+        said.append(f"note: the sidecar's overrides are left out: {which} states the numbers of this object itself.")
+    else:
+        settings = _assigned(settings, overrides, data[0].metadata.get("sidecar"))
+    settings = _assigned(settings, args.set, "--set")
+    model, parameters, drive, *_ = module.build(settings)
+    recordings = []
+    for recording in data:
+        notes = doubts(recording, model, parameters, drive)
+        with naming(recording.metadata.get("file")):
+            check_recording(recording, model)
+        said += [f"note: {note}" for note in notes]
+        recordings.append(
+            replace(recording, metadata={**recording.metadata, "notes": [*recording.metadata.get("notes", ()), *notes]})
+        )
+    known, single, aligned = known_before(settings, data[0], args.prior, model, parameters)
+    subject = Subject.from_scene(module, settings, spreads=known, name=name).tuned(single).beside(aligned)
+    if not subject.nominals:
+        said.append(
+            "note: no setting has a prior, so all are taken as exact; state how well they are known with --prior."
+        )
+    units = with_units(module, settings, parameters)
+    return Arguments(subject, recordings, module, settings, units, given, calibration, said)
 
 
 def read_recordings(paths: Sequence[str], sidecar: str | None = None) -> DataSet:
@@ -218,7 +252,8 @@ def _assigned(settings: Settings, assignments: Sequence[str], source: object) ->
     return out.with_panels(settings.panels).with_motion(settings.motion, settings.until)
 
 
-def _options(args: Namespace, settings: Settings) -> Options:
+def options_of(args: Namespace, settings: Settings) -> Options:
+    """How a diagnosis, or an estimate, looks, by a command line."""
     if args.segment is not None and not args.segment > 0:
         raise InputError("must be positive", field="--segment", value=args.segment, allowed="> 0 s")
     if args.start_at == "rest" and args.segment is not None:
@@ -229,16 +264,24 @@ def _options(args: Namespace, settings: Settings) -> Options:
     return replace(options, motion=motion, panels=args.panels, segment=args.segment, start=args.start_at, limit=limit)
 
 
-def _check_model(folder: Path, model: str) -> None:
-    """Refuses a folder whose patch is the model itself."""
-    if Path(model).resolve() == (folder / PATCH).resolve():
+def check_model(patch: Path, model: str) -> None:
+    """Refuses to write a patch over the model itself."""
+    if Path(model).resolve() == patch.resolve():
         raise InputError(
-            "the model would be overwritten", file=model, field="--out", value=str(folder), allowed="another folder"
+            "the model would be overwritten",
+            file=model,
+            field="--out",
+            value=str(patch.parent),
+            allowed="another folder",
         )
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuses, before anything is computed, a folder that cannot be written or that holds other things."""
+def check_folder(folder: Path, *, of_ours: bool, what: str) -> None:
+    """Refuses, before anything is computed, a folder that cannot be written or that holds other things.
+
+    Args:
+        of_ours: whether it is new or empty, or holds what such a command left. what: that is.
+    """
     allowed = "a folder that can be written"
     try:
         existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
@@ -249,13 +292,9 @@ def _check_folder(folder: Path) -> None:
         raise InputError(fault, file=folder, field="--out", allowed=allowed) from None
     if not existing.is_dir():
         raise InputError("is a file", file=existing, field="--out", allowed=allowed)
-    if _earlier(folder) is None:
-        raise InputError(
-            "is a folder with other things in it, not a diagnosis",
-            file=folder,
-            field="--out",
-            allowed="a new or empty folder, or an earlier diagnosis",
-        )
+    if not of_ours:
+        fault, allowed = f"is a folder with other things in it, not {what}", f"a new or empty folder, or that of {what}"
+        raise InputError(fault, file=folder, field="--out", allowed=allowed)
 
 
 def _earlier(folder: Path) -> list[str] | None:

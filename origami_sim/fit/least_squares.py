@@ -304,6 +304,15 @@ def renewed(forward, f: Fit) -> Fit:
     return replace(out, exact=True)
 
 
+def converged(forward, f: Fit) -> Fit:
+    """A fit carried on by derivatives that are taken where it is, until these promise nothing."""
+    f = f if f.exact else renewed(forward, f)
+    if f.cost - promised(forward, f) >= OWED:
+        f = carried_on(forward, f)
+        f = f if f.failed or f.exact else renewed(forward, f)
+    return f
+
+
 def smoothed(forward, f: Fit, weights: Weights) -> list[np.ndarray]:
     """Residuals (n, D) [SI] of a fit's segments with the starts and numbers that suit other weights, linearly."""
     assert f.linear is not None and f.weights is not None

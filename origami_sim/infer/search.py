@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from origami_sim.fit.derivatives import small
 from origami_sim.fit.evidence import log_occam
 from origami_sim.fit.implied import OwnColumns, log_evidence, with_own_noise
-from origami_sim.fit.least_squares import OWED, Fit, carried_on, fit, promised, renewed
+from origami_sim.fit.least_squares import OWED, Fit, converged, fit
 from origami_sim.fit.nominal import level
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
@@ -294,16 +294,7 @@ def _finished(out: Posterior, forward: Predictor, f: Fit, noise: Weights | None 
             return f  # it is no rival
     known = [w for w in (out.nodes[out.leader].fit.weights, noise) if w is not None]
     own, _ = with_own_noise(forward, f, out.hyper, known)
-    return own if (on := _to_the_end(forward, own)).failed else on
-
-
-def _to_the_end(forward: Predictor, f: Fit) -> Fit:
-    """A fit carried on by derivatives that are taken where it is, until these promise nothing."""
-    f = f if f.exact else renewed(forward, f)
-    if f.cost - promised(forward, f) >= OWED:
-        f = carried_on(forward, f)
-        f = f if f.failed or f.exact else renewed(forward, f)
-    return f
+    return own if (on := converged(forward, own)).failed else on
 
 
 def _without_idle_branches(out: Posterior, forward: Predictor, key: Key) -> None:
@@ -388,7 +379,7 @@ def polished(out: Posterior, forward: Predictor, most: int, going_on: GoingOn) -
             return some
         key = max(leaders, key=lambda k: reach[k])
         before, now = out.total[key], out.nodes[key].fit
-        f = _to_the_end(forward, now)
+        f = converged(forward, now)
         if f is not now:
             some = True
             if not f.failed:

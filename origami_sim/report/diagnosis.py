@@ -273,8 +273,13 @@ class Diagnosis:
 
     def save_json(self, path: str | Path) -> Path:
         """Writes everything as JSON, a field per line: with a line for every number it takes ten times as long."""
-        lines = [f" {json.dumps(name)}: {json.dumps(v, allow_nan=False)}" for name, v in self.to_dict().items()]
-        return write_text(path, "{\n" + ",\n".join(lines) + "\n}")
+        return write_text(path, as_json({f.name: getattr(self, f.name) for f in fields(self)}))
+
+
+def as_json(values: Mapping) -> str:
+    """JSON of names and values, a line each; what is not finite becomes null."""
+    lines = [f" {json.dumps(name)}: {json.dumps(_plain(v), allow_nan=False)}" for name, v in values.items()]
+    return "{\n" + ",\n".join(lines) + "\n}"
 
 
 def _plain(value):

@@ -22,6 +22,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from origami_sim.files import write_text
 from origami_sim.hypotheses.hypothesis import Free, Hypothesis, Suspect, apply, silent
 from origami_sim.model import BODY, Model, Parameters
 from origami_sim.model.entities import OWNERS, WAYS, located
-from origami_sim.report.diagnosis import Candidate, Diagnosis
+from origami_sim.report.diagnosis import Candidate
 from origami_sim.units import of_unit
 
 _WORDS = ("site", "source", "at")
@@ -216,18 +217,35 @@ def _numbers(a: Addition) -> tuple[Free, ...]:
     )
 
 
-def patched(diagnosis: Diagnosis) -> Candidate | None:
+class Finding(Protocol):
+    """What is written into a calibration: of a diagnosis, or of an estimate of stated numbers; see `Diagnosis`."""
+
+    @property
+    def verdict(self) -> str: ...
+    @property
+    def sentence(self) -> str: ...
+    @property
+    def recordings(self) -> list[str]: ...
+    @property
+    def candidates(self) -> list[Candidate]: ...
+    @property
+    def patch(self) -> dict[str, float]: ...
+    @property
+    def changed(self) -> list[str]: ...
+
+
+def patched(diagnosis: Finding) -> Candidate | None:
     """The explanation whose numbers are patched in; None where the diagnosis changes nothing."""
     values = list(diagnosis.patch.values())
     return next((c for c in diagnosis.candidates if values and [n.value for n in c.numbers] == values), None)
 
 
-def additions(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
+def additions(diagnosis: Finding, settings: Settings) -> tuple[Addition, ...]:
     """The effects that the diagnosis found missing, one for each site; see also `of_channels`."""
     return tuple(a for a in _found(diagnosis, settings) if not _of_channel(a))
 
 
-def of_channels(diagnosis: Diagnosis, settings: Settings) -> list[str]:
+def of_channels(diagnosis: Finding, settings: Settings) -> list[str]:
     """Errors of single channels that the diagnosis found: the recording's, so that no model can have them."""
     return [f"{a.effect} at {a.site}" for a in _found(diagnosis, settings) if _of_channel(a)]
 
@@ -236,7 +254,7 @@ def _of_channel(a: Addition) -> bool:
     return a.effect in CATALOGUE and get(a.effect).family == "measurement" and a.entities is not None
 
 
-def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
+def _found(diagnosis: Finding, settings: Settings) -> tuple[Addition, ...]:
     found: dict[tuple[str, str], dict[str, float]] = {}
     source = f"diagnosis of {', '.join(diagnosis.recordings)}: {diagnosis.verdict}"
     tuned = []
@@ -274,7 +292,7 @@ def _found(diagnosis: Diagnosis, settings: Settings) -> tuple[Addition, ...]:
     )
 
 
-def write_patch(path: str | Path, settings: Settings, diagnosis: Diagnosis, *, scene: str) -> Path:
+def write_patch(path: str | Path, settings: Settings, diagnosis: Finding, *, scene: str) -> Path:
     """Writes the calibration with refitted settings, their new uncertainty, and the missing effects switched on.
 
     Returns:

@@ -1,5 +1,6 @@
 """What findings look like: a plot by Matplotlib, and a card in a notebook, of diagnoses, comparisons and sweeps."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +11,11 @@ from origami_sim.view.plot import readable
 from origami_sim.view.summary import card, counted, picture_of
 
 if TYPE_CHECKING:
+    from origami_sim.estimation.estimate import Estimate
     from origami_sim.explore.sweep import Sweep
     from origami_sim.folding import Folding
     from origami_sim.observation.compare import Comparison
-    from origami_sim.report.diagnosis import Diagnosis
+    from origami_sim.report.diagnosis import Diagnosis, Trace
 
 DRAWN = 4
 """Components of a recording in the plot of a diagnosis; the report has all."""
@@ -45,7 +47,7 @@ def diagnosis_html(d: "Diagnosis") -> str:
 def plot_diagnosis(d: "Diagnosis") -> Figure:
     """Where the mismatch goes; the first recording beside the model as given and the best explanation, and what each
     leaves, with the band of the noise."""
-    first = [t for t in d.traces if t.recording == d.traces[0].recording][:DRAWN] if d.traces else []
+    first = _first(d.traces)
     figure = Figure(figsize=(9.0, 1.2 + 2.0 * len(first)), layout="constrained")
     grid = figure.add_gridspec(1 + len(first), 2, height_ratios=[0.35, *[1.0] * len(first)])
     top, left = figure.add_subplot(grid[0, :]), 0.0
@@ -58,15 +60,35 @@ def plot_diagnosis(d: "Diagnosis") -> Figure:
     top.set(xlim=(0, max(left, 1e-9)), yticks=[], xticks=[])
     top.set_title(f"{d.verdict}: where the mismatch goes", loc="left", fontsize=9)
     top.spines[:].set_visible(False)
-    for row, t in enumerate(first, 1):
+    _draw_traces(figure, [(grid[row, 0], grid[row, 1]) for row in range(1, len(first) + 1)], first, "best explanation")
+    return figure
+
+
+def plot_estimate(e: "Estimate") -> Figure:
+    """The first recording beside the model as given and as fitted, and what each leaves, with the band of the noise."""
+    first = _first(e.traces)
+    figure = Figure(figsize=(9.0, 0.6 + 2.0 * len(first)), layout="constrained")
+    grid = figure.add_gridspec(len(first), 2)
+    _draw_traces(figure, [(grid[row, 0], grid[row, 1]) for row in range(len(first))], first, "model as fitted")
+    return figure
+
+
+def _first(traces: "Sequence[Trace]") -> "list[Trace]":
+    """Components of the first recording that are drawn."""
+    return [t for t in traces if t.recording == traces[0].recording][:DRAWN] if traces else []
+
+
+def _draw_traces(figure: Figure, places: Sequence[tuple], traces: "Sequence[Trace]", after_is: str) -> None:
+    """Draws components, each in a row: recorded and predicted, and beside it what is left."""
+    for row, ((left, right), t) in enumerate(zip(places, traces, strict=True)):
         recorded, times = np.array(t.recorded, float), np.array(t.times, float)
         before, after = np.array(t.before, float), np.array(t.after, float)
-        motion, rest = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])
+        motion, rest = figure.add_subplot(left), figure.add_subplot(right)
         factor, unit = _shown(t.unit, recorded)
         for values, style in (
             (recorded, {"color": "#000000", "lw": 1.4, "label": "recorded"}),
             (before, {"color": "#9aa7b5", "lw": 1.2, "ls": "--", "label": "model as given"}),
-            (after, {"color": "#d55e00", "lw": 1.0, "label": "best explanation"}),
+            (after, {"color": "#d55e00", "lw": 1.0, "label": after_is}),
         ):
             motion.plot(times, factor * values, **style)
         motion.set_ylabel(f"{t.component} [{unit}]")
@@ -77,12 +99,11 @@ def plot_diagnosis(d: "Diagnosis") -> Figure:
         rest.set_ylabel(f"left [{unit}]")
         for axes in (motion, rest):
             readable(axes)
-            if row == len(first):
+            if row == len(traces) - 1:
                 axes.set_xlabel(t.clock[0] if t.by_step else "time [s]")
-        if row == 1:
+        if row == 0:
             motion.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
             rest.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    return figure
 
 
 def _shown(unit: str, values: np.ndarray) -> tuple[float, str]:

@@ -458,7 +458,7 @@ def test_a_diagnosis_replaces_nothing_but_a_diagnosis(call, monkeypatch, tmp_pat
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "diagnosis.json").write_text('{"patient": "me"}')
     arguments = ["diagnose", recording, "--model", "pendulum_chain", "--suspects", "magic", "--out", "mine"]
-    refused(call, tmp_path, arguments, r"mine: is a folder with other things.*--out.*earlier diagnosis")
+    refused(call, tmp_path, arguments, r"mine: is a folder with other things.*--out.*that of a diagnosis")
     (tmp_path / "mine" / "diagnosis.json").write_text('{"verdict": "TIE", "recordings": ["monday", "tuesday"]}')
     _, out, err = call(*arguments)
     assert "no such effect" in err and out == ""  # so nothing is replaced

@@ -42,9 +42,7 @@ def _marginals(d: Diagnosis) -> list:
     head = ("Effect", "Where", "Probability")
     rows = [row(head, _capital(title_of(effect_of(k) or k)), site_of(k), bar(v)) for k, v in likely.items()]
     less = len(d.marginals) - len(rows)
-    about = (
-        "Posterior probability that the effect acts there, alone or with others, if no law outside acts"
-    )
+    about = "Posterior probability that the effect acts there, alone or with others, if no law outside acts"
     about += f"; {less} more have less than {LIKELY:.1%} each." if less else "."
     out = [
         element("h3", "Probability of each effect"),

@@ -1,0 +1,1 @@
+"""System identification: numbers of a model, and effects that are stated, fitted to recordings by least squares."""
