@@ -18,7 +18,7 @@ from origami_sim.diagnose.command import (
 from origami_sim.diagnose.later import attempt
 from origami_sim.estimation.estimate import Estimate, estimate
 from origami_sim.quantities import ANY
-from origami_sim.report.diagnosis import as_json
+from origami_sim.report.diagnosis import Number, as_json
 from origami_sim.report.patch import write_patch
 
 DATA, PATCH, PLOT = "estimate.json", "fitted.toml", "fit.png"
@@ -63,13 +63,13 @@ def _summary(e: Estimate, made: Mapping[str, Path]) -> str:
 
 
 def _text(e: Estimate, made: Mapping[str, Path], scene: str) -> list[str]:
-    lines = ["", e.sentence, "", f"{'number':44s} {'value':>10s}   {'95 % interval':24s} before"]
+    lines = ["", e.sentence, "", f"{'number':44s} {'value':>12s}   {'95 % interval':26s} before"]
     for n in e.numbers:
-        unit = "" if n.unit in ("-", "1", ANY) else f" {n.unit}"
+        unit = "" if n.unit in ("-", "1", ANY) else f" [{n.unit}]"
         known = "" if not np.isfinite(n.away) else f"{n.prior:.4g}, {n.away:.1f} sd away"
         bound = "   at its bound" if n.at_bound else ""
-        lines.append(f"{n.label + unit.replace(' ', ' [', 1) + (']' if unit else ''):44s} {n.value:10.4g}   "
-                     f"{f'{n.low:.4g} to {n.high:.4g}':24s} {known}{bound}")  # fmt: skip
+        value, low, high = (f"{v:.{_digits(n)}g}" for v in (n.value, n.low, n.high))
+        lines.append(f"{n.label + unit:44s} {value:>12s}   {f'{low} to {high}':26s} {known}{bound}")
     if (pair := e.strongest_correlation()) is not None:
         lines += ["", f"correlated most: {pair[0]} and {pair[1]} ({pair[2]:+.3f})"]
     if e.effects:
@@ -81,3 +81,9 @@ def _text(e: Estimate, made: Mapping[str, Path], scene: str) -> list[str]:
     lines += [f"{name}: {path}" for name, path in made.items() if name != "calibration"]
     lines.append(f"fitted: origami-sim run {scene} --calibration {made['calibration']}")
     return [*lines, f"{e.seconds:.0f} s"]
+
+
+def _digits(n: Number) -> int:
+    """Digits with which a value is printed: as many as show two of its interval's, from four to nine."""
+    size, width = abs(n.value), n.high - n.low
+    return int(np.clip(np.ceil(np.log10(size / width)) + 2, 4, 9)) if 0.0 < width < np.inf and size else 4
