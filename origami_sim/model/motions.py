@@ -28,6 +28,21 @@ def _within(basis: np.ndarray, points: np.ndarray, held: np.ndarray) -> np.ndarr
     return vt[np.sum(s > 1e-9) :] @ basis
 
 
+def carried(x: np.ndarray, motion: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Places [N, W, 3] to which points x [N, W, 3] go with a rigid motion, within `by` units of time [W].
+
+    Args:
+        motion: (6,) angular velocity, and velocity of the origin.
+    """
+    turn, along = screw(by[:, None] * motion[:3])
+    return np.einsum("wab,nwb->nwa", turn, x) + np.einsum("wab,wb->wa", along, by[:, None] * motion[3:])
+
+
+def velocity(x: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Velocities [..., 3] of points x [..., 3] that go along with a rigid motion (6,)."""
+    return motion[3:] + np.cross(motion[:3], x)
+
+
 def screw(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotations R [W, 3, 3] by rotation vectors [W, 3] [rad], and matrices V [W, 3, 3] that make screws of them.
 

@@ -5,7 +5,7 @@ import numpy as np
 from origami_sim.drive import PATHS, Drive
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, State
-from origami_sim.model.motions import screw
+from origami_sim.model.motions import carried, velocity
 
 ROW = "grips"
 """Name of their work among that of the effects."""
@@ -46,10 +46,8 @@ def placed(model: Model, levels: np.ndarray, reference: np.ndarray | None = None
     begin = model.position[:, None] if reference is None else reference
     out = np.array(np.broadcast_to(begin, (len(begin), levels.shape[1], 3)))
     for k, (way, level) in enumerate(zip(model.grip_screws, levels, strict=True)):
-        turn, along = screw(level[:, None] * way[:3])
-        shift = np.einsum("wab,wb->wa", along, level[:, None] * way[3:])
         mine = model.grips == k
-        out[mine] = np.einsum("wab,nwb->nwa", turn, out[mine]) + shift
+        out[mine] = carried(out[mine], way, level)
     return out
 
 
@@ -101,9 +99,7 @@ def carried_along(
         return x
     only = alone(model)
     if only is not None:
-        way, ahead = model.grip_screws[only], (after - before)[only][:, None]
-        turn, go = screw(ahead * way[:3])
-        x = np.einsum("wab,nwb->nwa", turn, x) + np.einsum("wab,wb->wa", go, ahead * way[3:])
+        x = carried(x, model.grip_screws[only], (after - before)[only])
     return held_at(model, x, after, reference)
 
 
@@ -111,11 +107,10 @@ def ridden(model: Model, state: State, motion: np.ndarray) -> None:
     """Takes a state along with the grip that holds it alone, with its velocities, to paths and rates [3, G, W]."""
     k = alone(model)
     assert k is not None
-    way, level = model.grip_screws[k], motion[0, k][:, None]
-    turn, go = screw(level * way[:3])
-    state.x = np.einsum("wab,nwb->nwa", turn, state.x) + np.einsum("wab,wb->wa", go, level * way[3:])
-    state.v = np.einsum("wab,nwb->nwa", turn, state.v)
-    state.v += motion[1, k, :, None] * (way[3:] + np.cross(way[:3], state.x))
+    way, level = model.grip_screws[k], motion[0, k]
+    state.x = carried(state.x, way, level)
+    turned = carried(state.v, np.append(way[:3], np.zeros(3)), level)
+    state.v = turned + motion[1, k, :, None] * velocity(state.x, way)
 
 
 def levels_at(model: Model, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
@@ -167,7 +162,7 @@ def velocities(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray:
     out = np.zeros_like(x)
     for k, way in enumerate(model.grip_screws):
         mine = model.grips == k
-        out[mine] = motion[1, k, :, None] * (way[3:] + np.cross(way[:3], x[mine]))
+        out[mine] = motion[1, k, :, None] * velocity(x[mine], way)
     return out
 
 
@@ -176,7 +171,7 @@ def accelerations(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray
     out = np.zeros_like(x)
     for k, way in enumerate(model.grip_screws):
         mine = model.grips == k
-        unit = way[3:] + np.cross(way[:3], x[mine])
+        unit = velocity(x[mine], way)
         out[mine] = motion[2, k, :, None] * unit + motion[1, k, :, None] ** 2 * np.cross(way[:3], unit)
     return out * (model.free == 0.0)[:, None]
 

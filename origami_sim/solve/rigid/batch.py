@@ -10,6 +10,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.bodies import centred, eccentric
+from origami_sim.model.motions import velocity
 from origami_sim.solve import grips
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels.tree import PARTS, POSE, Tree
@@ -189,9 +190,7 @@ class RigidBatch(Batch):
         motion = grips.along(self.model, self._drive, time, self.worlds)
         self._clamps[0].begun = wp.array(motion[0], dtype=wp.float64, device=self.device)
         t, x, corners = self.tree_of, state.x, len(state.x) - len(self.model.carriers)
-        going = [
-            motion[1, g, :, None] * (way[3:] + np.cross(way[:3], x)) for g, way in enumerate(self.model.grip_screws)
-        ]
+        going = [rate[:, None] * velocity(x, way) for rate, way in zip(motion[1], self.model.grip_screws, strict=True)]
         base = going[root] if root >= 0 else np.zeros_like(x)
         by, mass = self.jacobian(x, origin, axis, pivot), np.broadcast_to(self._mass, x.shape[:2])
         data = self._tree.data.numpy().reshape(self.worlds, -1)

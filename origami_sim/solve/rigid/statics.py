@@ -4,7 +4,7 @@ import numpy as np
 
 from origami_sim.drive import Drive
 from origami_sim.model import Model, Parameters, State, dihedral_angles
-from origami_sim.model.motions import screw
+from origami_sim.model.motions import carried
 from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
 from origami_sim.solve.rigid.shares import of_grips
@@ -202,8 +202,7 @@ def led(
     aims = grips.held_at(model, x[:, None], paths, reference)[:, 0]
     ahead = paths - grips.levels_at(model, x[:, None], reference)
     if root >= 0:
-        turn, go = screw(ahead[root][:, None] * model.grip_screws[root, :3])
-        x = x @ turn[0].T + ahead[root] * (go[0] @ model.grip_screws[root, 3:])
+        x = carried(x[:, None], model.grip_screws[root], ahead[root])[:, 0]
     q = closed(tree, x, np.zeros(len(tree.turns) + len(tree.joints)), aims)
     return None if q is None else tree.moved(x, q[:, None])[:, 0]
 
