@@ -10,7 +10,7 @@ from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.model.articulation import Articulation, Pose
 from origami_sim.recording import Recording
-from origami_sim.solve.grips import along, carried_along, levels_at, moving
+from origami_sim.solve.grips import carried_along, levels_at, moving, nearest_levels
 from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.statics.equilibria import equilibrium
 
@@ -71,8 +71,8 @@ def begun(
     if not moving(model, drive):
         return found
     found = State.at_rest(model) if found is None else found
-    paths = along(model, drive, 0.0, found.worlds)[0]
-    found.x = carried_along(model, found.x, levels_at(model, found.x), paths)
+    levels = levels_at(model, drive, 0.0, found.worlds)
+    found.x = carried_along(model, found.x, nearest_levels(model, found.x), levels)
     return found
 
 

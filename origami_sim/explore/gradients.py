@@ -19,7 +19,7 @@ from origami_sim.explore.found import Build, Device, Found, Measure, Way, at, fo
 from origami_sim.model import State
 from origami_sim.model.distort import distorted
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.grips import along, held_at
+from origami_sim.solve.grips import held_at, levels_at
 from origami_sim.solve.rigid.sensitivity import followed
 from origami_sim.solve.statics.equilibria import tangent
 from origami_sim.solve.statics.system import NULL_SHIFT, STENCIL, WEIGHTS
@@ -152,4 +152,4 @@ def _at_rest(devices: list[Device], way: Way, unknowns: int, step: Mapping[str, 
 def _supported(first: Device, near: Device, x: np.ndarray, time: float) -> np.ndarray:
     """Positions x [N, 3] of the first device, with held nodes where another one's supports and grips have them."""
     x = x + (1 - first.model.free) * (near.model.position - first.model.position)
-    return held_at(near.model, x[:, None], along(near.model, near.drive, time, 1)[0])[:, 0]
+    return held_at(near.model, x[:, None], levels_at(near.model, near.drive, time, 1))[:, 0]

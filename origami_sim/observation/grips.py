@@ -6,7 +6,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model
 from origami_sim.recording import Channel, Recording
-from origami_sim.solve.grips import alone, moving, on_path
+from origami_sim.solve.grips import alone, moving, on_path, turning
 
 
 def grip_of(model: Model, channel: Channel) -> int:
@@ -36,7 +36,7 @@ def of_grip(model: Model, channel: Channel, wrench: np.ndarray) -> np.ndarray:
         InputError: a force along the path of a grip that turns, a moment of one that does not.
     """
     grip = grip_of(model, channel)
-    turns = bool(np.any(model.grip_screws[grip, :3]))
+    turns = bool(turning(model)[grip])
     direction = channel.attachment.get("direction")
     if channel.kind == "force" and direction is not None:
         return wrench[:, :3] @ np.asarray(direction, float)
@@ -49,9 +49,7 @@ def of_grip(model: Model, channel: Channel, wrench: np.ndarray) -> np.ndarray:
             value=channel.kind,
             allowed="moment, or a force with a direction" if turns else "force",
         )
-    every = np.zeros((len(model.grip_screws), len(wrench), 6))
-    every[grip] = wrench
-    return on_path(model, every)[grip]
+    return on_path(model.grip_screws[grip], wrench)
 
 
 def refuse_moving(model: Model, channel: Channel) -> None:

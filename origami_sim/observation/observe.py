@@ -14,7 +14,7 @@ from origami_sim.model.distort import distorted
 from origami_sim.observation.grips import grip_of, of_grip, refuse_moving
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.grips import along, moving
+from origami_sim.solve.grips import levels_at, moving
 from origami_sim.solve.motion.dynamics import Trajectory
 from origami_sim.solve.motion.gripped import exerted_at_rest
 from origami_sim.solve.rigid.reactions import held_nodes, support_of_all
@@ -359,10 +359,10 @@ def grip_wrench(poses: Poses, channel: Channel) -> np.ndarray:
     model, grip = poses.model, grip_of(poses.model, channel)
     if poses.state is None or poses.drive is None:
         raise InputError("a force needs states and a drive", field=f"channels.{channel.name}")
-    x, paths = poses.state.x, along(model, poses.drive, 0.0, poses.state.worlds)[0]
+    x, levels = poses.state.x, levels_at(model, poses.drive, 0.0, poses.state.worlds)
     force = Batch(model, poses.parameters, poses.drive, poses.state).total_force(0.0)
     tree = Topology(model, moving(model, poses.drive)) if model.panels == "rigid" else None
-    return exerted_at_rest(model, tree, x, paths, force)[grip]
+    return exerted_at_rest(model, tree, x, levels, force)[grip]
 
 
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:

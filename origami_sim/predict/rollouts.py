@@ -39,7 +39,7 @@ from origami_sim.predict.track import coordinates
 from origami_sim.predict.worlds import World, Worlds, distinct_motions
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.grips import along, moving, ridden
+from origami_sim.solve.grips import motion_at, moving, ridden
 from origami_sim.solve.rigid.batch import batch_of
 from origami_sim.solve.statics.equilibria import equilibrium
 from origami_sim.threads import default_threads, sharing, side_by_side
@@ -322,7 +322,7 @@ class Rollouts(Worlds, ABC):
         state = State.at_rest(model, x.shape[1], position=x, placed=True)
         state.v[:] = v
         if moving(model, self.drives[shots.recording]):
-            ridden(model, state, along(model, self.driven(shots), 0.0, state.worlds))
+            ridden(model, state, motion_at(model, self.driven(shots), 0.0, state.worlds))
         return remembering(state, shots)
 
     def batch(self, model: Model, parameters: Parameters, drive: Drive, state: State, **options) -> Batch:

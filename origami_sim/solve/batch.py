@@ -166,7 +166,7 @@ class Batch:
         if self.program.touches:
             self._constants.append(skin.upload(model, self._room, self.device))
         row = len(self.program.effects)
-        own = [clamps.upload(model, drive, grips.paths(model), row, self.device)] if self.gripped else []
+        own = [clamps.upload(model, drive, grips.channels(model), row, self.device)] if self.gripped else []
         self._clamps: list[Any] = own
         self._x, self._v, self._a = (self._upload(s, wp.vec3d) for s in (state.x, state.v, state.a))
         self._f = self._room(max(len(model.position), 1), dtype=wp.vec3d)

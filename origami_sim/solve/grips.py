@@ -1,4 +1,8 @@
-"""Grips of a model: which of them move, where their nodes are, and what force they exert."""
+"""Grips of a model: which of them move, where their nodes are, and what force they exert.
+
+How far a grip has gone along its path from the reference state is its level, [m] or [rad]; levels are [G, W], and
+motions [3, G, W] levels, rates and accelerations.
+"""
 
 import numpy as np
 
@@ -7,19 +11,32 @@ from origami_sim.errors import InputError, nearest
 from origami_sim.model import Model, State
 from origami_sim.model.motions import carried, velocity
 
-ROW = "grips"
+WORK = "grips"
 """Name of their work among that of the effects."""
 
 APART = 1e-6
 """Distance over the device's size from which a held node is not where its grip is: rounding leaves 1e-12, and a start
 that is meant to be elsewhere 1e-3. Half and double refuse the same ones."""
 
+TEARS = 1e-4
+"""Distance over the device's size from which panels no longer reach their grip: loops stay closed to 1e-8, and to 5e-5
+where steps have a tolerance of 1e-4; panels that do not reach are off by 5e-4 in the next frame, and by 1e-2 after ten.
+Half and double tell the same ones."""
 
-def paths(model: Model) -> list[str]:
+PART = 0.1
+"""Share of an element's length by which grips move from one equilibrium to the next on a way to one: bars that are
+strained by a tenth still come to rest. Half takes twice as long, double loses arches of thick strips."""
+
+
+def turning(model: Model) -> np.ndarray:
+    """Whether each grip turns about an axis [G]; else it moves along a direction."""
+    return np.any(model.grip_screws[:, :3] != 0.0, axis=1)
+
+
+def channels(model: Model) -> list[str]:
     """Channel of the drive that is the path of each grip."""
-    turns = np.any(model.grip_screws[:, :3] != 0.0, axis=1)
     names = model.names.get("grip", ())
-    return [f"{PATHS[int(t)]}_{names[k] if k < len(names) else k}" for k, t in enumerate(turns)]
+    return [f"{PATHS[int(t)]}_{names[k] if k < len(names) else k}" for k, t in enumerate(turning(model))]
 
 
 def moving(model: Model, drive: Drive) -> bool:
@@ -28,17 +45,18 @@ def moving(model: Model, drive: Drive) -> bool:
     Raises:
         InputError: a path of a grip that the model does not have.
     """
-    known = paths(model)
-    for name, signal in drive.signals.items():
+    known = channels(model)
+    for name in drive.signals:
         if name.partition("_")[0] in PATHS and name not in known:
             said = f"the model has no such grip{nearest(name, known)}"
-            allowed = ", ".join(known) or "Sheet.grip(name, panels=..., direction=...)"
-            raise InputError(said, field=name, value=signal.unit, allowed=allowed)
+            raise InputError(
+                said, field=name, allowed=", ".join(known) or "Sheet.grip(name, panels=..., direction=...)"
+            )
     return any(n in drive.signals and not drive[n].is_zero for n in known)
 
 
 def placed(model: Model, levels: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
-    """Places [N, W, 3] [m] to which paths [G, W] bring the nodes; those of no grip are as in the reference state.
+    """Places [N, W, 3] [m] to which levels [G, W] bring the nodes; those of no grip are as in the reference state.
 
     Args:
         reference: [N, W, 3] of worlds that differ in shape (default: the model's).
@@ -51,31 +69,42 @@ def placed(model: Model, levels: np.ndarray, reference: np.ndarray | None = None
     return out
 
 
-def along(model: Model, drive: Drive, time: float, worlds: int) -> np.ndarray:
-    """Paths, their rates and their accelerations [3, G, W] at a time [s]."""
-    out = np.zeros((3, len(model.grip_screws), worlds))
-    for k, name in enumerate(paths(model)):
+def levels_at(model: Model, drive: Drive, time: float, worlds: int) -> np.ndarray:
+    """Levels [G, W] at a time [s]; 0 of grips that the drive does not move."""
+    out = np.zeros((len(model.grip_screws), worlds))
+    for row, name in zip(out, channels(model), strict=True):
         if name in drive.signals:
-            signal = drive[name]
-            for row, value in zip(out[:, k], (signal(time), *signal.derivatives(time)), strict=True):
+            row[:] = np.squeeze(drive[name](time))
+    return out
+
+
+def levels_over(model: Model, drive: Drive, times: np.ndarray, worlds: int) -> np.ndarray:
+    """Levels [F, G, W] at times [F] [s]."""
+    return np.stack([levels_at(model, drive, float(t), worlds) for t in times])
+
+
+def motion_at(model: Model, drive: Drive, time: float, worlds: int) -> np.ndarray:
+    """Levels, their rates and their accelerations [3, G, W] at a time [s]."""
+    out = np.zeros((3, len(model.grip_screws), worlds))
+    out[0] = levels_at(model, drive, time, worlds)
+    for k, name in enumerate(channels(model)):
+        if name in drive.signals:
+            for row, value in zip(out[1:, k], drive[name].derivatives(time), strict=True):
                 row[:] = np.squeeze(value)
     return out
 
 
-def along_frames(model: Model, drive: Drive, times: np.ndarray, worlds: int) -> np.ndarray:
-    """Paths [F, G, W] at times [F] [s]."""
-    return np.stack([along(model, drive, float(t), worlds)[0] for t in times])
-
-
-def level_of(model: Model, drive: Drive, levels: np.ndarray) -> np.ndarray:
-    """Paths [G, W] of levels [channels, W] of a drive; 0 of grips that it does not move."""
-    channels = list(drive.signals)
-    rows = [levels[channels.index(n)] if n in channels else np.zeros(levels.shape[1]) for n in paths(model)]
-    return np.array(rows).reshape(len(rows), levels.shape[1])
+def levels_among(model: Model, drive: Drive, values: np.ndarray) -> np.ndarray:
+    """Levels [G, W] among the values [channels, W] of a drive; 0 of grips that it does not move."""
+    rows, known = np.zeros((len(model.grip_screws), values.shape[1])), list(drive.signals)
+    for row, name in zip(rows, channels(model), strict=True):
+        if name in known:
+            row[:] = values[known.index(name)]
+    return rows
 
 
 def held_at(model: Model, x: np.ndarray, levels: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
-    """Positions x [N, W, 3] with the held axes of grips where paths [G, W] have them, and all else; see `placed`."""
+    """Positions x [N, W, 3] with the held axes of grips where levels [G, W] have them, and all else; see `placed`."""
     if not len(model.grips):
         return x
     held = ((model.grips >= 0)[:, None] & (model.free == 0.0))[:, None]
@@ -91,7 +120,7 @@ def alone(model: Model) -> int | None:
 def carried_along(
     model: Model, x: np.ndarray, before: np.ndarray, after: np.ndarray, reference: np.ndarray | None = None
 ) -> np.ndarray:
-    """A guess of positions [N, W, 3] after paths have gone on from [G, W] to others, from positions x [N, W, 3].
+    """A guess of positions [N, W, 3] after levels have gone on from [G, W] to others, from positions x [N, W, 3].
 
     Where one grip alone holds the device, all of it goes along; else what is held.
     """
@@ -104,7 +133,7 @@ def carried_along(
 
 
 def ridden(model: Model, state: State, motion: np.ndarray) -> None:
-    """Takes a state along with the grip that holds it alone, with its velocities, to paths and rates [3, G, W]."""
+    """Takes a state along with the grip that holds it alone, with its velocities, to levels and rates [3, G, W]."""
     k = alone(model)
     assert k is not None
     way, level = model.grip_screws[k], motion[0, k]
@@ -113,8 +142,8 @@ def ridden(model: Model, state: State, motion: np.ndarray) -> None:
     state.v = turned + motion[1, k, :, None] * velocity(state.x, way)
 
 
-def levels_at(model: Model, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
-    """Paths [G, W] that bring the nodes nearest to positions x [N, W, 3]; turns within half a turn."""
+def nearest_levels(model: Model, x: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
+    """Levels [G, W] that bring the nodes nearest to positions x [N, W, 3]; turns within half a turn."""
     out = np.zeros((len(model.grip_screws), x.shape[1]))
     for k, way in enumerate(model.grip_screws):
         mine = model.grips == k
@@ -122,43 +151,29 @@ def levels_at(model: Model, x: np.ndarray, reference: np.ndarray | None = None) 
         if not np.any(way[:3]):
             out[k] = ((now - before) @ way[3:]).mean(axis=0)
             continue
-        on = np.cross(way[:3], way[3:])
+        on = _on_axis(way)
         sine = (np.cross(before - on, now - on) @ way[:3]).sum(axis=0)
         flat = [a - (a @ way[:3])[..., None] * way[:3] for a in (before - on, now - on)]
         out[k] = np.arctan2(sine, (flat[0] * flat[1]).sum(axis=(0, 2)))
     return out
 
 
-def way_to(model: Model, x: np.ndarray, paths: np.ndarray, length: float) -> list[np.ndarray]:
-    """Paths [G, 1] at the parts of a way to paths, from positions x [N, 1, 3] of one world, these first.
+def way_to(model: Model, x: np.ndarray, end: np.ndarray, length: float) -> list[np.ndarray]:
+    """Levels [G, 1] at the parts of a way to those at its end, from positions x [N, 1, 3] of one world, these first.
 
-    Who turns from the reference state goes the whole angle, and from anywhere else the shorter way round.
+    Who turns from the reference state goes the whole angle, and from anywhere else the shorter way round. A device that
+    one grip holds alone goes along whole. Others bend at each part, by no more than a share of an element's length [m].
     """
-    begin = levels_at(model, x)
-    turns = (np.abs(begin) > APART) & np.any(model.grip_screws[:, :3] != 0.0, axis=1)[:, None]
-    begin = begin + np.where(turns, 2 * np.pi * np.round((paths - begin) / (2 * np.pi)), 0.0)
-    count = steps_to(model, x, paths, length)
-    return [begin + (paths - begin) * (k / count) for k in range(count)] + [paths]
-
-
-def steps_to(model: Model, x: np.ndarray, paths: np.ndarray, length: float) -> int:
-    """Into how many parts the way of grips to paths [G, 1] is cut, from positions x [N, 1, 3] of one world.
-
-    A device that one grip holds alone goes along whole. Others bend at each part, by no more than a share of a length.
-    """
-    if alone(model) is not None:
-        return 1
-    far = np.linalg.norm(held_at(model, x, paths) - x, axis=-1).max()
-    return max(1, int(np.ceil(far / (PART * length))))
-
-
-PART = 0.1
-"""Share of an element's length by which grips move from one equilibrium to the next on a way to one: bars that are
-strained by a tenth still come to rest. Half takes twice as long, double loses arches of thick strips."""
+    begin = nearest_levels(model, x)
+    turns = (np.abs(begin) > APART) & turning(model)[:, None]
+    begin = begin + np.where(turns, 2 * np.pi * np.round((end - begin) / (2 * np.pi)), 0.0)
+    far = 0.0 if alone(model) is not None else _astray(model, x, end).max()
+    count = max(1, int(np.ceil(far / (PART * length))))
+    return [begin + (end - begin) * (k / count) for k in range(count)] + [end]
 
 
 def velocities(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Velocities [N, W, 3] [m/s] of the nodes of grips at positions x [N, W, 3], for paths [3, G, W]."""
+    """Velocities [N, W, 3] [m/s] of the nodes of grips at positions x [N, W, 3], in a motion [3, G, W]."""
     out = np.zeros_like(x)
     for k, way in enumerate(model.grip_screws):
         mine = model.grips == k
@@ -167,7 +182,7 @@ def velocities(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray:
 
 
 def accelerations(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Accelerations [N, W, 3] [m/s^2] of the held axes of grips at positions x [N, W, 3], for paths [3, G, W]."""
+    """Accelerations [N, W, 3] [m/s^2] of the held axes of grips at positions x [N, W, 3], in a motion [3, G, W]."""
     out = np.zeros_like(x)
     for k, way in enumerate(model.grip_screws):
         mine = model.grips == k
@@ -177,7 +192,7 @@ def accelerations(model: Model, x: np.ndarray, motion: np.ndarray) -> np.ndarray
 
 
 def poles(model: Model, levels: np.ndarray) -> np.ndarray:
-    """Points [G, W, 3] [m] about which moments of the grips are meant, at paths [G, W].
+    """Points [G, W, 3] [m] about which moments of the grips are meant, at levels [G, W].
 
     The middle of the nodes, where it is now, or the point next to their middle on the axis about which they turn.
     """
@@ -186,9 +201,14 @@ def poles(model: Model, levels: np.ndarray) -> np.ndarray:
     for k, way in enumerate(model.grip_screws):
         out[k] = x[model.grips == k].mean(axis=0)
         if np.any(way[:3]):
-            on = np.cross(way[:3], way[3:])
+            on = _on_axis(way)
             out[k] = on + ((out[k] - on) @ way[:3])[:, None] * way[:3]
     return out
+
+
+def _on_axis(screw: np.ndarray) -> np.ndarray:
+    """The point [3] [m] next to the origin on the axis of a screw (6,) that turns."""
+    return np.cross(screw[:3], screw[3:])
 
 
 def wrenches(model: Model, mass: np.ndarray, x: np.ndarray, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -198,7 +218,7 @@ def wrenches(model: Model, mass: np.ndarray, x: np.ndarray, force: np.ndarray, m
 
     Args:
         mass: [N, 1 or W] of the nodes [kg]. x: [N, W, 3] [m]. force: [N, W, 3] of all laws [N].
-        motion: paths, rates and accelerations [3, G, W].
+        motion: levels, rates and accelerations [3, G, W].
     """
     exerted = (model.free == 0.0)[:, None] * (mass[:, :, None] * accelerations(model, x, motion) - force)
     out = np.zeros((len(model.grip_screws), x.shape[1], 6))
@@ -209,16 +229,15 @@ def wrenches(model: Model, mass: np.ndarray, x: np.ndarray, force: np.ndarray, m
     return out
 
 
-def on_path(model: Model, wrench: np.ndarray) -> np.ndarray:
-    """What grips exert along their paths [..., G, W]: a force along the direction [N], a moment about the axis [N m].
+def on_path(screw: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """What a grip exerts along its path [...]: a force along the direction [N], a moment about the axis [N m].
 
     Args:
-        wrench: of the grips [..., G, W, 6].
+        screw: of the grip (6,), or of many [..., 6]. wrench: what it exerts [..., 6].
     """
-    turns = np.any(model.grip_screws[:, :3] != 0.0, axis=1)
-    way = np.where(turns[:, None], model.grip_screws[:, :3], model.grip_screws[:, 3:])
-    part = np.where(turns[:, None, None], wrench[..., 3:], wrench[..., :3])
-    way = way[:, None]
+    turns = np.any(screw[..., :3] != 0.0, axis=-1, keepdims=True)
+    way = np.where(turns, screw[..., :3], screw[..., 3:])
+    part = np.where(turns, wrench[..., 3:], wrench[..., :3])
     return np.where(way == 0.0, 0.0, part * way).sum(axis=-1)  # a component that is open elsewhere is no matter
 
 
@@ -232,34 +251,37 @@ def refuse_jump(model: Model, x: np.ndarray, levels: np.ndarray) -> None:
     """Refuses a start in which held nodes are not where their grips are.
 
     Args:
-        x: [N, W, 3] positions at the start. levels: paths [G, W] then.
+        x: [N, W, 3] positions at the start. levels: [G, W] then.
 
     Raises:
         InputError: naming the grip and how far off it is.
     """
-    size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
-    off = np.linalg.norm(held_at(model, x, levels) - x, axis=-1).max(axis=1)
+    off = _astray(model, x, levels).max(axis=1)
     worst = int(off.argmax())
-    if off[worst] > APART * size:
+    if off[worst] > APART * _size(model):
         raise InputError(
             f"a grip cannot jump: it is {off[worst] * 1e3:.3g} mm from where the motion starts",
-            field=paths(model)[int(model.grips[worst])],
+            field=channels(model)[int(model.grips[worst])],
             allowed="a path from 0 on, such as ramp('5 mm', '1 s'), or a state that is there, as of an equilibrium",
         )
 
 
-def torn(model: Model, x: np.ndarray, levels: np.ndarray) -> list[tuple[int, str]]:
-    """[W] the node farthest from its grip, at x [N, W, 3] and paths [G, W], and why panels are torn; "": none is."""
-    size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
-    off = np.linalg.norm(held_at(model, x, levels) - x, axis=-1)
-    out = []
-    for w, worst in enumerate(off.argmax(axis=0).tolist()):
-        far = off[worst, w]
-        name = paths(model)[int(model.grips[worst])].partition("_")[2] if model.grips[worst] >= 0 else ""
-        said = f"the grips tear the rigid panels: node {worst} is {far * 1e3:.3g} mm from its grip '{name}'"
-        out.append((worst, said if not far <= TEARS * size else ""))
+def torn(model: Model, x: np.ndarray, levels: np.ndarray) -> dict[int, tuple[int, str]]:
+    """Worlds whose rigid panels do not reach their grips, at x [N, W, 3] and levels [G, W]: a node of each, and why."""
+    off, out = _astray(model, x, levels), {}
+    for w in np.flatnonzero(off.max(axis=0) > TEARS * _size(model)).tolist():  # none where positions are no numbers
+        node = int(off[:, w].argmax())
+        name = channels(model)[int(model.grips[node])].partition("_")[2]
+        far = f"node {node} is {off[node, w] * 1e3:.3g} mm from its grip '{name}'"
+        out[w] = node, f"the grips tear the rigid panels: {far}"
     return out
 
 
-TEARS = 1e-4
-"""Distance over the device's size from which panels no longer reach their grip: loops stay closed to 1e-9 and less."""
+def _astray(model: Model, x: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Distance [N, W] [m] of nodes at x [N, W, 3] from where grips at levels [G, W] have them; 0 of others."""
+    return np.linalg.norm(held_at(model, x, levels) - x, axis=-1)
+
+
+def _size(model: Model) -> float:
+    """Size of a device in its reference state [m]."""
+    return float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0

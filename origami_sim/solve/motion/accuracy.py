@@ -15,7 +15,7 @@ import numpy as np
 
 from origami_sim.effects import get
 from origami_sim.errors import InputError
-from origami_sim.solve.grips import ROW
+from origami_sim.solve.grips import WORK
 
 if TYPE_CHECKING:
     from origami_sim.solve.motion.dynamics import Trajectory
@@ -41,8 +41,8 @@ def exchanges(motion: "Trajectory") -> dict[str, np.ndarray]:
     out = {"kinetic": motion.energies["kinetic"]}
     for name in motion.model.laws:
         out[name] = -motion.work[name] if get(name).exchanges_work else motion.energies[name]
-    if ROW in motion.work:
-        out[ROW] = -motion.work[ROW]
+    if WORK in motion.work:
+        out[WORK] = -motion.work[WORK]
     return {n: a - a[0] for n, a in out.items()}
 
 

@@ -138,7 +138,7 @@ class Trajectory:
 
     def grip_path(self, name: str) -> np.ndarray:
         """How far a grip has moved from the reference state [F, W]: [m], or [rad] of one that turns."""
-        return grips.along_frames(self.model, self.drive, self.times, self.x.shape[2])[:, self._grip(name)]
+        return grips.levels_over(self.model, self.drive, self.times, self.x.shape[2])[:, self._grip(name)]
 
     def grip_load(self, name: str) -> np.ndarray:
         """What a grip exerts on the device along its path [F, W]: a force [N], or a moment about its axis [N m].
@@ -151,7 +151,7 @@ class Trajectory:
         k = self._grip(name)
         if self.grip_wrenches is None:
             raise InputError("no grip moves in this motion", field="grip", value=name)
-        return grips.on_path(self.model, self.grip_wrenches)[:, k]
+        return grips.on_path(self.model.grip_screws[k], self.grip_wrenches[:, k])
 
     def _grip(self, name: str) -> int:
         names = self.model.names.get("grip", ())
@@ -198,7 +198,7 @@ class Trajectory:
                 total -= self.work[name]
             else:
                 total += self.energies[name]
-        return total - self.work.get(grips.ROW, 0.0)
+        return total - self.work.get(grips.WORK, 0.0)
 
 
 def simulate(
@@ -363,7 +363,7 @@ def _simulated(
         worlds = max(parameters.worlds, drive.worlds)
         state = State.at_rest(model, worlds)
         if grips.alone(model) is not None:  # that grip has the whole device where its path begins
-            at = grips.along(model, drive, 0.0, worlds)[0]
+            at = grips.levels_at(model, drive, 0.0, worlds)
             state.x = grips.carried_along(model, state.x, np.zeros_like(at), at)
     check_memory(model, state.worlds, duration, rate)
     first = max(state.step, 0)
@@ -442,7 +442,7 @@ def _simulated(
         },
         work={
             n: np.stack([s.work[i] for s, _ in record])
-            for i, n in enumerate((*model.laws, grips.ROW) if gripped else model.laws)
+            for i, n in enumerate((*model.laws, grips.WORK) if gripped else model.laws)
         },
         grip_wrenches=np.stack(pulls) if gripped else None,
         gaps=np.stack([e.gaps for _, e in record]),

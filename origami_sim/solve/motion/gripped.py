@@ -21,10 +21,10 @@ def check_start(model: Model, drive: Drive, state: State, begin: float, end: flo
     """
     if not grips.moving(model, drive):
         return False
-    grips.refuse_jump(model, state.x, grips.along(model, drive, begin, state.worlds)[0])
+    grips.refuse_jump(model, state.x, grips.levels_at(model, drive, begin, state.worlds))
     if model.panels != "rigid":
         return True
-    for name in grips.paths(model):
+    for name in grips.channels(model):
         kinks = drive[name].kinks if name in drive.signals else np.zeros(0)
         inside = kinks[(kinks > begin) & (kinks < end)]
         if len(inside):
@@ -39,7 +39,7 @@ def check_start(model: Model, drive: Drive, state: State, begin: float, end: flo
 def exerted(batch: Batch, drive: Drive, mass: np.ndarray, state: State, now: Evaluation, time: float) -> np.ndarray:
     """Force [N] and moment about its pole [N m] of each grip in a frame of a motion [G, W, 6]."""
     model = batch.model
-    motion = grips.along(model, drive, time, state.worlds)
+    motion = grips.motion_at(model, drive, time, state.worlds)
     if isinstance(batch, RigidBatch):
         wrench, loops = batch.supporting()
         return shared(model, batch.tree_of, state.x, motion[0], wrench, loops)
@@ -48,26 +48,24 @@ def exerted(batch: Batch, drive: Drive, mass: np.ndarray, state: State, now: Eva
 
 
 def exerted_at_rest(
-    model: Model, tree: Topology | None, x: np.ndarray, paths: np.ndarray, force: np.ndarray
+    model: Model, tree: Topology | None, x: np.ndarray, levels: np.ndarray, force: np.ndarray
 ) -> np.ndarray:
-    """The same in equilibria [G, W, 6], at positions x [N, W, 3] with forces of all laws [N, W, 3] and paths [G, W].
+    """The same in equilibria [G, W, 6], at positions x [N, W, 3] with forces of all laws [N, W, 3] and levels [G, W].
 
     Args:
         tree: of rigid panels.
     """
     if tree is None:
-        still = np.stack([paths, np.zeros_like(paths), np.zeros_like(paths)])
+        still = np.stack([levels, np.zeros_like(levels), np.zeros_like(levels)])
         return grips.wrenches(model, np.zeros((len(x), 1)), x, force, still)
     wrench = -np.concatenate([force.sum(axis=0), np.cross(x, force).sum(axis=0)], axis=1)
-    return shared(model, tree, x, paths, wrench, -np.einsum("mnwa,nwa->mw", tree.rates(x), force))
+    return shared(model, tree, x, levels, wrench, -np.einsum("mnwa,nwa->mw", tree.rates(x), force))
 
 
 def tears(model: Model, drive: Drive, times: np.ndarray, x: np.ndarray) -> dict[int, tuple[float, int, str]]:
     """Worlds of rigid panels that grips tear apart: the first frame's time [s], a node, and why. x: [F, N, W, 3]."""
     found: dict[int, tuple[float, int, str]] = {}
     for time, frame in zip(times.tolist(), x, strict=True):
-        paths = grips.along(model, drive, time, x.shape[2])[0]
-        for w, (node, why) in enumerate(grips.torn(model, frame, paths)):
-            if why and w not in found and np.all(np.isfinite(frame[:, w])):
-                found[w] = time, node, why
+        torn = grips.torn(model, frame, grips.levels_at(model, drive, time, x.shape[2]))
+        found |= {w: (time, *how) for w, how in torn.items() if w not in found}
     return found

@@ -245,7 +245,7 @@ class _World:
         a = (u - h * m.v - h**2 * (0.5 - s.beta) * m.acceleration) / (s.beta * h**2) * self.model.free
         v = m.v + h * ((1 - s.gamma) * m.acceleration + s.gamma * a)
         if self._gripped is not None:
-            motion = grips.along(self.model, self._drive, m.time + h, 1)
+            motion = grips.motion_at(self.model, self._drive, m.time + h, 1)
             v = np.where(self._gripped, grips.velocities(self.model, (m.x + u)[:, None], motion)[:, 0], v)
         return v, a
 
@@ -253,7 +253,7 @@ class _World:
         """A move [N, 3] within a step of h in which nodes in grips end on their paths."""
         if self._gripped is None:
             return u
-        there = grips.placed(self.model, grips.along(self.model, self._drive, self.now.time + h, 1)[0])[:, 0]
+        there = grips.placed(self.model, grips.levels_at(self.model, self._drive, self.now.time + h, 1))[:, 0]
         return np.where(self._gripped, there - self.now.x, u)
 
     def _place(self, copies: _Copies, u: np.ndarray, v: np.ndarray, h: float):

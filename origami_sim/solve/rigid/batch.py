@@ -187,7 +187,7 @@ class RigidBatch(Batch):
         """
         state, origin, axis, pivot = self._from
         root, rows = self._gripped or (-1, np.zeros(0, int))
-        motion = grips.along(self.model, self._drive, time, self.worlds)
+        motion = grips.motion_at(self.model, self._drive, time, self.worlds)
         self._clamps[0].begun = wp.array(motion[0], dtype=wp.float64, device=self.device)
         t, x, corners = self.tree_of, state.x, len(state.x) - len(self.model.carriers)
         going = [rate[:, None] * velocity(x, way) for rate, way in zip(motion[1], self.model.grip_screws, strict=True)]

@@ -50,16 +50,16 @@ def of_grips(model: Model, tree: Topology) -> tuple[int, np.ndarray]:
 
 
 def shared(
-    model: Model, tree: Topology, x: np.ndarray, paths: np.ndarray, wrench: np.ndarray, loops: np.ndarray
+    model: Model, tree: Topology, x: np.ndarray, levels: np.ndarray, wrench: np.ndarray, loops: np.ndarray
 ) -> np.ndarray:
     """Force [N] and moment about its pole [N m] of each grip on rigid panels [G, W, 6]; nan where not determined.
 
     Args:
-        x: [N, W, 3] positions. paths: [G, W]. wrench: [W, 6] force and moment about the origin of all supports.
+        x: [N, W, 3] positions. levels: [G, W]. wrench: [W, 6] force and moment about the origin of all supports.
         loops: [m, W] what loops add to the momenta of the coordinates.
     """
     root, rows = of_grips(model, tree)
-    at = poles(model, paths)
+    at = poles(model, levels)
     out = np.zeros((*at.shape[:2], 6))
     ground = np.flatnonzero(rows > -2)
     size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0

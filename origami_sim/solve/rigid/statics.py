@@ -87,7 +87,7 @@ class RigidSystem:
         """The equilibrium near the start, as the fields of an `Equilibrium`, with its grips in their places."""
         found = None
         if self._gripped:
-            end = grips.along(self.model, self._drive, time, 1)[0]
+            end = grips.levels_at(self.model, self._drive, time, 1)
             for at in grips.way_to(self.model, self.x[:, None], end, self.size)[1:]:
                 x = led(self.model, self.tree, self.x, at)
                 if x is None:
@@ -192,15 +192,15 @@ class RigidSystem:
 
 
 def led(
-    model: Model, tree: Topology, x: np.ndarray, paths: np.ndarray, reference: np.ndarray | None = None
+    model: Model, tree: Topology, x: np.ndarray, levels: np.ndarray, reference: np.ndarray | None = None
 ) -> np.ndarray | None:
-    """Positions [N, 3] of panels next to x [N, 3] whose held nodes are where grips at paths [G, 1] have them.
+    """Positions [N, 3] of panels next to x [N, 3] whose held nodes are where grips at levels [G, 1] have them.
 
     The root goes along with its grip, and all panels with it, before loops are closed. None if they cannot be.
     """
     root, _ = of_grips(model, tree)
-    aims = grips.held_at(model, x[:, None], paths, reference)[:, 0]
-    ahead = paths - grips.levels_at(model, x[:, None], reference)
+    aims = grips.held_at(model, x[:, None], levels, reference)[:, 0]
+    ahead = levels - grips.nearest_levels(model, x[:, None], reference)
     if root >= 0:
         x = carried(x[:, None], model.grip_screws[root], ahead[root])[:, 0]
     q = closed(tree, x, np.zeros(len(tree.turns) + len(tree.joints)), aims)

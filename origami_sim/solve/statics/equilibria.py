@@ -222,7 +222,7 @@ def _ways(model: Model, system: System, x: np.ndarray, time: float) -> list[Call
     drive = system.inputs[1]
     if not grips.moving(model, drive):
         return [lambda x: x]
-    at = grips.way_to(model, x[:, None], grips.along(model, drive, time, 1)[0], system.length)
+    at = grips.way_to(model, x[:, None], grips.levels_at(model, drive, time, 1), system.length)
     return [lambda x, a=a, b=b: grips.carried_along(model, x[:, None], a, b)[:, 0] for a, b in pairwise(at)]
 
 

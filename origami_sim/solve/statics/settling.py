@@ -132,8 +132,8 @@ class Settling(ABC):
         self.held.batch.hold(level)
         begin, every = start.x, wanted
         if self.gripped:
-            paths = grips.level_of(self.model, self.drive, level)
-            (guess, reached), (begin, again) = self._led(guess, paths), self._led(begin, paths)
+            ends = grips.levels_among(self.model, self.drive, level)
+            (guess, reached), (begin, again) = self._led(guess, ends), self._led(begin, ends)
             wanted, self.torn = wanted & reached & again, ~(reached & again)
         x, done = self._newton(guess, wanted & (gradual or not self.slips), ROUNDS)
         lost = wanted & ~done
@@ -157,10 +157,10 @@ class Settling(ABC):
         out.step, out.status = -1, np.full_like(out.status, -1)
         return out, done
 
-    def _led(self, x: np.ndarray, paths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [N, W, 3] after grips have gone to paths [G, W], and the worlds in which panels can follow [W]."""
-        at = grips.levels_at(self.model, x, self.reference)
-        return grips.carried_along(self.model, x, at, paths, self.reference), np.ones(x.shape[1], bool)
+    def _led(self, x: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [N, W, 3] after grips have gone to levels [G, W], and the worlds in which panels can follow [W]."""
+        at = grips.nearest_levels(self.model, x, self.reference)
+        return grips.carried_along(self.model, x, at, ends, self.reference), np.ones(x.shape[1], bool)
 
     def _newton(self, x: np.ndarray, wanted: np.ndarray, rounds: int) -> tuple[np.ndarray, np.ndarray]:
         """Positions after so many rounds, each with a tangent of its own, and which worlds came to rest."""
@@ -441,11 +441,10 @@ class SettlingPanels(Settling):
     def size(self) -> float:
         return 1.0
 
-    def _led(self, x, paths):
-        out = [led(self.model, self.tree, x[:, w], paths[:, [w]], self.reference[:, [w]]) for w in range(x.shape[1])]
-        return np.stack([x[:, w] if a is None else a for w, a in enumerate(out)], axis=1), np.array(
-            [a is not None for a in out]
-        )
+    def _led(self, x, ends):
+        out = [led(self.model, self.tree, x[:, w], ends[:, [w]], self.reference[:, [w]]) for w in range(x.shape[1])]
+        reached = np.array([a is not None for a in out])
+        return np.stack([x[:, w] if a is None else a for w, a in enumerate(out)], axis=1), reached
 
     def _unbalanced(self, x):
         return np.einsum("mnwa,nwa->mw", self.tree.rates(x), self._force(x))

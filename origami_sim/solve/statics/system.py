@@ -271,7 +271,7 @@ class System:
         """Positions x [N, 3], with nodes in grips on their paths at that time if it `follows` these."""
         if not self.follows:
             return x
-        return grips.held_at(self.model, x[:, None], grips.along(self.model, self.inputs[1], time, 1)[0])[:, 0]
+        return grips.held_at(self.model, x[:, None], grips.levels_at(self.model, self.inputs[1], time, 1))[:, 0]
 
     def force(self, x: np.ndarray, angles: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Total force [N, 3] and the angles continued from the given ones [H]."""
