@@ -85,7 +85,7 @@ class Batch:
             raise InputError("there is no such device", field="device", value=device, allowed=known) from None
         every = [*(n for n in among if get(n).strengths or n in model.effects), *model.effects]
         self.model = model
-        self.gripped = grips.moving(model, drive) and supports is None and bool(np.any(model.free))
+        self.gripped = grips.moving(model, drive) and supports is None
         with COMPILING:
             self.program = compose(tuple(dict.fromkeys(every)), bool(among), self.gripped)
         self.worlds = state.worlds

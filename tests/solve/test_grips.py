@@ -239,6 +239,20 @@ def test_a_grip_that_stands_changes_nothing(panels):
         assert run.grip_wrenches is None
 
 
+@pytest.mark.parametrize("panels", ["elastic", "rigid"])
+def test_a_device_that_a_grip_holds_altogether_moves_with_it(panels):
+    sheet = Sheet(strip(list(LENGTHS), width=0.02), thickness=1e-3, material="pdms", panels=panels)
+    sheet.crease(stiffness=STIFFNESS).gravity().grip("base", panels=[0, 1], direction=(0, 0, 1))
+    model, parameters = sheet.build()
+    run = simulate(model, parameters, Drive(grips={"base": sine("1 mm", "10 Hz")}), duration=0.1, rate=400)
+    lift, _, pull = sine_path(1e-3, 10.0)(run.times)
+    moved = run.x - run.x[0]
+    np.testing.assert_allclose(moved, lift[:, None, None, None] * np.broadcast_to([0, 0, 1], moved.shape), atol=1e-12)
+    weight = parameters["inertia", "mass"].sum() * (G + pull)
+    np.testing.assert_allclose(run.grip_load("base")[:, 0], weight, atol=1e-9)
+    assert run.energy_error < 1e-2
+
+
 def test_motion_goes_on_in_its_grip_from_a_state():
     model, parameters = flap("elastic", damping=2e-3)
     drive = Drive(grips={"base": sine("1 mm", "20 Hz")})

@@ -372,7 +372,7 @@ def _simulated(
     applied = distorted(model, parameters, drive, drive_end)
     refuse_start_outside_tables(model, parameters, applied, state.x, first * step)
     gripped = check_start(model, applied, state, first * step, drive_end)
-    tree = Topology(model, gripped) if model.panels == "rigid" and np.any(model.free) else None
+    tree = Topology(model, gripped) if model.panels == "rigid" and (gripped or np.any(model.free)) else None
     if implicit:
         batch = Implicit(
             model,

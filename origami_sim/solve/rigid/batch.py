@@ -348,12 +348,13 @@ def batch_of(
 ) -> Batch:
     """A batch of worlds of whichever kind the model's panels ask for.
 
-    Rigid panels that are held everywhere do not move by themselves, but may be carried along a path. `tolerance`,
+    Rigid panels that are held everywhere move by grips alone, but may also be carried along a path. `tolerance`,
     `tree` and `implicit` are of rigid panels, see `RigidBatch`; the rest is as for `Batch`.
     """
     if model.panels != "rigid":
         return Batch(model, parameters, drive, state, among=among, **options)
-    if not np.any(model.free):
+    led = options.get("supports") is not None or not grips.moving(model, drive)
+    if led and not np.any(model.free):
         unit = parameters.copy()
         unit.replace("inertia", "mass", np.ones_like(parameters["inertia", "mass"]))
         return Batch(model, unit, drive, state, among=among, **options)
