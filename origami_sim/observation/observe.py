@@ -14,9 +14,9 @@ from origami_sim.model.distort import distorted
 from origami_sim.observation.grips import grip_of, of_grip, refuse_moving
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.grips import levels_at, moving
+from origami_sim.solve.grips import levels_at, moving, standing
 from origami_sim.solve.motion.dynamics import Trajectory
-from origami_sim.solve.motion.gripped import exerted_at_rest
+from origami_sim.solve.motion.gripped import exerted
 from origami_sim.solve.rigid.reactions import held_nodes, support_of_all
 from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.statics.equilibria import Equilibrium, equilibrium
@@ -359,10 +359,10 @@ def grip_wrench(poses: Poses, channel: Channel) -> np.ndarray:
     model, grip = poses.model, grip_of(poses.model, channel)
     if poses.state is None or poses.drive is None:
         raise InputError("a force needs states and a drive", field=f"channels.{channel.name}")
-    x, levels = poses.state.x, levels_at(model, poses.drive, 0.0, poses.state.worlds)
+    motion = standing(levels_at(model, poses.drive, 0.0, poses.state.worlds))
     force = Batch(model, poses.parameters, poses.drive, poses.state).total_force(0.0)
     tree = Topology(model, moving(model, poses.drive)) if model.panels == "rigid" else None
-    return exerted_at_rest(model, tree, x, levels, force)[grip]
+    return exerted(model, poses.state.x, force, motion, tree=tree)[grip]
 
 
 def panel_angle(model: Model, x: np.ndarray, panel: int) -> np.ndarray:

@@ -94,6 +94,11 @@ def motion_at(model: Model, drive: Drive, time: float, worlds: int) -> np.ndarra
     return out
 
 
+def standing(levels: np.ndarray) -> np.ndarray:
+    """The motion [3, G, W] of grips that stand at levels [G, W]."""
+    return np.stack([levels, np.zeros_like(levels), np.zeros_like(levels)])
+
+
 def levels_among(model: Model, drive: Drive, values: np.ndarray) -> np.ndarray:
     """Levels [G, W] among the values [channels, W] of a drive; 0 of grips that it does not move."""
     rows, known = np.zeros((len(model.grip_screws), values.shape[1])), list(drive.signals)

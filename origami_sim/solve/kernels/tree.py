@@ -114,11 +114,11 @@ class Tree:
     gram: int  # [R, R], or [m, m] if there are more constraints than rates
     pull: int  # [R] constraint forces
     found: int  # [m] accelerations by them
-    aim: (
-        int  # [R, 3] how far, how fast and how much faster grips have moved what loops close to, and the root, along it
-    )
-    wrench: int  # [6] force and moment about O of all supports, where there are grips
-    closing: int  # [m] what loops add to the momenta of the coordinates
+    # [R, 3] how far, how fast and how much faster grips have moved what loops close to, and the root, along it
+    aim: int
+    # where grips move: force and moment about O of all supports, what loops add to the momenta of the coordinates
+    wrench: int  # [6]
+    closing: int  # [m]
 
 
 PARTS = tuple(

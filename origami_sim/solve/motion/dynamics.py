@@ -33,7 +33,7 @@ from origami_sim.solve.oversights import (
     starts_flat,
 )
 from origami_sim.solve.rigid.batch import TOLERANCE as RIGID
-from origami_sim.solve.rigid.batch import batch_of
+from origami_sim.solve.rigid.batch import RigidBatch, batch_of
 from origami_sim.solve.rigid.damping import overdamped
 from origami_sim.solve.rigid.topology import Topology
 from origami_sim.solve.skin import PRESSED, too_deep
@@ -398,13 +398,17 @@ def _simulated(
     watch, said = watch_of(model, parameters, state, reference=rests, device=device)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     record: list[tuple[State, Evaluation]] = []
-    mass, pulls = node_mass(model, parameters), []
+    mass, pulls = node_mass(model, parameters) if gripped and tree is None else None, []
     began = clock.perf_counter()
     for i in range(frames + 1):
         batch.advance(substeps if i else 0, step, speed_limit)  # no steps: only the first force evaluation
         record.append((batch.state(), batch.evaluate(batch.step * step)))
         if gripped:
-            pulls.append(exerted(batch, applied, mass, *record[-1], batch.step * step))
+            now, laws = record[-1]
+            force = sum((laws.forces[n] for n in model.laws), np.zeros_like(now.x))
+            motion = grips.motion_at(model, applied, batch.step * step, now.worlds)
+            borne = batch.supporting() if isinstance(batch, RigidBatch) else None
+            pulls.append(exerted(model, now.x, force, motion, mass=mass, tree=tree, borne=borne))
         if i == 0 and rests and "ground" in model.laws:
             refuse_start_inside_the_ground(model, parameters, record[0][0].x, record[0][1].energies["ground"])
         if watch is not None:

@@ -6,9 +6,7 @@ from origami_sim.drive import Drive
 from origami_sim.errors import InputError
 from origami_sim.model import Model, State
 from origami_sim.solve import grips
-from origami_sim.solve.batch import Batch, Evaluation
-from origami_sim.solve.rigid.batch import RigidBatch
-from origami_sim.solve.rigid.shares import shared
+from origami_sim.solve.rigid.shares import shared, supporting
 from origami_sim.solve.rigid.topology import Topology
 
 
@@ -36,30 +34,42 @@ def check_start(model: Model, drive: Drive, state: State, begin: float, end: flo
     return True
 
 
-def exerted(batch: Batch, drive: Drive, mass: np.ndarray, state: State, now: Evaluation, time: float) -> np.ndarray:
-    """Force [N] and moment about its pole [N m] of each grip in a frame of a motion [G, W, 6]."""
-    model = batch.model
-    motion = grips.motion_at(model, drive, time, state.worlds)
-    if isinstance(batch, RigidBatch):
-        wrench, loops = batch.supporting()
-        return shared(model, batch.tree_of, state.x, motion[0], wrench, loops)
-    force = sum((now.forces[n] for n in model.laws), np.zeros_like(state.x))
-    return grips.wrenches(model, mass, state.x, force, motion)
+def exerted(
+    model: Model,
+    x: np.ndarray,
+    force: np.ndarray,
+    motion: np.ndarray,
+    *,
+    mass: np.ndarray | None = None,
+    tree: Topology | None = None,
+    borne: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
+    """Force [N] and moment about its pole [N m] of each grip [G, W, 6].
+
+    Args:
+        x: [N, W, 3] positions [m]. force: [N, W, 3] of all laws [N].
+        motion: levels, rates and accelerations [3, G, W] of the grips. mass: [N, 1 or W] of the nodes [kg] of bars;
+            None: at rest.
+        tree: of rigid panels. borne: what their supports and loops bear, see `RigidBatch.supporting`; None: at rest.
+    """
+    if tree is None:
+        still = np.zeros((len(x), 1))
+        return grips.wrenches(model, still if mass is None else mass, x, force, motion)
+    return shared(model, tree, x, motion[0], *(supporting(tree, x, force) if borne is None else borne))
 
 
 def exerted_at_rest(
-    model: Model, tree: Topology | None, x: np.ndarray, levels: np.ndarray, force: np.ndarray
-) -> np.ndarray:
-    """The same in equilibria [G, W, 6], at positions x [N, W, 3] with forces of all laws [N, W, 3] and levels [G, W].
+    model: Model, drive: Drive, times: np.ndarray, x: np.ndarray, force: np.ndarray, tree: Topology | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of equilibria at times [F], and the work [J] of all grips since the first: [F, G, W, 6] and [F, W].
 
     Args:
-        tree: of rigid panels.
+        x: [F, N, W, 3] positions [m]. force: [F, N, W, 3] of all laws [N]. tree: of rigid panels.
     """
-    if tree is None:
-        still = np.stack([levels, np.zeros_like(levels), np.zeros_like(levels)])
-        return grips.wrenches(model, np.zeros((len(x), 1)), x, force, still)
-    wrench = -np.concatenate([force.sum(axis=0), np.cross(x, force).sum(axis=0)], axis=1)
-    return shared(model, tree, x, levels, wrench, -np.einsum("mnwa,nwa->mw", tree.rates(x), force))
+    levels = grips.levels_over(model, drive, times, x.shape[2])
+    frames = zip(x, force, levels, strict=True)
+    out = np.stack([exerted(model, a, f, grips.standing(at), tree=tree) for a, f, at in frames])
+    return out, grips.work(levels, grips.on_path(model.grip_screws[:, None], out))
 
 
 def tears(model: Model, drive: Drive, times: np.ndarray, x: np.ndarray) -> dict[int, tuple[float, int, str]]:

@@ -47,10 +47,8 @@ def frames(path: "Path") -> Trajectory:
         signals[n] = s
     pulls = None
     if grips.moving(model, drive):
-        at = grips.levels_over(model, drive, path.factor, 1)
         total = sum(forces.values(), np.zeros_like(x))
-        pulls = np.stack([exerted_at_rest(model, None, *a) for a in zip(x, at, total, strict=True)])
-        work[grips.WORK] = grips.work(at, grips.on_path(model.grip_screws[:, None], pulls))
+        pulls, work[grips.WORK] = exerted_at_rest(model, drive, path.factor, x, total)
     contact = [n for n in model.laws if get(n).family in CONTACTS]
     return Trajectory(
         model=model,

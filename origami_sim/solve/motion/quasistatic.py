@@ -425,10 +425,8 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
             work[n][:] = 0.0
     pulls = None
     if march.search.gripped:
-        tree, by = getattr(march.search, "tree", None), grips.levels_over(model, march.drive, times, worlds)
-        total = sum(forces.values(), np.zeros_like(x))
-        pulls = np.stack([exerted_at_rest(model, tree, *a) for a in zip(x, by, total, strict=True)])
-        work[grips.WORK] = grips.work(by, grips.on_path(model.grip_screws[:, None], pulls))
+        tree, total = getattr(march.search, "tree", None), sum(forces.values(), np.zeros_like(x))
+        pulls, work[grips.WORK] = exerted_at_rest(model, march.drive, times, x, total, tree)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     zero = np.zeros_like(x)
     out = QuasiStatic(

@@ -159,7 +159,8 @@ class RigidBatch(Batch):
             },
             **{"angles0": tree.hinges, "memory0": tree.memories, "feet0": 3 * tree.feet_count},
             **{"heavy": tree.bodies, "factor": rates**2, "gram": min(tree.rows, rates) ** 2},
-            **{"pull": tree.rows, "found": rates, "aim": 3 * tree.rows, "wrench": 6, "closing": rates},
+            **{"pull": tree.rows, "found": rates, "aim": 3 * tree.rows},
+            **{"wrench": 6 * self.gripped, "closing": rates * self.gripped},
         }
         columns, place = [], 0
         for name in PARTS:

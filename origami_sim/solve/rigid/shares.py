@@ -49,6 +49,12 @@ def of_grips(model: Model, tree: Topology) -> tuple[int, np.ndarray]:
     return (int(mine[0]) if len(mine) else -1), rows.astype(np.int32)
 
 
+def supporting(tree: Topology, x: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What `shared` is to share at rest: of all supports [W, 6] and of loops [m, W], against forces [N, W, 3]."""
+    wrench = -np.concatenate([force.sum(axis=0), np.cross(x, force).sum(axis=0)], axis=1)
+    return wrench, -np.einsum("mnwa,nwa->mw", tree.rates(x), force)
+
+
 def shared(
     model: Model, tree: Topology, x: np.ndarray, levels: np.ndarray, wrench: np.ndarray, loops: np.ndarray
 ) -> np.ndarray:
