@@ -14,7 +14,7 @@ from origami_sim.model.motions import velocity
 from origami_sim.solve import grips
 from origami_sim.solve.batch import _FIRST, Batch
 from origami_sim.solve.kernels.tree import PARTS, POSE, Tree
-from origami_sim.solve.rigid.shares import closing, of_grips
+from origami_sim.solve.rigid.shares import closing
 from origami_sim.solve.rigid.tableaus import EXPLICIT, additive
 from origami_sim.solve.rigid.topology import Topology, check_inertia
 
@@ -65,9 +65,7 @@ class RigidBatch(Batch):
         implicit: bool = False,
         **options,
     ):
-        gripped = grips.moving(model, drive)
-        self.tree_of = tree or Topology(model, gripped)
-        self._gripped = of_grips(model, self.tree_of) if gripped else None
+        self.tree_of = tree or Topology(model, grips.moving(model, drive))
         self.implicit = implicit
         if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
@@ -174,8 +172,8 @@ class RigidBatch(Batch):
         data[:, :place] = np.concatenate(columns, axis=1)
         tree.data = constant(data.ravel(), wp.float64)
         self.size = float(np.ptp(model.position, axis=0).max(initial=0.0)) or 1.0
-        if self._gripped is not None:
-            clamp, (root, rows) = self._clamps[0], self._gripped
+        if self.gripped:
+            clamp, (root, rows) = self._clamps[0], t.in_grips
             clamp.root, clamp.rows = root, constant(rows, wp.int32)
             self._from = state, origin, axis, pivot
         return tree
@@ -187,7 +185,7 @@ class RigidBatch(Batch):
         at once, those after the blow: of all motions that the grips allow, the one nearest by mass (Gauss's principle).
         """
         state, origin, axis, pivot = self._from
-        root, rows = self._gripped or (-1, np.zeros(0, int))
+        root, rows = self.tree_of.in_grips
         motion = grips.motion_at(self.model, self._drive, time, self.worlds)
         self._clamps[0].begun = wp.array(motion[0], dtype=wp.float64, device=self.device)
         t, x, corners = self.tree_of, state.x, len(state.x) - len(self.model.carriers)
@@ -283,7 +281,7 @@ class RigidBatch(Batch):
 
     def _run(self, steps: int, dt: float, speed_limit: float, every: int, film, angles, carried, notes=()):
         fixed = self.tolerance == 0.0
-        if self._fresh and self._gripped is not None:
+        if self._fresh and self.gripped:
             self._begin_in_grips(max(self.step, 0) * dt)
         self._launch(
             "rigid",

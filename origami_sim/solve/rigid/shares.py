@@ -1,4 +1,4 @@
-"""Grips that hold rigid panels: which of them the tree has to follow, and what force each exerts.
+"""What grips on rigid panels exert, each of them.
 
 Loops to the ground are redundant: a panel is held at more nodes than it has motions. What each grip exerts as a whole
 is determined all the same, unless the panels could be pressed or twisted between grips without moving: such components
@@ -7,7 +7,6 @@ depend on how panels deform, and are not a number.
 
 import numpy as np
 
-from origami_sim.errors import InputError
 from origami_sim.model import Model
 from origami_sim.solve.grips import poles
 from origami_sim.solve.rigid.topology import REDUNDANT, Topology
@@ -29,26 +28,6 @@ def closing(tree: Topology, x: np.ndarray) -> np.ndarray:
     return tree.closures(x, np.zeros((count, 1)))[1][:, :, 0].T
 
 
-def of_grips(model: Model, tree: Topology) -> tuple[int, np.ndarray]:
-    """The grip of the root, -1 where it stands; and that of each constraint [R], -2 between panels.
-
-    Raises:
-        InputError: a panel that a grip holds only in part, or beside a support that stands still.
-    """
-    held = np.any(model.free[tree.root_nodes] == 0.0, axis=1)
-    mine = np.unique(model.grips[tree.root_nodes[held]])
-    if len(mine) > 1 or (len(mine) and mine[0] >= 0 and len(tree.turns)):
-        nodes = tree.root_nodes[held]
-        raise InputError(
-            "a rigid panel in a grip is held by it alone, and as a whole",
-            field="grip",
-            value=f"nodes {nodes.tolist()}",
-            allowed="Sheet.grip(name, panels=[...]), or panels='elastic'",
-        )
-    rows = np.where(tree.row_body[:, 1] >= 0, -2, model.grips[tree.row_node]) if len(tree.row_node) else np.zeros(0)
-    return (int(mine[0]) if len(mine) else -1), rows.astype(np.int32)
-
-
 def supporting(tree: Topology, x: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What `shared` is to share at rest: of all supports [W, 6] and of loops [m, W], against forces [N, W, 3]."""
     wrench = -np.concatenate([force.sum(axis=0), np.cross(x, force).sum(axis=0)], axis=1)
@@ -64,7 +43,7 @@ def shared(
         x: [N, W, 3] positions. levels: [G, W]. wrench: [W, 6] force and moment about the origin of all supports.
         loops: [m, W] what loops add to the momenta of the coordinates.
     """
-    root, rows = of_grips(model, tree)
+    root, rows = tree.in_grips
     at = poles(model, levels)
     out = np.zeros((*at.shape[:2], 6))
     ground = np.flatnonzero(rows > -2)

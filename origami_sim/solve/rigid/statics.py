@@ -7,7 +7,6 @@ from origami_sim.model import Model, Parameters, State, dihedral_angles
 from origami_sim.model.motions import carried
 from origami_sim.solve import grips
 from origami_sim.solve.batch import Batch
-from origami_sim.solve.rigid.shares import of_grips
 from origami_sim.solve.rigid.topology import REDUNDANT, Topology
 from origami_sim.solve.skin import clear_share
 
@@ -36,8 +35,6 @@ class RigidSystem:
         self.model, self.parameters, self.state, self._drive = model, parameters, state, drive
         self._gripped = grips.moving(model, drive)
         self.tree = t = Topology(model, self._gripped)
-        if self._gripped:
-            of_grips(model, t)
         self.x, self.folds = state.x[:, 0], state.angles[: len(model.creases), 0].copy()
         self.size = float(np.ptp(self.x, axis=0).max(initial=0.0)) or 1.0
         self.count = len(t.turns) + len(t.joints)
@@ -198,7 +195,7 @@ def led(
 
     The root goes along with its grip, and all panels with it, before loops are closed. None if they cannot be.
     """
-    root, _ = of_grips(model, tree)
+    root, _ = tree.in_grips
     aims = grips.held_at(model, x[:, None], levels, reference)[:, 0]
     ahead = levels - grips.nearest_levels(model, x[:, None], reference)
     if root >= 0:

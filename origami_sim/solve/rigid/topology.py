@@ -1,5 +1,7 @@
 """The tree of rigid panels: how the root may move, which bodies joints carry, and which loops are to be closed."""
 
+from functools import cached_property
+
 import numpy as np
 
 from origami_sim.errors import InputError
@@ -57,6 +59,28 @@ class Topology:
         self.floating = not np.any(model.free[self.root_nodes] == 0.0)
         self.turns, self.shifts, self.pivots, self.follows = self._root(model)
         self.row_node, self.row_body, self.row_axis = self._loops(model, arm, body, gripped)
+        self._free, self._grips = model.free, model.grips
+        if gripped:
+            _ = self.in_grips  # refuses what does not fit
+
+    @cached_property
+    def in_grips(self) -> tuple[int, np.ndarray]:
+        """The grip of the root, -1 where it stands; that of each constraint [R], -1 to the ground, -2 between panels.
+
+        Raises:
+            InputError: a panel that a grip holds only in part, or beside a support that stands still.
+        """
+        nodes = self.root_nodes[np.any(self._free[self.root_nodes] == 0.0, axis=1)]
+        mine = np.unique(self._grips[nodes])
+        if len(mine) > 1 or (len(mine) and mine[0] >= 0 and len(self.turns)):
+            raise InputError(
+                "a rigid panel in a grip is held by it alone, and as a whole",
+                field="grip",
+                value=f"nodes {nodes.tolist()}",
+                allowed="Sheet.grip(name, panels=[...]), or panels='elastic'",
+            )
+        rows = np.where(self.row_body[:, 1] >= 0, -2, self._grips[self.row_node]) if len(self.row_node) else np.zeros(0)
+        return (int(mine[0]) if len(mine) else -1), rows.astype(np.int32)
 
     def beyond(self, body: int) -> np.ndarray:
         """A body and all that it carries."""

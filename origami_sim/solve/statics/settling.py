@@ -17,7 +17,6 @@ from origami_sim.effects import get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State
 from origami_sim.solve import grips
-from origami_sim.solve.rigid.shares import of_grips
 from origami_sim.solve.rigid.statics import STEP as TURN
 from origami_sim.solve.rigid.statics import closed, led, loops_kept
 from origami_sim.solve.rigid.topology import Topology
@@ -424,8 +423,6 @@ class SettlingPanels(Settling):
     def __init__(self, worlds, drive: Drive, state: State, **options):
         super().__init__(worlds, drive, state, **options)
         self.tree = t = Topology(self.model, self.gripped)
-        if self.gripped:
-            of_grips(self.model, t)
         self.count = len(t.turns) + len(t.joints)
         if not self.count:
             raise InputError("statics needs a panel that is free to move", field="free", value=0)
