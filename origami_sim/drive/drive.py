@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -143,7 +144,7 @@ class Signal:
         at = np.asarray(t, float)
         at = at[..., 0] if at.ndim and at.shape[-1] == 1 and self.values.ndim == 2 else at
         if self.slopes is not None:
-            out = CubicHermiteSpline(self.times, self.values, self.slopes)(np.clip(at, *self.times[[0, -1]]), order)
+            out = self._cubics(np.clip(at, *self.times[[0, -1]]), order)
         elif order == 1:
             shape = (-1, *(1,) * (self.values.ndim - 1))
             i = np.clip(np.searchsorted(self.times, at), 1, len(self.times) - 1)
@@ -154,6 +155,12 @@ class Signal:
             return out
         inside = (at >= self.times[0]) & (at <= self.times[-1])
         return np.where(inside.reshape((*at.shape, *(1,) * (out.ndim - at.ndim))), out, 0.0)
+
+    @cached_property
+    def _cubics(self) -> CubicHermiteSpline:
+        """The cubics by which slopes join the samples; solvers ask for them at every step."""
+        assert self.times is not None and self.values is not None and self.slopes is not None
+        return CubicHermiteSpline(self.times, self.values, self.slopes)
 
     def derivatives(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Its first and second derivative at times t [s], shaped like the signal; without the jumps at `kinks`."""

@@ -1,5 +1,6 @@
 """A drive as it is seen from several starts."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,20 +38,20 @@ def shifted(
         each = s.each()
         own = np.broadcast_to(starts, (len(each), count)) if starts.ndim == 1 else starts
         each *= len(own) // len(each)
-        columns = [np.broadcast_to(one(local + t0), local.shape) for one, t in zip(each, own, strict=True) for t0 in t]
-        values = np.stack(columns, axis=1)
-        times = (1, worlds * count // values.shape[1])
-        changed[name] = series(local, np.tile(values, times))
-        if name.partition("_")[0] in PATHS and not len(s.kinks):  # smooth, and exactly so
-            rates = [
-                np.broadcast_to(one.derivatives(local + t0)[0], local.shape)
-                for one, t in zip(each, own, strict=True)
-                for t0 in t
-            ]
-            changed[name] = replace(changed[name], slopes=np.tile(np.stack(rates, axis=1), times))
+        seen = [(one, local + t0) for one, t in zip(each, own, strict=True) for t0 in t]
+        changed[name] = series(local, _columns([one(t) for one, t in seen], local, worlds * count))
+        if name.partition("_")[0] in PATHS and not len(s.kinks):  # and exactly so
+            rates = _columns([one.derivatives(t)[0] for one, t in seen], local, worlds * count)
+            changed[name] = replace(changed[name], slopes=rates)
     age = np.ravel(drive.signals["origin"](0.0))
     ages = (np.broadcast_to(age, worlds)[:, None] + starts).ravel()
     return drive.replace(**changed, origin=ages)
+
+
+def _columns(each: Sequence[np.ndarray], local: np.ndarray, rollouts: int) -> np.ndarray:
+    """Values [n, rollouts] at local times (n,) of what is given for each rollout, or for those of all worlds alike."""
+    columns = np.stack([np.broadcast_to(one, local.shape) for one in each], axis=1)
+    return np.tile(columns, (1, rollouts // len(each)))
 
 
 def _knots(times: np.ndarray, starts: np.ndarray, duration: float) -> np.ndarray:
