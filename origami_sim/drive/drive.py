@@ -172,13 +172,23 @@ class Signal:
         return np.asarray(out[0], float), np.asarray(out[1], float)
 
     @property
+    def smooth(self) -> bool:
+        """Whether nothing but its ends makes its rate jump: a wave, or samples that cubics join."""
+        return self.slopes is not None or not len(self.kinks)
+
+    @property
     def kinks(self) -> np.ndarray:
-        """Instants (k,) at which its rate jumps [s]: the samples of a series that is linear in between."""
-        if self.times is None or self.values is None or self.slopes is not None or not np.any(self.scale):
+        """Instants (k,) at which its rate jumps [s]: samples that lines join, and ends at which cubics do not rest."""
+        if self.times is None or self.values is None or not np.any(self.scale):
             return np.zeros(0)
-        rates = np.diff(self.values, axis=0) / np.diff(self.times).reshape(-1, *(1,) * (self.values.ndim - 1))
-        jumps = np.abs(np.diff(rates, axis=0, prepend=0.0, append=0.0)).reshape(len(self.times), -1).max(axis=1)
-        return self.times[jumps > 1e-12 * jumps.max(initial=0.0)]
+        if self.slopes is None:
+            spans = np.diff(self.times).reshape(-1, *(1,) * (self.values.ndim - 1))
+            jumps = np.diff(np.diff(self.values, axis=0) / spans, axis=0, prepend=0.0, append=0.0)
+            most = np.abs(jumps).max(initial=0.0)
+        else:
+            jumps, most = self.slopes.copy(), np.abs(self.slopes).max(initial=0.0)
+            jumps[1:-1] = 0.0
+        return self.times[np.abs(jumps).reshape(len(self.times), -1).max(axis=1) > 1e-12 * most]
 
     def seen_from(self, start: float) -> "Signal":
         """The same signal on a clock that shows 0 at `start` [s] of this one."""

@@ -40,7 +40,7 @@ def shifted(
         each *= len(own) // len(each)
         seen = [(one, local + t0) for one, t in zip(each, own, strict=True) for t0 in t]
         changed[name] = series(local, _columns([one(t) for one, t in seen], local, worlds * count))
-        if name.partition("_")[0] in PATHS and not len(s.kinks):  # and exactly so
+        if name.partition("_")[0] in PATHS and s.smooth:  # and exactly so
             rates = _columns([one.derivatives(t)[0] for one, t in seen], local, worlds * count)
             changed[name] = replace(changed[name], slopes=rates)
     age = np.ravel(drive.signals["origin"](0.0))

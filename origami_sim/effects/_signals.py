@@ -28,7 +28,7 @@ def sampled(
     if not (np.any(when) and moving):
         return drive
     times, values = drive.series(moving, duration)
-    smooth = [c.partition("_")[0] in PATHS and not len(drive[c].kinks) for c in moving]
+    smooth = [c.partition("_")[0] in PATHS and drive[c].smooth for c in moving]
     new = [series(times, change(times, v), smooth=s) for v, s in zip(values, smooth, strict=True)]
     return drive.replace(**dict(zip(moving, new, strict=True)))
 

@@ -5,7 +5,19 @@ import pytest
 from effects.kit import slope
 from solve.test_grips import chain, flap
 
-from origami_sim import Drive, Model, Parameters, Sheet, continuation, equilibrium, quasistatic, ramp, simulate, strip
+from origami_sim import (
+    Drive,
+    Model,
+    Parameters,
+    Sheet,
+    continuation,
+    equilibrium,
+    quasistatic,
+    ramp,
+    series,
+    simulate,
+    strip,
+)
 from origami_sim.errors import InputError
 from origami_sim.model import State
 
@@ -214,6 +226,9 @@ def test_rigid_panels_follow_no_jump_of_a_velocity():
     model, parameters = flap("rigid")
     with pytest.raises(InputError, match=r"jumps at t = 0.05 s, which no rigid panel can follow"):
         simulate(model, parameters, Drive(grips={"base": ramp("1 mm", "50 ms")}), duration=0.1)
+    late = series([0.03, 0.06, 0.1], [0.0, 1e-3, 0.0], smooth=True)  # a cubic spline does not begin at rest
+    with pytest.raises(InputError, match=r"jumps at t = 0.03 s, which no rigid panel can follow"):
+        simulate(model, parameters, Drive(grips={"base": late}), duration=0.1)
     drive, errors = Drive(grips={"base": ramp("1 mm", "50 ms", smooth=True)}), []
     for tolerance in (1e-8, 1e-12):
         errors.append(simulate(model, parameters, drive, duration=0.1, tolerance=tolerance).energy_error[0])
