@@ -1,6 +1,6 @@
 """From a crease pattern to a Model: thickness, materials, creases, magnets, feet and supports."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -351,25 +351,6 @@ class Sheet(Grounds, Electrodes, Thick, Creases, Grips):
                 demagnetising_2=across,
                 **given,
             )
-        return self
-
-    @statement()
-    def fix(
-        self, *, panels: Iterable[int] | None = None, nodes: Iterable[int] | None = None, axes: str = "xyz"
-    ) -> "Sheet":
-        """Holds panels or nodes along the named axes; lists may be empty.
-
-        Raises:
-            InputError: no such panel, node or axis; neither panels nor nodes.
-        """
-        if panels is None and nodes is None:
-            raise InputError("nothing is held", field="panels, nodes", allowed="fix(panels=[0]), fix(nodes=[0, 1])")
-        panels, nodes = ([] if v is None else list(v) if isinstance(v, Iterable) else [v] for v in (panels, nodes))
-        index = np.array([*self._index("node", [*nodes]), *(n for p in panels for n in self._nodes_of(p))], int)
-        for a in axes:
-            if a not in "xyz":
-                raise InputError("there is no such axis", field="axes", value=a, allowed="x, y, z")
-            self._free[index, "xyz".index(a)] = 0.0
         return self
 
     @statement()

@@ -178,6 +178,14 @@ def sheet(panels="elastic"):
         (lambda s: s.grip("a", panels=[0]), "moves along a direction or about an axis"),
         (lambda s: s.grip("a", panels=[0], direction=(0, 0, 1), axis=(0, 0, 1)), "along a direction or about an axis"),
         (lambda s: s.grip("a", panels=[0], direction=(0, 0, 0)), "has three components"),
+        (lambda s: s.grip("a", panels=[0], direction=(0, 1)), "direction of a grip has three components"),
+        (lambda s: s.grip("a", panels=[0], direction=(0, 0, 1), point=(1, 0, 0)), "a point is one on an axis"),
+        (lambda s: s.grip("a", panels=[0, 4], direction=(0, 0, 1)), "there is no such panel"),
+        (lambda s: s.grip("a", nodes=[99], direction=(0, 0, 1)), "there is no such node"),
+        (lambda s: s.grip("a", nodes=[0], direction=(0, 0, 1), axes="zu"), "there is no such axis"),
+        (lambda s: s.fix(panels=[0]).grip("a", panels=[1], direction=(0, 0, 1)), "what a grip moves is fixed"),
+        (lambda s: s.grip("a", panels=[1], direction=(0, 0, 1)).fix(panels=[0]), "what a grip moves is fixed"),
+        (lambda s: s.fix(panels=[0]).grip("a", panels=[1], axis=(0, 1, 0)), "what a grip moves is fixed"),
         (lambda s: s.grip("a", nodes=[0], direction=(0, 0, 1), axes="xy"), "moves where it does not hold"),
         (lambda s: s.grip("a", nodes=[0], axis=(0, 0, 1), axes="x"), "moves where it does not hold"),
         (
@@ -220,6 +228,12 @@ def test_a_path_needs_its_grip_its_unit_and_a_start_on_it():
         simulate(model, parameters, duration=0.05).grip_load("base")
     with pytest.raises(InputError, match="there is no such grip"):
         simulate(model, parameters, duration=0.05).grip_load("top")
+
+
+def test_a_grip_and_a_support_share_what_the_grip_does_not_move():
+    turned = sheet().fix(panels=[0]).grip("a", panels=[1], axis=(0, 1, 0), point=(0.01, 0, 0))  # about their crease
+    guided = sheet().fix(nodes=range(10), axes="y").grip("a", panels=[0], direction=(1, 0, 1), axes="xz")
+    assert all(len(s.build()[0].grip_screws) for s in (turned, guided))
 
 
 def test_rigid_panels_follow_no_jump_of_a_velocity():
