@@ -8,7 +8,7 @@ from effects.kit import slope
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from origami_sim import Drive, Model, Parameters, Sheet, series, simulate, sine, strip
+from origami_sim import Drive, Model, Parameters, Sheet, ramp, series, simulate, sine, strip
 from origami_sim.model import State
 from origami_sim.model.bodies import body_of
 
@@ -261,6 +261,14 @@ def test_motion_goes_on_in_its_grip_from_a_state():
     then = simulate(model, parameters, drive, duration=0.05, rate=200, state=first.state)
     np.testing.assert_array_equal(then.x[-1], whole.x[-1])
     np.testing.assert_allclose(then.work["grips"][-1], whole.work["grips"][-1], rtol=1e-12)
+
+
+def test_loops_of_rigid_panels_go_on_from_a_state_as_fast_as_they_were():
+    model, parameters = chain("rigid")
+    drive = Drive(grips={"left": ramp("1 mm", "0.1 s", smooth=True)})
+    first = simulate(model, parameters, drive, duration=0.05, rate=200)
+    then = simulate(model, parameters, drive, duration=0.01, rate=200, state=first.state)
+    np.testing.assert_allclose(then.v[0], first.v[-1], atol=1e-13)
 
 
 def test_worlds_may_differ_in_their_paths():

@@ -37,6 +37,17 @@ SOFTNESS = 1e-10
 """Softness of loop constraints, relative to the mobility of their nodes: redundant ones share the load."""
 
 
+FITS = 1e-9
+"""Part of the largest velocity within which rates of the coordinates fit a state in moving grips: one from which a
+motion goes on is missed by 2e-15, one at rest in a grip that starts at once by all. Half and double tell the same."""
+
+REPEATED = 1e-13
+"""Part of the largest singular value of a blow's balance below which a row repeats others, as most of a held panel do.
+
+Those of panels of 30 mg leave 2e-17, what their masses tell is 5e-9. Half and double tell the same rows.
+"""
+
+
 class RigidBatch(Batch):
     """A batch of worlds with rigid panels, moved in reduced coordinates.
 
@@ -65,9 +76,10 @@ class RigidBatch(Batch):
         implicit: bool = False,
         **options,
     ):
-        self.tree_of = tree or Topology(model, grips.moving(model, drive))
+        gripped = grips.moving(model, drive)
+        self.tree_of = tree or Topology(model, gripped)
         self.implicit = implicit
-        if not len(self.tree_of.turns):  # the kernel leaves a root that is held as it is
+        if not len(self.tree_of.turns) and not gripped:  # the kernel leaves a root that stands as it is
             state = replace(state, v=np.where(self.tree_of.body_of[:, None, None] == 0, 0.0, state.v))
         self._eccentric = eccentric(model, parameters)
         if self._eccentric is not None:
@@ -197,14 +209,14 @@ class RigidBatch(Batch):
             own, wanted = by[:, :, w], (state.v - base)[:, w]
             u = np.linalg.lstsq(own[:, :corners].reshape(len(by), -1).T, wanted[:corners].ravel(), rcond=None)[0]
             left = np.abs(np.einsum("mna,m->na", own, u) - wanted)[:corners].max(initial=0.0)
-            if left > 1e-9 * max(np.abs(base[:, w]).max(), np.abs(state.v[:, w]).max()):
+            if left > FITS * max(np.abs(base[:, w]).max(), np.abs(state.v[:, w]).max()):
                 heavy = np.einsum("mna,n,kna->mk", own, mass[:, w], own)
                 right = np.einsum("mna,n,na->m", own, mass[:, w], wanted)
                 slope = closing(t, x[:, w])
                 nodes = zip(rows.tolist(), t.row_node.tolist(), t.row_axis, strict=True)
                 goal = [a @ ((going[g][n, w] if g >= 0 else 0.0) - base[n, w]) if g > -2 else 0.0 for g, n, a in nodes]
                 whole = np.block([[heavy, slope.T], [slope, np.zeros((len(slope),) * 2)]])
-                u = np.linalg.lstsq(whole, np.append(right, goal), rcond=1e-13)[0][: len(by)]
+                u = np.linalg.lstsq(whole, np.append(right, goal), rcond=REPEATED)[0][: len(by)]
             data[w, self._tree.u : self._tree.u + len(u)] = u
         self._tree.data.assign(data.ravel())
 
