@@ -108,18 +108,22 @@ def levels_among(model: Model, drive: Drive, values: np.ndarray) -> np.ndarray:
     return rows
 
 
+def held(model: Model) -> np.ndarray:
+    """The axes [N, 3] along which grips hold nodes."""
+    return (model.grips >= 0)[:, None] & (model.free == 0.0)
+
+
 def held_at(model: Model, x: np.ndarray, levels: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:
     """Positions x [N, W, 3] with the held axes of grips where levels [G, W] have them, and all else; see `placed`."""
     if not len(model.grips):
         return x
-    held = ((model.grips >= 0)[:, None] & (model.free == 0.0))[:, None]
-    return np.where(held, placed(model, levels, reference), x)
+    return np.where(held(model)[:, None], placed(model, levels, reference), x)
 
 
 def alone(model: Model) -> int | None:
     """The grip that holds the device alone; None if there is none such (0 is a grip)."""
-    held = np.unique(model.grips[np.any(model.free == 0.0, axis=1)]) if len(model.grips) else []
-    return int(held[0]) if len(held) == 1 and held[0] >= 0 else None
+    holding = np.unique(model.grips[np.any(model.free == 0.0, axis=1)]) if len(model.grips) else []
+    return int(holding[0]) if len(holding) == 1 and holding[0] >= 0 else None
 
 
 def carried_along(

@@ -49,9 +49,8 @@ class Grips:
     row: int  # of the work
     # rigid panels
     root: int  # grip of the root, -1 where it stands
-    rows: wp.array(
-        dtype=wp.int32
-    )  # [R] grip of what closes a loop to the ground, -1 where it stands, -2 between panels
+    # [R] grip of what closes a loop to the ground, -1 where it stands, -2 between panels
+    rows: wp.array(dtype=wp.int32)
     begun: wp.array2d(dtype=scalar)  # [G, W] the path where the panels were placed
 
 
@@ -335,7 +334,7 @@ def upload(model: Model, drive: Drive, names: Sequence[str], row: int, device) -
     signals = [drive.signals.get(n) for n in names]
     series = [s if s is not None and s.times is not None else None for s in signals]
     worlds = max([1, *(s.worlds for s in signals if s is not None)])
-    numbers, columns = np.zeros((len(names), 5, worlds)), 1
+    numbers = np.zeros((len(names), 5, worlds))
     for out, s in zip(numbers, signals, strict=True):
         if s is not None:
             own = s.offset, s.amplitude, 2 * math.pi * np.asarray(s.frequency), s.phase, s.scale

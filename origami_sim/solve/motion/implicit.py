@@ -220,8 +220,7 @@ class _World:
         self._slopes: sp.csc_array | None = None
         self._factors, self._factored, self._scale = None, 0.0, 0.0
         self._past: list[tuple[float, np.ndarray]] = []
-        held = (model.free == 0.0) & (model.grips[:, None] >= 0) if len(model.grips) else model.free < 0.0
-        self._drive, self._gripped = drive, held if grips.moving(model, drive) else None
+        self._drive, self._gripped = drive, grips.held(model) if grips.moving(model, drive) else None
         self._next = START * self.first
         self.counts = Counts()
         s = state

@@ -34,7 +34,7 @@ from origami_sim.solve.oversights import (
     refuse_start_outside_tables,
 )
 from origami_sim.solve.statics.held import FOREVER
-from origami_sim.solve.statics.settling import Settling, levels, settling
+from origami_sim.solve.statics.settling import Settling, SettlingPanels, levels, settling
 from origami_sim.solve.timestep import AT_REST, TimeStep
 from origami_sim.solve.watch import Met, continued, watch_of, with_memory
 
@@ -425,7 +425,8 @@ def _filmed(model, parameters, drive, times, states: list[State], march: March, 
             work[n][:] = 0.0
     pulls = None
     if march.search.gripped:
-        tree, total = getattr(march.search, "tree", None), sum(forces.values(), np.zeros_like(x))
+        tree = march.search.tree if isinstance(march.search, SettlingPanels) else None
+        total = sum(forces.values(), np.zeros_like(x))
         pulls, work[grips.WORK] = exerted_at_rest(model, march.drive, times, x, total, tree)
     contact = [e for e in model.effects if get(e).family in ("contact", "tangent")]
     zero = np.zeros_like(x)
