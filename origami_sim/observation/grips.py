@@ -57,15 +57,16 @@ def refuse_moving(model: Model, channel: Channel) -> None:
     if "grip" in channel.attachment or channel.attachment.get("ground"):
         return
     many = channel.attachment.get("nodes", [channel.attachment.get("node")])
-    names = model.names.get("node", ())
-    nodes = [names.index(n) if isinstance(n, str) and n in names else n for n in many]
+    labels = model.names.get("node", ())
+    nodes = [labels.index(n) if isinstance(n, str) and n in labels else n for n in many]
     numbers = [n for n in nodes if isinstance(n, int) and 0 <= n < len(model.grips)]
     if model.panels == "rigid" or np.any(model.grips[numbers] >= 0):
+        names = model.names.get("grip", range(len(model.grip_screws)))
         raise InputError(
             "the force of supports that move is that of a grip",
             field=f"channels.{channel.name}",
             value=f"nodes {many}",
-            allowed="grip = " + " or ".join(f"'{n}'" for n in model.names.get("grip", ())),
+            allowed="grip = " + " or ".join(repr(n) for n in names),
         )
 
 
