@@ -43,6 +43,12 @@ UNITS = {
 PATHS = ("grip", "turn")
 """Families of channels that are paths of grips."""
 
+SMOOTH = 33
+"""Samples of a smooth ramp: cubics between them are off by 1e-6 of its way, and by 0.5 % of its largest acceleration.
+
+Half as many are off by 1e-5 and 2 %, twice as many by 5e-8 and 0.1 %.
+"""
+
 SAMPLES_PER_SECOND, SAMPLES_PER_PERIOD = 2000.0, 200
 """How finely a signal is sampled that something distorts: at least so often per second, and per period of its wave."""
 
@@ -75,9 +81,14 @@ class Signal:
     def __post_init__(self):
         if (self.times is None) != (self.values is None):
             raise InputError("a sampled signal needs both times and values", field="times")
-        for name in ("offset", "amplitude", "frequency", "phase", "scale"):
+        wave = ("offset", "amplitude", "frequency", "phase", "scale")
+        for name in wave:
             if not np.all(np.isfinite(getattr(self, name))):
                 raise InputError("a signal must be finite", field=name, value=getattr(self, name))
+        counts = {np.size(getattr(self, n)) for n in wave} - {1}
+        if len(counts) > 1:
+            value = ", ".join(map(str, sorted(counts)))
+            raise InputError("numbers of a signal are for different numbers of worlds", field="signal", value=value)
         if self.times is None or self.values is None:
             return
         times, values = np.asarray(self.times, float), np.asarray(self.values, float)
@@ -248,13 +259,13 @@ def ramp(final: Any, duration: float | str, *, start: Any = 0.0, smooth: bool = 
     """From `start` linearly to `final` within `duration` [s], then constant; SI or quantities: ramp("0.1 T", "1 s").
 
     With `smooth`, the path of a grip begins and ends at rest, without jumps of acceleration: s^3 (10 - 15 s + 6 s^2)
-    at the share s of the duration, by cubics between 33 samples.
+    at the share s of the duration, by cubics between `SMOOTH` samples.
     """
     final, start, duration = converted(final, ANY, "final"), converted(start, ANY, "start"), _seconds(duration)
     if not 0 < duration < FOREVER:
         allowed = f"above 0, below {FOREVER:g} s"
         raise InputError("a ramp needs a positive duration", field="duration", value=duration, allowed=allowed)
-    s = np.linspace(0.0, 1.0, 33 if smooth else 2)
+    s = np.linspace(0.0, 1.0, SMOOTH if smooth else 2)
     times, values = np.append(duration * s, FOREVER), np.append(s**3 * (10 - 15 * s + 6 * s**2) if smooth else s, 1.0)
     slopes = np.append(30 * (s * (1 - s)) ** 2 / duration, 0.0) if smooth else None
     signal = Signal(offset=start, times=times, values=values, scale=np.subtract(final, start), slopes=slopes)

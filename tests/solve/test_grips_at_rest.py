@@ -16,6 +16,7 @@ from origami_sim import (
     ramp,
     series,
     simulate,
+    sine,
     strip,
 )
 from origami_sim.errors import InputError
@@ -216,6 +217,8 @@ def test_a_path_needs_its_grip_its_unit_and_a_start_on_it():
         Drive(turns={"base": ramp("1 mm", "1 s")})
     with pytest.raises(InputError, match="paths go by the names"):
         Drive(grips="1 mm")
+    with pytest.raises(InputError, match="for different numbers of worlds"):
+        sine([1e-3, 2e-3], np.array([1.0, 2.0, 3.0]))
     with pytest.raises(InputError, match="only paths are smooth"):
         Drive(voltage=ramp("1 kV", "1 s", smooth=True))
     with pytest.raises(InputError, match="a grip cannot jump: it is 1 mm"):
