@@ -7,7 +7,7 @@ import tempfile
 import threading
 import time as clock
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -55,7 +55,7 @@ def run(args: Namespace) -> int:
     folder = Path(args.out or "runs/diagnose")
     if args.model:
         check_model(folder / PATCH, args.model)
-    check_folder(folder, of_ours=_earlier(folder) is not None, what="a diagnosis")
+    check_folder(folder, lambda: _earlier(folder) is not None, "a diagnosis")
     asked = read_arguments(args)
     for file in filter(None, (args.model, asked.given, asked.calibration)):
         check_model(folder / PATCH, file)
@@ -276,7 +276,7 @@ def check_model(patch: Path, model: str) -> None:
         )
 
 
-def check_folder(folder: Path, *, of_ours: bool, what: str) -> None:
+def check_folder(folder: Path, of_ours: Callable[[], bool], what: str) -> None:
     """Refuses, before anything is computed, a folder that cannot be written or that holds other things.
 
     Args:
@@ -292,7 +292,7 @@ def check_folder(folder: Path, *, of_ours: bool, what: str) -> None:
         raise InputError(fault, file=folder, field="--out", allowed=allowed) from None
     if not existing.is_dir():
         raise InputError("is a file", file=existing, field="--out", allowed=allowed)
-    if not of_ours:
+    if not of_ours():
         fault, allowed = f"is a folder with other things in it, not {what}", f"a new or empty folder, or that of {what}"
         raise InputError(fault, file=folder, field="--out", allowed=allowed)
 

@@ -27,8 +27,7 @@ DATA, PATCH, PLOT = "estimate.json", "fitted.toml", "fit.png"
 def run(args: Namespace) -> int:
     """The command; returns its exit code."""
     folder = Path(args.out or "runs/estimate")
-    there = {p.name for p in folder.iterdir()} if folder.is_dir() else set()
-    check_folder(folder, of_ours=there <= {DATA, PATCH, PLOT}, what="an estimate")
+    check_folder(folder, lambda: {p.name for p in folder.glob("*")} <= {DATA, PATCH, PLOT}, "an estimate")
     asked = read_arguments(args)
     for file in filter(None, (args.model, asked.given, asked.calibration)):
         check_model(folder / PATCH, file)

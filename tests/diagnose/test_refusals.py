@@ -226,10 +226,10 @@ def test_entities_that_the_model_lacks_are_refused():
 def test_the_start_can_be_chosen_but_not_rest_for_segments():
     chosen = {"segment": None, "panels": "auto", "motion": "auto", "thorough": False, "start_at": "fit", "limit": None}
     plain = SimpleNamespace(motion=None)
-    assert command._options(SimpleNamespace(**chosen), plain).start == "fit"  # type: ignore[arg-type]
-    assert command._options(SimpleNamespace(**chosen | {"start_at": None, "segment": 1.0}), plain).start is None  # type: ignore[arg-type]
+    assert command.options_of(SimpleNamespace(**chosen), plain).start == "fit"  # type: ignore[arg-type]
+    assert command.options_of(SimpleNamespace(**chosen | {"start_at": None, "segment": 1.0}), plain).start is None  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"starts of their own.*--start-at.*no --segment"):
-        command._options(SimpleNamespace(**chosen | {"start_at": "rest", "segment": 1.0}), plain)  # type: ignore[arg-type]
+        command.options_of(SimpleNamespace(**chosen | {"start_at": "rest", "segment": 1.0}), plain)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -260,3 +260,15 @@ def test_no_segment_starts_where_its_start_is_not_seen():
     seen = [n for n in whole if not gap.start + 4 <= n < gap.stop - 4]
     assert len(seen) < len(whole)
     assert starts(given.channels) == some == seen, "each crease is told by its own channel only"
+
+
+def test_a_drive_that_is_switched_keeps_its_instants_from_many_starts():
+    """On a grid of 0.5 ms a step of the voltage was smeared, and starts that are late were driven in another way."""
+    switched = series([0.0, 0.999999, 1.0, 2.0], [0.0, 0.0, 3000.0, 3000.0])
+    starts = np.arange(180) / 90.0 + np.array([[0.0], [1.234e-4], [7.7e-5]])
+    seen = shifted(Drive(voltage=switched), starts, 0.0333, 3).signals["voltage_0"]
+    local = np.linspace(0.0, 0.0333, 7001)
+    assert seen.times is not None and seen.values is not None
+    for k, start in enumerate(starts.ravel()):
+        wrong = np.abs(np.interp(local, seen.times, seen.values[:, k]) - switched(local + start)) > 10.0
+        assert wrong.mean() * 0.0333 < 1e-5, "seconds within which the voltage is another"
