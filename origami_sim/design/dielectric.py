@@ -228,6 +228,9 @@ class Electrodes(Masses):
         length = np.broadcast_to(np.asarray(notch, float), index.shape)
         if not np.all(positive(length)):
             raise InputError("a hinge bends along some length", field="notch", value=notch, allowed="> 0 m")
+        whole = float(np.ptp(self.mesh.vertices, axis=0).max())
+        if np.any(length > whole):
+            raise InputError("a hinge is longer than the sheet", field="notch", value=notch, allowed=f"<= {whole:g} m")
         skin, soft = material(film), material(elastomer)
         modulus = skin.modulus if film_modulus is None else film_modulus
         poisson = skin.poisson if film_poisson is None else film_poisson

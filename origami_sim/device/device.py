@@ -394,7 +394,7 @@ def _as(value: Any, default: Any, name: str, path: Path) -> Any:
         return value
     if isinstance(default, int):
         if value != round(value):
-            raise InputError("is a whole number", file=path, field=name, value=value)
+            raise InputError("must be a whole number", file=path, field=name, value=value)
         return round(value)
     return value
 

@@ -150,8 +150,8 @@ def screen(
         if any(v.status for v in mine):
             found[id(s)] = Signature(s, [], np.array([f.scale for f in s.strengths]), status=LATE)
             continue
-        if not mine:
-            continue
+        if sum(any(np.any(p) for p in v.parts) for v in mine) < 2:
+            continue  # where it can act at a single place, at all of them is the same
         size = np.median([abs(m.size) for m in mine], axis=0) * np.sign(mine[0].size)
         parts = [np.sum([m.parts[n] * (size / m.size) for m in mine], axis=0) for n in range(len(base.blocks))]
         found[id(s)] = Signature(s, parts, size)

@@ -209,9 +209,10 @@ class Parameters:
 
     def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
         if key not in self._values:
-            owned = sorted(n for o, n in self._values if o == key[0])
+            owned = sorted(n for o, n in self._values if o == (key if isinstance(key, str) else key[0]))
             allowed = ", ".join(owned) if owned else ", ".join(sorted({o for o, _ in self._values}))
-            raise InputError("there is no such parameter", field=".".join(key), allowed=allowed)
+            name = key if isinstance(key, str) else ".".join(key)
+            raise InputError("there is no such parameter", field=name, allowed=allowed)
         return self._values[key]
 
     def __iter__(self) -> Iterator[tuple[str, str]]:

@@ -53,7 +53,7 @@ def decide(p: Posterior, budgets: Callable[[Key], Budget]) -> Decision:
     classes = by_effects(p, chance)
     top = max(classes, key=lambda c: classes[c])
     lead, beside = surely(p, classes)
-    if not any(p.effects(k) >= lead for k in p.nodes):  # of what was never fitted no number could be said
+    if not any(p.told(k) >= lead for k in p.nodes):  # of what no fit tells from zero no number could be said
         lead, beside = frozenset(), []
     best = best_of(p, chance, top if beside else lead or top)
     may_be, total = credible(classes)

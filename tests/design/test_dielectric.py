@@ -132,3 +132,8 @@ def test_a_field_beyond_breakdown_is_noted_in_megavolts_per_metre(how):
     assert len(said) == 1 and "comes to 44 MV/m (12 kV over 0.273 mm)" in said[0]
     assert not any("MV/m" in n for n in [*notes("4 kV"), *notes("12 kV", electrode_width=0.0)])
     assert any("comes to 88 MV/m" in n for n in notes("12 kV", layer_thickness=136.4e-6))
+
+
+def test_a_hinge_longer_than_its_sheet_is_refused():
+    with pytest.raises(InputError, match=r"longer than the sheet.*notch.*<= 0\.05"):
+        hinge(notch=6.0)

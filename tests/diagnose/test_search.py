@@ -391,3 +391,25 @@ def test_components_of_a_vector_are_screened_alone_as_beside_it():
     assert len(found) == 3 * len(every) == 9
     assert [s.suspect.label for s in again] == [s.suspect.label for s in found]
     assert [len(s.size) for s in again] == [len(s.size) for s in found] == [2, 1, 1] * 3
+
+
+def test_an_effect_that_can_act_at_one_crease_is_no_suspect_at_all_of_them():
+    """Where one of two creases is a dielectric hinge, its permittivity at all creases is that of the hinge."""
+    sheet = Sheet(strip([0.02] * 3, 0.02), thickness="0.25 mm", material="pet", panels="rigid").fix(panels=[0])
+    sheet.crease([1], stiffness="0.1 mN m/rad", loss_time="8 ms").gravity((9.81, 0, 0))
+    sheet.electrode([0], layers=4, notch="6 mm", layer_thickness="0.1 mm", film_thickness="50 um", loss_time="8 ms")
+    model, parameters = sheet.build()
+    drive = Drive(voltage=sine("2 kV", "1 Hz"))
+    run = simulate(model, parameters, drive, duration=0.5, rate=100)
+    channels = {
+        f"f{k}": Channel(f"f{k}", "crease_angle", run.creases[:, k, 0], "rad", 1e-3, {"crease": k}) for k in (0, 1)
+    }
+    known = Subject.from_model(model, parameters, drive, [factor("crease.stiffness", 0.05)])
+    forward, _ = arranged(known, prepared([Recording("swing", run.times, channels)], 200.0), Options())
+    _, base, weights = nominal_fits(forward)
+    every = suspects(model, forward.recordings, drive, parameters)
+    some = [s for s in every if s.effect in ("strain_permittivity", "crease_friction")]
+    acting = {s.suspect.label for s in screen(forward, some, base, weights) if not s.status}
+    assert acting == {f"crease_friction at {site}" for site in ("crease 0", "crease 1", "all creases")} | {
+        "strain_permittivity at crease 0"
+    }
