@@ -155,14 +155,15 @@ def test_feet_hold_and_slide_the_same_with_implicit_steps():
 
 def test_the_gpu_follows_the_cpu(cuda):
     model, parameters = damped([5.0, 3.0])
-    chain = model, parameters, folded(model, [1.2, 0.7], worlds=3), 1e-9
+    chain = model, parameters, folded(model, [1.2, 0.7], worlds=3), 1e-9, 1e-7
     model, parameters = walker(1e-3)
     pose = Articulation(model).moved(Articulation(model).reference(), np.array([[0.0], [0.0], [0.0], [0.08]]))
-    feet = model, parameters, State.at_rest(model, 1, position=Articulation(model).positions(pose), placed=True), 1e-10
-    for model, parameters, state, tolerance in (chain, feet):
+    stands = State.at_rest(model, 1, position=Articulation(model).positions(pose), placed=True)
+    feet = model, parameters, stands, 1e-10, 1e-6
+    for model, parameters, state, tolerance, apart in (chain, feet):
         ends = []
         for device in ("cpu", cuda):
             batch = RigidBatch(model, parameters, Drive(), state, tolerance=tolerance, implicit=True, device=device)
             batch.advance(40, 0.01, np.inf)
             ends.append(batch.state().x)
-        assert np.abs(ends[0] - ends[1]).max() < 1e-7
+        assert np.abs(ends[0] - ends[1]).max() < apart  # feet slip by 1 mm; other steps end as far apart
