@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from origami_sim.drive.sources import coil, coil_pair, dipole, field_table, magnet
     from origami_sim.effects import CATALOGUE
     from origami_sim.errors import InputError
+    from origami_sim.estimation.estimate import Estimate, estimate
     from origami_sim.explore import Found, Way, gradient, optimise, solve_for, sweep
     from origami_sim.model import Model, Parameters, State
     from origami_sim.model.bodies import rigid

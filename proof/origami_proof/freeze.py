@@ -15,7 +15,7 @@ from origami_sim.errors import InputError
 
 PACKAGE = Path(origami_sim.__file__).resolve().parent
 FROZEN = "frozen.json"
-HOUSES = ("hypotheses", "fit", "predict", "infer", "verdict", "locate", "report", "diagnose")
+HOUSES = ("hypotheses", "fit", "predict", "infer", "verdict", "locate", "report", "diagnose", "estimation")
 """Folders of the diagnosis."""
 
 
