@@ -115,11 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("recording", help="CSV or Parquet file")
     what = "scene or device that models what was recorded: pendulum_chain, my_flap.py"
     p.add_argument("--scene", "--model", metavar="SCENE", help=f"{what} (default: what the sidecar names)")
-    p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a diagnosis")
-    p.add_argument(
-        "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
-    )
-    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
+    _stated(p)
     p.add_argument("--start", type=float, default=0.0, help="seconds after the first sample (default 0)")
     p.add_argument("--duration", type=float, help="seconds compared (default: what is left of the recording)")
     p.add_argument(
@@ -204,16 +200,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _recorded(p: argparse.ArgumentParser) -> None:
-    """Options of what is told of a device by recordings."""
-    p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
-    what = "a scene, its calibration (TOML), or my_flap.py (default: what the sidecar names)"
-    p.add_argument("--model", metavar="SCENE", help=what)
+def _stated(p: argparse.ArgumentParser) -> None:
+    """Options that state the numbers of a device, and the columns of its recordings."""
     p.add_argument("--calibration", metavar="TOML", help="numbers of the model, such as patched.toml of a device")
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="override a setting")
     p.add_argument(
         "--sidecar", metavar="TOML", help="what the columns mean (default: beside the recording, else shipped)"
     )
+
+
+def _recorded(p: argparse.ArgumentParser) -> None:
+    """Options of what is told of a device by recordings."""
+    p.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables, a folder or a listing of one object")
+    what = "a scene, its calibration (TOML), or my_flap.py (default: what the sidecar names)"
+    p.add_argument("--model", metavar="SCENE", help=what)
+    _stated(p)
     p.add_argument(
         "--prior",
         action="append",

@@ -26,9 +26,9 @@ from origami_sim.recording.axes import EXPLAINED, FAR, alike
 STEPS = 1e5
 """Steps of the solver, at most, of recordings for which units but those of time are asked.
 
-Up to 15 predictions: of bars 1 to 4 s each with as many steps. Rigid panels take a step a frame or so, and are asked in
-any case that is met; stiff bars of some ten seconds are not. Half leaves out bars of half the length, double takes
-twice as long before the first fit.
+Up to 15 predictions, of bars as large as the crawler 0.1 s each with as many steps (`benchmarks/README.md`). Rigid
+panels take a step a frame or so, and are asked in any case that is met; stiff bars of some ten seconds are not. Half
+leaves out bars of half the length, double takes twice as long before the first fit.
 """
 
 

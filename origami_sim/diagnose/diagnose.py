@@ -4,7 +4,6 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import orth
@@ -20,7 +19,7 @@ from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
 from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.options import Options, Report
-from origami_sim.diagnose.prepare import among, prepared
+from origami_sim.diagnose.prepare import Recorded, among, gathered
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
 from origami_sim.effects import get
 from origami_sim.fit.bursts import bursts
@@ -44,7 +43,6 @@ from origami_sim.locate.partial import partials
 from origami_sim.locate.where import located
 from origami_sim.observation.channels import stacked, units_of
 from origami_sim.observation.doubts import assumed
-from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.possible import Possible
 from origami_sim.report.diagnosis import Diagnosis
 from origami_sim.threads import in_step, leads, shared, told
@@ -59,7 +57,7 @@ WHOLE = "One recording, which is predicted as a whole: nothing could be left out
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
 def diagnose(
     subject: Source,
-    recordings: Sequence[Recording | str | Path] | Recording | str | Path,
+    recordings: Recorded,
     options: Options | None = None,
     *,
     catalogue: Sequence[str] | None = None,
@@ -88,7 +86,7 @@ def diagnose(
 
 def _diagnosed(
     subject: Source,
-    recordings: Sequence[Recording | str | Path] | Recording | str | Path,
+    recordings: Recorded,
     o: Options,
     catalogue: Sequence[str] | None,
     priors: Mapping[str, float | str] | None,
@@ -106,8 +104,7 @@ def _diagnosed(
     tell("prepare", 0.0)
     said = possible_of(subject)
     subject = subject_of(subject, priors)
-    each = [recordings] if isinstance(recordings, (Recording, str, Path)) else recordings
-    recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
+    recordings = gathered(recordings, o.rate)
     forward, noted = arranged(subject, recordings, o)
     if keep is not None:
         keep.follow(forward)

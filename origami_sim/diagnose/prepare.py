@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -11,10 +12,13 @@ from origami_sim.errors import InputError
 from origami_sim.hypotheses.hypothesis import Suspect
 from origami_sim.observation.thinning import thinned
 from origami_sim.predict.rigid import FEWEST
-from origami_sim.recording import Recording
+from origami_sim.recording import Recording, read_dataset
 from origami_sim.recording.drives import switches
 from origami_sim.recording.wild import wild_frames
 from origami_sim.threads import shared
+
+Recorded = Sequence[Recording | str | Path] | Recording | str | Path
+"""Recordings of one object, or their files."""
 
 FRAMES = 400
 """Frames of a recording that are compared at least, if it has as many."""
@@ -36,6 +40,16 @@ def among(every: Sequence[Suspect], catalogue: Sequence[str]) -> list[Suspect]:
             allowed=", ".join(sorted({s.effect for s in every})),
         )
     return out
+
+
+def gathered(given: Recorded, rate: float) -> list[Recording]:
+    """Recordings, and those of files, as they are compared, see `prepared`.
+
+    Raises:
+        InputError: a file that cannot be read; what `prepared` refuses.
+    """
+    each = [given] if isinstance(given, (Recording, str, Path)) else given
+    return prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], rate)
 
 
 def prepared(recordings: Sequence[Recording], rate: float) -> list[Recording]:

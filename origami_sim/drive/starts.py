@@ -11,7 +11,8 @@ BENDS, LISTED = 512, 10**6
 """Places at which a drive that is seen from many starts is sampled at least, and of which a list is made at most.
 
 Jumps keep their instants while there are no more of them: on a grid of 0.5 ms a voltage that is switched within a short
-segment moves a finger of 0.3 g by 5 mrad.
+segment moves a finger of 0.3 g by 5 mrad. Twenty-two delays of a drive with four switches need 176 places; the list is
+8 MB at most.
 """
 
 

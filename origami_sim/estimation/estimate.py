@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from origami_sim.diagnose.arrange import arranged, shortened
 from origami_sim.diagnose.observed import unobserved
 from origami_sim.diagnose.options import Options, Report
-from origami_sim.diagnose.prepare import prepared
+from origami_sim.diagnose.prepare import Recorded, gathered
 from origami_sim.diagnose.tables import numbers, patch, traces
 from origami_sim.effects import get
 from origami_sim.errors import InputError, nearest
@@ -37,7 +37,6 @@ from origami_sim.infer.basins import settled
 from origami_sim.infer.recorder import recorder_noise
 from origami_sim.infer.scan import over_their_range
 from origami_sim.observation.channels import units_of
-from origami_sim.recording import Recording, read_dataset
 from origami_sim.report.diagnosis import Candidate, Number, Trace, as_json
 from origami_sim.threads import in_step, leads, shared
 
@@ -129,7 +128,7 @@ class Estimate:
 @threadpool_limits.wrap(limits=1, user_api="blas")  # as of a diagnosis
 def estimate(
     subject: Source,
-    recordings: Sequence[Recording | str | Path] | Recording | str | Path,
+    recordings: Recorded,
     effects: Sequence[str] = (),
     *,
     priors: Mapping[str, float | str] | None = None,
@@ -154,7 +153,7 @@ def estimate(
 
 def _estimated(
     source: Source,
-    given: Sequence[Recording | str | Path] | Recording | str | Path,
+    given: Recorded,
     effects: Sequence[str],
     priors: Mapping[str, float | str] | None,
     o: Options,
@@ -166,8 +165,7 @@ def _estimated(
     if not subject.nominals and not effects:
         allowed = "priors of the numbers to fit, or effects to fit"
         raise InputError("nothing is to be fitted", field="priors", allowed=allowed)
-    each = [given] if isinstance(given, (Recording, str, Path)) else given
-    recordings = prepared([r for s in each for r in ([s] if isinstance(s, Recording) else read_dataset(s))], o.rate)
+    recordings = gathered(given, o.rate)
     forward, notes = arranged(subject, recordings, o)
     if (unseen := unobserved(forward)) is not None:
         notes.append(unseen)

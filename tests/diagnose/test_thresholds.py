@@ -139,4 +139,4 @@ def test_a_hard_stop_is_named_with_intervals_that_cover(bounced):
     for name, true in (("contact_stiffness", HARD), ("contact_angle", -STOP)):
         number = numbers[f"crease_contact.{name}"]
         assert number.low < true < number.high  # of the stiffness within 44 %
-        assert number.value == pytest.approx(true, rel=0.2)
+        assert number.value == pytest.approx(true, rel=0.15)

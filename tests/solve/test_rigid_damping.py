@@ -150,7 +150,7 @@ def test_feet_hold_and_slide_the_same_with_implicit_steps():
     moved = np.abs(ends[0] - state.x[:, 0]).max()
     assert moved > 1e-3
     # where feet stop is the sum of many small slips: explicit steps of 1e-12 end 0.7 um from those of 1e-13
-    assert np.abs(ends[1] - ends[0]).max() < 1e-3 * moved
+    assert np.abs(ends[1] - ends[0]).max() < 3e-4 * moved
 
 
 def test_the_gpu_follows_the_cpu(cuda):
@@ -159,7 +159,7 @@ def test_the_gpu_follows_the_cpu(cuda):
     model, parameters = walker(1e-3)
     pose = Articulation(model).moved(Articulation(model).reference(), np.array([[0.0], [0.0], [0.0], [0.08]]))
     stands = State.at_rest(model, 1, position=Articulation(model).positions(pose), placed=True)
-    feet = model, parameters, stands, 1e-10, 1e-6
+    feet = model, parameters, stands, 1e-10, 5e-7
     for model, parameters, state, tolerance, apart in (chain, feet):
         ends = []
         for device in ("cpu", cuda):
