@@ -7,8 +7,8 @@ import numpy as np
 from origami_sim.errors import InputError
 from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
+from origami_sim.observation.attachments import body_point, index_of, panel_of
 from origami_sim.observation.channels import stacked
-from origami_sim.observation.observe import _index, body_point
 from origami_sim.predict.starts import channel_tangent, seen_first
 from origami_sim.recording import Channel, Recording
 from origami_sim.verdict.words import joined
@@ -125,8 +125,8 @@ def _check_distances(recording: Recording, model: Model, panels: Sequence[np.nda
 def _panels_of(channel: Channel, model: Model, panels: Sequence[np.ndarray]) -> set[int]:
     """Panels that carry a marker."""
     if "panel" in channel.attachment:
-        return {_index(model, channel, "panel", len(panels))}
-    node = _index(model, channel, "node", len(model.position))
+        return {panel_of(model, channel)}
+    node = index_of(model, channel, "node", len(model.position))
     return {p for p, nodes in enumerate(panels) if node in nodes}
 
 

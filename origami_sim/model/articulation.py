@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from origami_sim.errors import InputError, nearest
 from origami_sim.model.model import Model, beside, carried_sides, dihedral_angles
 from origami_sim.model.motions import possible
+from origami_sim.model.vectors import cross
 from origami_sim.quantities import converted
 
 
@@ -213,10 +214,10 @@ class Articulation:
         out = np.zeros((self.size, *x.shape))
         first = len(self.motions)
         for k, along in enumerate(self.motions):
-            out[k] = along[:3] + np.cross(along[3:], x - pose.centre)
+            out[k] = along[:3] + cross(along[3:], x - pose.centre)
         for joint, (c, _, _, sign) in enumerate(self._joints):
             carried = self._carried[joint]
-            out[first + joint, carried] = np.cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
+            out[first + joint, carried] = cross(self._axis(x, c, sign), x[carried] - x[self.model.creases[c, 1]])
         return out
 
     def sought(self, shown: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from origami_sim.effects import CONTACTS, DISTORTIONS, get
 from origami_sim.errors import InputError
+from origami_sim.model.vectors import cross
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -492,7 +493,7 @@ def _joined(model: Model, magnet: np.ndarray) -> np.ndarray:
     of = np.flatnonzero(magnet[0] * magnet[1])
     _, sign, a, b, n = magnet[:, of, None]
     x1, x2, x3 = np.moveaxis(model.position[model.triangles[of]], 1, 0)
-    in_plane, normal = a * (x2 - x1) + b * (x3 - x1), np.cross(x2 - x1, x3 - x1)
+    in_plane, normal = a * (x2 - x1) + b * (x3 - x1), cross(x2 - x1, x3 - x1)
     poling = sign * (np.sqrt(1 - n**2) * _unit(in_plane) + n * _unit(normal))
     corners = np.stack([np.repeat(np.arange(len(of)), 3), model.triangles[of].ravel()])
     touches = sp.csr_array(sp.coo_array((np.ones(corners.shape[1]), corners), (len(of), len(model.position))))
@@ -531,6 +532,6 @@ def dihedral_angles(x: np.ndarray, hinges: np.ndarray) -> np.ndarray:
         return np.zeros((0, *x.shape[1:-1]))
     i, j, k, m = (x[hinges[:, c]] for c in range(4))
     e = k - j
-    n1, n2 = np.cross(i - j, e), np.cross(e, m - j)
+    n1, n2 = cross(i - j, e), cross(e, m - j)
     length = np.linalg.norm(e, axis=-1)
-    return np.arctan2((np.cross(n1, n2) * e).sum(-1) / length, (n1 * n2).sum(-1))
+    return np.arctan2((cross(n1, n2) * e).sum(-1) / length, (n1 * n2).sum(-1))

@@ -4,7 +4,7 @@ import numpy as np
 
 from origami_sim.errors import InputError
 from origami_sim.model import Model, dihedral_angles
-from origami_sim.observation.observe import _index, body_axes, body_point
+from origami_sim.observation.attachments import body_axes, body_point, index_of, panel_of
 from origami_sim.recording import Camera, Channel, Recording
 
 PATH = "crease_angle"
@@ -23,12 +23,12 @@ def read(
         InputError: a channel attached to something that the model does not have.
     """
     if channel.kind == "crease_angle":
-        c = _index(model, channel, "crease", len(model.creases))
+        c = index_of(model, channel, "crease", len(model.creases))
         if angles is not None:
             return angles[:, c : c + 1]
         return np.moveaxis(dihedral_angles(np.moveaxis(x, 0, 1), model.creases[c : c + 1]), 0, 1)
     if channel.kind == "panel_angle":
-        panel = _index(model, channel, "panel", int(model.triangle_panel.max()) + 1)
+        panel = panel_of(model, channel)
         triangles = model.triangles[model.triangle_panel == panel]
         nodes = set(np.unique(triangles).tolist())
         axis = next((c[1:3] for c in model.creases if {int(c[1]), int(c[2])} <= nodes), None)
@@ -46,7 +46,7 @@ def read(
     if channel.kind == "marker_2d":
         return np.moveaxis(_camera(channel).project(_points(model, channel, x)), 2, 1)
     if channel.kind == "tip_displacement":
-        node = _index(model, channel, "node", len(model.position))
+        node = index_of(model, channel, "node", len(model.position))
         moved = x[:, node] - (model.begins[node] if begin is None else begin[node])
         along = channel.attachment.get("direction")
         if along is None:
@@ -114,7 +114,7 @@ def _points(model: Model, channel: Channel, x: np.ndarray) -> np.ndarray:
     """The point of the body that carries a marker, [F, W, 3]."""
     frames, nodes, worlds, _ = x.shape
     if "panel" not in channel.attachment and not channel.attachment.get("height"):
-        return x[:, _index(model, channel, "node", nodes)]
+        return x[:, index_of(model, channel, "node", nodes)]
     each = np.moveaxis(x, 2, 1).reshape(frames * worlds, nodes, 3)
     return body_point(model, each, channel).reshape(frames, worlds, 3)
 

@@ -11,6 +11,7 @@ from origami_sim.effects import CONTACTS, get
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, State, node_mass
 from origami_sim.model.distort import distorted
+from origami_sim.observation.attachments import body_axes, body_point, find, index_of, panel_of, panel_point
 from origami_sim.observation.grips import grip_of, of_grip, refuse_moving
 from origami_sim.recording import Channel, Recording, applied_drive
 from origami_sim.solve.batch import Batch
@@ -192,9 +193,9 @@ def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
     """
     model, x = poses.model, poses.x
     if channel.kind == "crease_angle":
-        return poses.angles[:, _index(model, channel, "crease", len(model.creases))]
+        return poses.angles[:, index_of(model, channel, "crease", len(model.creases))]
     if channel.kind == "panel_angle":
-        return panel_angle(model, x, _index(model, channel, "panel", int(model.triangle_panel.max()) + 1))
+        return panel_angle(model, x, panel_of(model, channel))
     if "grip" in channel.attachment:
         return of_grip(model, channel, grip_wrench(poses, channel))
     if channel.kind == "force":
@@ -210,92 +211,6 @@ def read_channel(poses: Poses, channel: Channel) -> np.ndarray:
     if channel.values.ndim == 1 and "direction" not in channel.attachment:
         return np.linalg.norm(moved, axis=1)
     return _part(channel, moved)
-
-
-def body_point(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
-    """The point of the body that carries a marker: (F, 3) [m], for positions x [F, N, 3].
-
-    Attached to a `node`, or to a `panel` at a point of it, see `panel_point`: it moves with the triangle of the panel
-    on which it lies, or nearest to which it lies. `height` lifts it above the mid-plane along the normal, that of the
-    triangle or the mean around the node.
-    """
-    height = float(channel.attachment.get("height", 0.0))
-    if "panel" in channel.attachment:
-        panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
-        nodes, weights, lift = _on_panel(model, panel, panel_point(model, channel, panel))
-        corners = x[:, nodes]
-        return np.einsum("k,fkc->fc", weights, corners) + (lift + height) * _normals(corners)
-    node = _index(model, channel, "node", len(model.position))
-    if height == 0.0:
-        return x[:, node]
-    around = model.triangles[(model.triangles == node).any(axis=1)]
-    if len(around) == 0:
-        raise InputError("a height needs a triangle at the node", field=f"channels.{channel.name}.height", value=height)
-    corners = x[:, around]
-    doubled = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]).sum(axis=1)
-    return x[:, node] + height * doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
-
-
-def panel_point(model: Model, channel: Channel, panel: int) -> np.ndarray:
-    """Where a channel's point lies in the reference state (3,) [m].
-
-    `point` is its offset from the panel's centroid in the reference axes. Or it is measured from a crease of the panel,
-    `from`: at `distance` from it into the panel, and `along` it from its middle, to the right for who looks from it
-    into the panel with the panel's upper side up. Such a point stays where it is on the body when a length is refitted.
-
-    Raises:
-        InputError: a crease that the model lacks or that is not the panel's.
-    """
-    triangles = model.triangles[model.triangle_panel == panel]
-    corners = model.position[triangles]
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    centroid = np.average(corners.mean(axis=1), axis=0, weights=np.linalg.norm(doubled, axis=1))
-    if "from" not in channel.attachment:
-        return centroid + np.asarray(channel.attachment.get("point", (0.0, 0.0, 0.0)), float)
-    given = channel.attachment["from"]
-    ends = model.creases[_find(model, channel, "crease", given, len(model.creases), key="from"), 1:3]
-    if not set(ends.tolist()) <= set(np.unique(triangles).tolist()):
-        raise InputError(
-            "the panel does not have this crease", field=f"channels.{channel.name}.from", value=given,
-            allowed="a crease of the panel on which the marker is",
-        )  # fmt: skip
-    start, end = model.position[ends]
-    hinge = (end - start) / np.linalg.norm(end - start)
-    normal = doubled.sum(axis=0) / np.linalg.norm(doubled.sum(axis=0))
-    into = np.cross(normal, hinge)
-    into = into * np.sign(into @ (centroid - start))
-    right = np.cross(into, normal)
-    attached = channel.attachment
-    return 0.5 * (start + end) + float(attached["distance"]) * into + float(attached.get("along", 0.0)) * right
-
-
-def body_axes(model: Model, x: np.ndarray, channel: Channel) -> np.ndarray:
-    """The model's axes x, y, z as the triangle under a marker has turned them, as the channel sees directions.
-
-    Returns:
-        (F, 3 axes, 3): x, y, z of a marker; right, up and towards the camera of one in a picture. For x [F, N, 3].
-    """
-    if "panel" in channel.attachment:
-        panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
-        nodes = _on_panel(model, panel, panel_point(model, channel, panel))[0]
-    else:
-        node = _index(model, channel, "node", len(model.position))
-        around = np.flatnonzero((model.triangles == node).any(axis=1))
-        nodes = model.triangles[around[0]] if len(around) else None
-    turned = np.broadcast_to(np.eye(3), (len(x), 3, 3))
-    if nodes is not None:  # a node without a panel does not turn
-        turned = np.einsum("ka,fkb->fab", _own_axes(model.position[nodes][None])[0], _own_axes(x[:, nodes]))
-    if channel.camera is not None:
-        turned = turned @ np.vstack([channel.camera.axes, np.cross(*channel.camera.axes)]).T
-    return turned
-
-
-def _own_axes(corners: np.ndarray) -> np.ndarray:
-    """Right-handed axes [F, 3, 3] of triangles [F, 3, 3]: along the first side, across it, along the normal."""
-    along = corners[:, 1] - corners[:, 0]
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    normal = _normals(corners)
-    return np.stack([along, np.cross(normal, along), normal], axis=1)
 
 
 def support_force(poses: Poses, channel: Channel) -> np.ndarray:
@@ -317,7 +232,7 @@ def support_force(poses: Poses, channel: Channel) -> np.ndarray:
     ground = bool(channel.attachment.get("ground", False))
     many = channel.attachment.get("nodes")
     names = [channel.attachment.get("node")] if many is None else many
-    nodes = [] if ground else [_find(model, channel, "node", one, len(model.position)) for one in names]
+    nodes = [] if ground else [find(model, channel, "node", one, len(model.position)) for one in names]
     contacts = [n for n in model.laws if get(n).family in CONTACTS]
     if ground and not contacts:
         raise InputError("the model has no contact with the ground", field=field + ".ground", value=True)
@@ -398,7 +313,7 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
         if channel.kind == "force":
             many = channel.attachment.get("nodes", [channel.attachment.get("node")])
             if not channel.attachment.get("ground"):
-                nodes = [_find(model, channel, "node", one, len(model.position)) for one in many]
+                nodes = [find(model, channel, "node", one, len(model.position)) for one in many]
                 if not (model.free[nodes] == 0).any():
                     raise InputError(
                         "no axis of these nodes is held",
@@ -408,7 +323,7 @@ def check_scene(recording: Recording, model: Model) -> list[str]:
                     )
             continue
         if channel.kind == "moment":
-            _index(model, channel, "crease", len(model.creases))
+            index_of(model, channel, "crease", len(model.creases))
             continue
         read_channel(Poses(model, Parameters(model), rest, zero.angles.T, np.zeros(1)), channel)
         _check_point(model, channel)
@@ -435,10 +350,10 @@ def _check_point(model: Model, channel: Channel) -> None:
     key = next((k for k in ("point", "distance") if k in channel.attachment), None)
     if "panel" not in channel.attachment or key is None:
         return
-    panel = _index(model, channel, "panel", int(model.triangle_panel.max(initial=-1)) + 1)
+    panel = panel_of(model, channel)
     corners = model.position[np.unique(model.triangles[model.triangle_panel == panel])]
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    far = float(np.linalg.norm(panel_point(model, channel, panel) - corners.mean(axis=0)))
+    far = float(np.linalg.norm(panel_point(model, channel) - corners.mean(axis=0)))
     if far > FAR * size:
         raise InputError(
             f"the point is {far:.3g} m off the middle of a panel of {size:.3g} m",
@@ -544,54 +459,3 @@ def _held(drives: Sequence[Drive]) -> Drive:
 def _of_values(drive: Drive, values: dict[str, np.ndarray]) -> Drive:
     """The drive, held at these values (F,) by channel, one world each."""
     return drive.with_signals({n: Signal(offset=v) for n, v in values.items()})
-
-
-def _normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals (F, 3) of triangles (F, 3, 3)."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    with np.errstate(invalid="ignore"):  # of a world that failed
-        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
-
-
-def _on_panel(model: Model, panel: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Nodes (3,) of the triangle under a point of a panel, its weights (3,) on them, and its height above it [m]."""
-    triangles = model.triangles[model.triangle_panel == panel]
-    corners = model.position[triangles]
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    best, chosen = -np.inf, None
-    for nodes, corner, area in zip(triangles, corners, doubled, strict=True):
-        square = float(area @ area)
-        sides = [np.cross(corner[(k + 1) % 3] - point, corner[(k + 2) % 3] - point) for k in range(3)]
-        weights = np.array([float(side @ area) / square for side in sides])
-        if weights.min() > best:  # inside all are positive; else the triangle that the point lies least outside of
-            lift = float((point - corner[0]) @ area) / np.sqrt(square)
-            best, chosen = weights.min(), (nodes, weights / weights.sum(), lift)
-    assert chosen is not None  # every panel has a triangle
-    return chosen
-
-
-def _index(model: Model, channel: Channel, family: str, count: int) -> int:
-    """Index that an attachment names, by number or by the model's label."""
-    return _find(model, channel, family, channel.attachment.get(family), count)
-
-
-def _find(model: Model, channel: Channel, family: str, given: object, count: int, key: str = "") -> int:
-    names = model.names.get(family, ())
-    if isinstance(given, str) and names.count(given) == 1:
-        return names.index(given)
-    if isinstance(given, int) and 0 <= given < count:
-        return given
-    if isinstance(given, str) and not names:  # "panel 1", as tables and pictures call what has no name
-        called = [model.name(family, k) for k in range(count)]
-        if given in called:
-            return called.index(given)
-    raise InputError(
-        f"several have that name, of which a {channel.kind} needs one"
-        if given in names
-        else "the model has nothing of that name"
-        if given is not None
-        else f"a {channel.kind} needs a {family}",
-        field=f"channels.{channel.name}.{key or family}",
-        value=given,
-        allowed=", ".join(n for n in names if names.count(n) == 1) or f"0 to {count - 1}",
-    )

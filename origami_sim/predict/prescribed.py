@@ -10,8 +10,8 @@ from origami_sim.hypotheses.hypothesis import Hypothesis, Subject
 from origami_sim.model import Parameters, State
 from origami_sim.model.articulation import Articulation
 from origami_sim.model.distort import distorted
+from origami_sim.observation.attachments import index_of
 from origami_sim.observation.channels import PATH
-from origami_sim.observation.observe import _index
 from origami_sim.predict.curves import HOLD, PIECES, Balance, Curves, Static
 from origami_sim.recording import Recording
 from origami_sim.solve.batch import Batch
@@ -112,7 +112,7 @@ class Prescribed(Curves):
 
     def _row(self, channel) -> int:
         """The coordinate of a channel's crease."""
-        crease = _index(self.model, channel, "crease", len(self.model.creases))
+        crease = index_of(self.model, channel, "crease", len(self.model.creases))
         return int(np.flatnonzero(self.articulation.creases == crease)[0])
 
     def inputs(self):

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from origami_sim.model import Model
 from origami_sim.model.articulation import Articulation, Pose
+from origami_sim.observation.attachments import body_point
 from origami_sim.observation.channels import PATH, angle_mask, channel_values, stacked
-from origami_sim.observation.observe import body_point
 from origami_sim.recording import Recording
 
 ROUNDS = 25

@@ -12,7 +12,8 @@ from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
 from origami_sim.model import State
 from origami_sim.model.articulation import Articulation
-from origami_sim.observation.observe import body_point, observe
+from origami_sim.observation.attachments import body_point
+from origami_sim.observation.observe import observe
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.recording import Camera, Channel, Recording
 from origami_sim.solve.motion.dynamics import simulate

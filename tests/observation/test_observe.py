@@ -10,7 +10,8 @@ from origami_sim import Sheet, miura, simulate, strip
 from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, node_mass
-from origami_sim.observation.observe import body_point, channel_frames, check_scene, follow, observe, observe_equilibria
+from origami_sim.observation.attachments import body_point
+from origami_sim.observation.observe import channel_frames, check_scene, follow, observe, observe_equilibria
 from origami_sim.physics.materials import G
 from origami_sim.recording import Camera, Channel, Recording, read_recording
 from origami_sim.scenes import pendulum_chain
