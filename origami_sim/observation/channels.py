@@ -46,9 +46,11 @@ def read(
     if channel.kind == "marker_2d":
         return np.moveaxis(_camera(channel).project(_points(model, channel, x)), 2, 1)
     if channel.kind == "tip_displacement":
-        node = index_of(model, channel, "node", len(model.position))
-        moved = x[:, node] - (model.begins[node] if begin is None else begin[node])
+        start = np.broadcast_to(model.begins[:, None] if begin is None else begin, x.shape[1:])
+        moved = _points(model, channel, x) - _points(model, channel, start[None])
         along = channel.attachment.get("direction")
+        if channel.values.ndim > 1 and along is None:
+            return np.moveaxis(moved, 2, 1)
         if along is None:
             return np.linalg.norm(moved, axis=-1)[:, None]
         return (moved @ (np.asarray(along, float) / np.linalg.norm(along)))[:, None]

@@ -11,6 +11,7 @@ from origami_sim.device.scene import read_calibration
 from origami_sim.errors import InputError
 from origami_sim.model import Model, Parameters, node_mass
 from origami_sim.observation.attachments import body_point
+from origami_sim.observation.channels import read
 from origami_sim.observation.observe import channel_frames, check_scene, follow, observe, observe_equilibria
 from origami_sim.physics.materials import G
 from origami_sim.recording import Camera, Channel, Recording, read_recording
@@ -170,6 +171,17 @@ def test_displacements_as_vector_part_and_length(motion):
     np.testing.assert_allclose(channel_frames(motion, part), -moved[:, 2], atol=1e-16)
     with pytest.raises(InputError, match="of 2 columns cannot be observed without a direction"):
         channel_frames(motion, channel("tip_displacement", np.zeros((2, 2)), unit="m", node=4))
+
+
+@pytest.mark.parametrize("on", [{"node": 4}, {"panel": 1, "point": [0.0, 0.003, 0.02]}, {"panel": 1, "height": 0.004}])
+@pytest.mark.parametrize("values", [np.zeros(2), np.zeros((2, 3))])
+def test_a_diagnosis_reads_displacements_as_a_run_is_read(motion, on, values):
+    given = channel("tip_displacement", values, unit="m", **on)
+    x = motion.x[:, :, :1]
+    found = read(motion.model, given, x, None, begin=x[0])[:, :, 0]
+    wanted = channel_frames(motion, given).reshape(len(x), -1)
+    assert np.abs(wanted).max() > 1e-3
+    np.testing.assert_allclose(found, wanted, atol=1e-14)
 
 
 def test_the_support_of_a_swinging_chain_carries_weight_and_momentum(motion):
