@@ -146,7 +146,7 @@ def fit_crease_table(angle, moment, *, ends: tuple[float, float] | None = None, 
             "moment that holds the angle",
             field="angle",
             value=round(float(knots[k]), 4),
-            allowed="a rising moment, or falling=True",
+            allowed="a rising moment (in Python, falling=True accepts a law that snaps)",
         )
     warnings = []
     if (first < angle[0] - (last - first) / KNOTS) or (last > angle[-1] + (last - first) / KNOTS):

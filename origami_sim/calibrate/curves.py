@@ -72,7 +72,8 @@ def checked_curve(x, y, names: tuple[str, str], fewest: int, *, strict: bool = T
         raise InputError("too few points on the curve", field=names[0], value=len(x), allowed=f"{fewest} or more")
     step = np.diff(x)
     if strict and not ((step > 0).all() or (step < 0).all()):
-        turn = int(np.flatnonzero(step * np.sign(step.sum() or 1.0) <= 0)[0]) + 2
+        way = np.sign(step[step != 0.0][:1])  # of a loop, the whole way is none
+        turn = int(np.flatnonzero(step * (way if len(way) else 1.0) <= 0)[0]) + 2
         raise InputError(
             f"the load is not monotone: it turns back or stands at point {turn}",
             field=names[0],
