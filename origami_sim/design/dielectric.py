@@ -209,7 +209,8 @@ class Electrodes(Masses):
             group: electrode group, `voltage=[V_0, V_1, ...]` in the drive.
             constraint: 1 if the film blocks the width, 1/2 if it is free.
             thinning: whether layers get thinner, and the stress larger, as they are stretched.
-            section: "ogden" (exact bending of the layers, a tabulated crease) or "linear".
+            section: "ogden" (exact bending of the layers, a tabulated crease) or "linear", for small angles: of six
+                layers on 62 um of tape 2 % off at 5 degrees, 10 % at 30.
             rest_angle: without voltage [rad] (default: as the pattern lies). loss_time: beta [s], viscosity = beta
                 stiffness. reach: largest curvature of the table, both ways [1/m] (default: what folds the notch by half
                 a turn, but no more than 1.6 over the stack's height with the stack outside, 0.2 with it inside).
