@@ -4,7 +4,7 @@ import numpy as np
 
 from origami_sim import Drive, Sheet, strip
 from origami_sim.model import State
-from origami_sim.solve.statics.settling import SettlingBars, levels, settling
+from origami_sim.solve.statics.settling import SettlingBars, _over, levels, settling
 
 
 def loaded(factor: float):
@@ -44,3 +44,9 @@ def test_worlds_that_lie_close_together_share_tangents(monkeypatch):
     together = settled(worlds)
     assert np.abs(together - alone).max() < 1e-11
     assert sum(taken) < 0.3 * 9 * len(taken)
+
+
+def test_a_share_of_next_to_nothing_is_no_warning(recwarn):
+    """Worlds that have settled move by subnormal numbers; the step that they may take is bounded elsewhere."""
+    found = _over(np.ones(3), np.array([0.0, 5e-310, 2.0]))
+    assert found.tolist() == [0.0, np.inf, 0.5] and not recwarn.list

@@ -528,5 +528,6 @@ def per_world(drive: Drive, level: np.ndarray) -> Drive:
 
 
 def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a / b, 0 where b is 0."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+    """a / b, 0 where b is 0; of changes that are almost 0, as of what has settled, it may be infinite."""
+    with np.errstate(over="ignore"):
+        return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
