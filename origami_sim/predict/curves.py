@@ -312,8 +312,13 @@ class Static(Curves):
 
 
 def clocked(effect: str) -> bool:
-    """Whether an effect depends on how fast things happen: a parameter's unit has seconds in it (but for s^2)."""
-    return effect in TIMED or any(re.search(r"(?<![A-Za-z])s(?![A-Za-z^])", p.unit) for p in get(effect).parameters)
+    """Whether an effect depends on how fast things happen: a parameter's unit has seconds in it (but for s^2).
+
+    A loss that is none unless it is stated, as of a crease that yields, does not make it so.
+    """
+    law = get(effect)
+    units = [p.unit for p in law.parameters if p.name in law.fitted or p.default != 0.0]
+    return effect in TIMED or any(re.search(r"(?<![A-Za-z])s(?![A-Za-z^])", unit) for unit in units)
 
 
 def measures_force(recording: Recording) -> bool:

@@ -342,3 +342,11 @@ def test_a_stray_field_is_no_weight_and_no_rest_angle():
     assert len([n for n in best.numbers if n.label.startswith("field_offset.")]) < 3
     assert "not told from zero" not in best.distrust
     assert [c.label for c in found.candidates].count(best.label) == 1
+
+
+def test_laws_with_a_loss_that_is_not_stated_are_suspects_of_load_steps():
+    assert not any(map(clocked, ("crease_yield", "crease_contact", "crease_friction")))
+    assert all(
+        map(clocked, ("crease_relaxation", "crease_viscosity", "crease_aging", "crease_swelling", "clock_delay"))
+    )
+    assert all(map(clocked, ("voltage_lag", "voltage_limit", "magnetic_viscosity", "dielectric_relaxation")))
