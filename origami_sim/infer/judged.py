@@ -31,7 +31,7 @@ def judged(out: Posterior, forward: Predictor, key: Key, f: Fit, owed: float = 0
     # order: the fit's own columns by suspect, then those of the strengths of each other suspect
     others = [n for n, s in enumerate(out.signatures) if s.parts and not s.status and n not in key]
     count, groups = len(own.columns), list(own.groups)
-    width, known = count, [out.signatures[o] for o in others]
+    width, known = count, [out.signature(o, key) for o in others]
     for one in known:
         groups.append(one.group(width))
         width += len(one.size)

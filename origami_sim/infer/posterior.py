@@ -84,8 +84,9 @@ class Posterior:
             all were tried over their ranges. swapped: by how much single effects were better than they promised in
             the place of the best set. realised: log Bayes factors of sets over the fit that their estimates are about,
             by that fit: as estimated, as promised, and as fitted. rough: whether fits end in many basins, see `basins`.
-            futile: sets that were fitted since one took the lead. beyond: the model without any effects, about which
-            a moment that no law gives was sought. ended: whether the search was ended before it was done.
+            futile: sets that were fitted since one took the lead. about: by fitted set, signatures about its fit, where
+            those about the refitted model do not tell what stands beside it. beyond: the model without any effects,
+            about which a moment that no law gives was sought. ended: whether the search was ended before it was done.
     """
 
     signatures: list[Signature]
@@ -105,6 +106,7 @@ class Posterior:
     ahead: dict[Key, tuple[float, Estimate]] = field(default_factory=dict)
     renewed: set[tuple[Key, Key]] = field(default_factory=set)
     beyond: Node | None = None
+    about: dict[Key, dict[int, Signature]] = field(default_factory=dict)
     polished: set[Key] = field(default_factory=set)
     begun: dict[Key, np.ndarray] = field(default_factory=dict)
     reconsidered: bool = False
@@ -197,6 +199,10 @@ class Posterior:
 
     def suspect(self, n: int) -> Suspect:
         return self.signatures[n].suspect
+
+    def signature(self, n: int, key: Key) -> Signature:
+        """What a suspect does beside a fitted set: about its fit, if that was simulated; in the same units anywhere."""
+        return self.about.get(key, {}).get(n, self.signatures[n])
 
     def label(self, key: Key) -> str:
         return " + ".join(self.labels(key)) or "nominal"

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
+from origami_sim.device.device import device_module
+from origami_sim.device.scene import scene_settings
 from origami_sim.diagnose import Options, diagnose
+from origami_sim.drive import Drive
 from origami_sim.hypotheses.subject import alignments
+from origami_sim.model import State
 from origami_sim.predict import rollouts
+from origami_sim.recording import Channel, Recording
+from origami_sim.solve.motion.dynamics import simulate
 from tests.diagnose.strips import record, subject
 
 FRICTION = {"crease_friction": {"friction_moment": (2e-5, [1])}}
@@ -188,3 +194,39 @@ def test_recordings_that_excite_no_suspect_test_none():
     found = diagnose(subject(2), [swing], catalogue=("clock_delay",))
     assert found.verdict == "UNTESTABLE" and not found.chosen and not found.patch
     assert any("Not tested" in n and "clock_delay" in n for n in found.notes)
+
+
+CHAIN = """
+from origami_sim import Drive, Sheet, strip
+
+def build(length_1="30 mm", length_2="30 mm", length_3="25 mm", mass_1="1.1 g", mass_2="1 g", mass_3="0.9 g"):
+    lengths, masses, x = [length_1, length_2, length_3], [mass_1, mass_2, mass_3], 0.01
+    sheet = Sheet(strip([x, *lengths], 0.02), thickness="0.5 mm", panels="rigid")
+    for k, (length, mass) in enumerate(zip(lengths, masses), 1):
+        about = {"inertia": mass * length**2 / 12, "about": (0, 1, 0)}
+        sheet.body(k, mass=mass, centre=(x + length / 2, 0, 0), **about)
+        x += length
+    sheet.crease(stiffness="0.1 mN m/rad", loss_time="8 ms").gravity((9.81, 0, 0)).fix(panels=[0])
+    return sheet, Drive()
+"""
+
+
+def test_an_effect_that_numbers_absorbed_is_found_beside_one_that_is_known(tmp_path):
+    """A tip that is heavier passes for a panel that is longer than it can be, until the drag beside it is fitted."""
+    (tmp_path / "chain.py").write_text(CHAIN)
+    module = device_module(str(tmp_path / "chain.py"))
+    model, parameters, _ = module.build(scene_settings(module))
+    richer, ends = model.with_effects("air_drag", "added_mass"), np.flatnonzero(model.position[:, 0] > 0.0949)
+    real = parameters.for_model(richer).set("air_drag", "drag_coefficient", 2.0)
+    real.set("added_mass", "added", 2e-5, ends).set("added_mass", "gravity_x", 9.81, ends)
+    state = State.folded(richer, dict(enumerate((0.9, 0.3, 0.3))))
+    motion = simulate(richer, real, Drive(), duration=4.0, rate=120, state=state)
+    read = motion.creases[:, :, 0] + 1.7e-3 * np.random.default_rng(0).normal(size=motion.creases.shape[:2])
+    channels = {f"c{k}": Channel(f"c{k}", "crease_angle", read[:, k], "rad", 1.7e-3, {"crease": k}) for k in range(3)}
+    priors = {f"length_{k}": 2e-4 for k in (1, 2, 3)} | {f"mass_{k}": "1 %" for k in (1, 2, 3)}
+    some = ("air_drag", "added_mass", "mass_damping")
+    found = diagnose(module, [Recording("swing", motion.times, channels)], catalogue=some, priors=priors)
+    assert found.verdict == "SEVERAL" and set(found.candidates[0].effects) == {"air_drag", "added_mass"}
+    of = {n.label: n for n in found.candidates[0].numbers}
+    for label, true in (("air_drag.drag_coefficient", 2.0), ("added_mass.added", 2e-5)):
+        assert of[label].low < true < of[label].high
