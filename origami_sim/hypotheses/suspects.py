@@ -56,7 +56,7 @@ def suspects(
         if any(p.name in ANCHORS for p in effect.parameters):
             sites += _edges(model)
         if effect.inertia is not None:  # what was added sits at a point, what was mistaken is a panel's
-            at = [*_edges(model), *points(model)] if _in_kilograms(effect) else []
+            at = _distinct([*_edges(model), *points(model)]) if _in_kilograms(effect) else []
             if _in_kilograms(effect):  # nodes that move, so that what is said is the mass of all of them
                 sites = [("the body", "body", tuple(np.flatnonzero(model.free.any(axis=1)).tolist()))]
             sites = at or [*sites, *_panels(model)]
@@ -219,6 +219,12 @@ def _edges(model: Model):
         if len(mine):
             out.append((p, "panel", tuple(map(int, own or mine))))
     return out if len(out) > 1 else []
+
+
+def _distinct(places: Sequence[tuple[str, str, tuple[int, ...]]]):
+    """Places without those that are another's nodes by a second name, as a strip's end and its last panel's edge."""
+    of = {frozenset(nodes): (site, kind, nodes) for site, kind, nodes in reversed(places)}
+    return [p for p in places if of[frozenset(p[2])] == p]
 
 
 def _panels(model: Model):

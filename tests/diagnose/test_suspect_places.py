@@ -207,3 +207,12 @@ def test_gravity_is_no_suspect_where_a_model_has_it_in_any_direction():
     assert not named((0.0, 0.0, -9.80665)) and not named((0.0, 9.81, 0.0))
     (lying,) = named((0.0, 0.0, 0.0))
     assert [f.start for f in lying.strengths] == [0.0, 0.0, 0.0]
+
+
+def test_a_mass_has_one_name_where_the_end_of_a_strip_is_the_edge_of_its_last_panel():
+    sheet = Sheet(strip([0.01, 0.03, 0.03, 0.025], 0.02), thickness="0.5 mm", panels="rigid")
+    model, parameters = sheet.crease(stiffness=1e-4).gravity((9.81, 0, 0)).fix(panels=[0]).build()
+    assert {site for site, *_ in points(model)} == {"the middle", "the last end"}
+    added = [s for s in asked(model, parameters, Drive()) if s.effect == "added_mass"]
+    assert [s.label for s in added] == [f"added_mass at panel {k}" for k in (1, 2, 3)]
+    assert len({s.entities for s in added}) == len(added)
