@@ -25,7 +25,7 @@ from origami_sim.verdict.decide import (
     of_each,
     shared_out,
 )  # fmt: skip
-from origami_sim.verdict.words import distinct, joined, said, say, title
+from origami_sim.verdict.words import change, distinct, joined, said, say, title
 
 COMPARED = 0.9
 """Share of the frames that has to be compared before nothing may be said to be missing."""
@@ -227,7 +227,7 @@ def unnamed_verdict(
     recorder = aligned and all(get(m.name.partition(".")[0]).family == "measurement" for m in beyond)
     strain = abs(t - f.start) / f.spread
     text = "Aligning the recording" if aligned else "Refitting the numbers of the model"
-    text += f" is enough: {f.label} goes from {said(f.start, f.unit)} to {said(t, f.unit)}, {strain:.1f} standard "
+    text += f" is enough: {f.label} goes {change(f.start, t, f.unit)}, {strain:.1f} standard "
     text += f"deviations of what was known; the error is then {over:.2f} times the noise."
     return "MEASUREMENT" if recorder else "PARAMETER", text, [m.label for m in beyond]
 
@@ -265,7 +265,7 @@ def explains(b: Budget, left: str, f: Fit) -> str:
     strained = [f"{n.label} is {s:.1f}" for s, n, _ in sorted(moved, key=lambda one: -one[0]) if s > STRAINED][:LISTED]
     if moved and b.numbers > b.named:
         _, n, value = max(moved, key=lambda one: one[0])
-        text += f" (above all {n.label}, from {said(n.start, n.unit)} to {said(value, n.unit)})"
+        text += f" (above all {n.label}, {change(n.start, value, n.unit)})"
     where = f", above all at {left}" if left else ""
     text += f"; {b.rest:.0%} is real and not named{where}" if _shows(b.rest) else ""
     return text + (f"; then {joined(strained)} standard deviations from what was known" if strained else "")

@@ -70,6 +70,13 @@ def said(value: float, unit: str, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if unit in ("-", "1", "", ANY) else quantity(value, unit, digits=digits)
 
 
+def change(before: float, after: float, unit: str) -> str:
+    """From which number to which, with so many digits that two of the difference are told."""
+    off = abs(after - before) / max(abs(before), abs(after), 1e-300)
+    digits = max(3, min(1 + int(np.ceil(-np.log10(off))), 9)) if off > 0.0 else 3
+    return f"from {said(before, unit, digits)} to {said(after, unit, digits)}"
+
+
 def title(effect: str) -> str:
     """The first words of an effect's file: its name as a physicist would say it."""
     import importlib

@@ -19,7 +19,7 @@ from origami_sim.locate.describe import described
 from origami_sim.locate.places import Acting, Curve, Place
 from origami_sim.verdict.decide import credible, decide, shared_out
 from origami_sim.verdict.sentences import explains, in_all, places, undecided
-from origami_sim.verdict.words import joined, said, say, title
+from origami_sim.verdict.words import change, joined, said, say, title
 
 
 def test_the_explanations_that_are_stated_hold_95_per_cent_and_none_only_adds_to_another():
@@ -385,3 +385,9 @@ def test_numbers_far_from_what_was_known_are_said_in_the_headline():
     text = explains(Budget([Share("", "effect", 1.0)], 1.0), "", f)
     said = "modulus is 8.5 and mass is 6.2 standard deviations from what was known"
     assert text == f"explains 100% of the mismatch; then {said}"
+
+
+def test_from_which_number_to_which_shows_that_they_differ():
+    assert change(0.2, 0.19952, "m") == "from 200.0 mm to 199.5 mm"
+    assert change(1e-4, 9.24e-5, "N m/rad") == "from 100 µN m/rad to 92.4 µN m/rad"
+    assert change(0.0, 0.02, "rad") == "from 0 rad to 20.0 mrad" and change(1.0, 1.0, "-") == "from 1 to 1"
