@@ -103,7 +103,7 @@ def _driven(recording: Recording, drive: Drive) -> list[tuple[str, float]]:
     """Sentences on the recorded drives, and how many times the device's own they are."""
     out = []
     for name, given in ({} if recording.by_step else recorded_signals(recording)).items():
-        most, own = _peak(as_signal(given)), _peak(drive[name]) if name in drive.signals else 0.0
+        most, own = _peak(as_signal(given, name=name)), _peak(drive[name]) if name in drive.signals else 0.0
         unit = UNITS.get(name) or UNITS[name.split("_")[0]]
         beside = f", {quantity(own, unit)} in the device's own drive" if own else ""
         if most:

@@ -22,8 +22,10 @@ from origami_sim import (
 )  # fmt: skip
 from origami_sim.errors import InputError
 from origami_sim.observation.compare import compare
+from origami_sim.observation.doubts import far_driven
 from origami_sim.observation.observe import check_scene, follow, observe, observe_equilibria
 from origami_sim.recording import applied_drive
+from origami_sim.recording.recording import Channel, DriveChannel, Recording
 
 
 def puller(panels="elastic"):
@@ -152,3 +154,13 @@ def test_runs_and_designs_keep_their_grips(tmp_path):
         again = simulate(*built, design.drive, duration=0.05, rate=200)
         np.testing.assert_allclose(again.x, run.x, atol=1e-12)
     run.plot()
+
+
+def test_the_path_of_a_grip_is_held_against_that_of_the_device():
+    """What is said of drives in other units reads paths, which are smooth, like any drive."""
+    times = np.arange(20) / 100.0
+    path = DriveChannel("turn_motor", 0.2 * np.sin(10.0 * times), "rad", False)
+    fold = Channel("fold", "crease_angle", np.zeros(20), "rad", 1e-3, {"crease": 0})
+    recording = Recording("turned", times, {"fold": fold}, {"turn_motor": path})
+    assert not far_driven(recording, Drive(turns={"motor": 0.1}))
+    assert "turn_motor" in far_driven(recording, Drive(turns={"motor": 1e-5}))[0].lower()
