@@ -5,7 +5,7 @@ effect: dry friction that holds a crease back is as a weaker magnet. And a numbe
 at which friction yields, may have several values from which a fit goes no further.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from origami_sim.fit.least_squares import UTMOST, Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import PLAUSIBLE, Free, Hypothesis, Suspect
+from origami_sim.hypotheses.suspects import CONSTANTS
 from origami_sim.infer.placement import LEADING
 from origami_sim.infer.profile import along_numbers, missed
 from origami_sim.infer.screen import LATE, LEAST, MOST, ROUNDS, Signature, rated, simulated_at
@@ -176,6 +177,9 @@ def at_their_strengths(
 
     out, whole = list(signatures), 0.5 * float(rest @ rest)
     best = {n: explained(s) for n, s in enumerate(out) if s.parts and not s.status}
+    for n, new in _at_other_times(forward, {n: out[n] for n in best}, base, weights):
+        if all(np.all(np.isfinite(p)) for p in new.parts) and (then := explained(new))[0] < best[n][0]:
+            out[n], best[n] = new, then
     for _ in range(ROUNDS):
         leading = sorted(best, key=lambda n: best[n][0])[:LEADING]
         apart = {n: np.abs(best[n][1]) for n in leading if n not in settled}
@@ -190,6 +194,27 @@ def at_their_strengths(
             else:
                 settled.add(n)
     return rated(out, base)
+
+
+def _at_other_times(
+    forward: Predictor, signatures: Mapping[int, Signature], base: Fit, weights: Weights
+) -> list[tuple[int, Signature]]:
+    """Signatures of which the strength is a time, as of a lag, at as many as a time constant is suspected with.
+
+    A lag of milliseconds shows in the frame of a switch alone, and tells nothing of one of seconds.
+    """
+    steps = [float(np.median(np.diff(r.times))) for r in forward.recordings]
+    longest = max(float(np.ptp(r.times)) for r in forward.recordings)
+    known, each = [], []
+    for n, s in signatures.items():
+        if all(f.unit == "s" for f in s.suspect.strengths):
+            for time in np.geomspace(min(steps), longest, CONSTANTS + 2)[1:-1]:
+                factors = time / s.size
+                if np.all(np.abs(factors) > MOST):
+                    both = (factors, -factors) if s.side == 0 else (np.abs(factors),)
+                    known += [n] * len(both)
+                    each += both
+    return list(zip(known, simulated_at(forward, [signatures[n] for n in known], each, base, weights), strict=True))
 
 
 def over_their_range(
@@ -207,8 +232,9 @@ def over_their_range(
     """
     about = Cleared(base, weights)
     for n, s in enumerate(suspects):
-        if progress:
-            progress(n / len(suspects))
+        if progress and progress(n / len(suspects)) is False:  # out of time
+            yield from [None] * (len(suspects) - n)
+            return
         thetas = [np.concatenate([base.theta, values]) for values in over_range(s, grid)]
         best = _best_of(forward, base, about, base.hypothesis.plus(s), thetas)
         yield best[:2] if best else None

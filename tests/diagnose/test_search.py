@@ -23,6 +23,7 @@ from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
+from origami_sim.infer import scan
 from origami_sim.infer.components import with_single_components
 from origami_sim.infer.placement import forget
 from origami_sim.infer.posterior import marginals
@@ -413,3 +414,19 @@ def test_an_effect_that_can_act_at_one_crease_is_no_suspect_at_all_of_them():
     assert acting == {f"crease_friction at {site}" for site in ("crease 0", "crease 1", "all creases")} | {
         "strain_permittivity at crease 0"
     }
+
+
+def test_a_scan_of_strengths_ends_with_the_time(monkeypatch):
+    """A search went on for as long as its limit again, as the scan told its progress and did not hear the answer."""
+    monkeypatch.setattr(scan, "Cleared", lambda *of: None)
+    monkeypatch.setattr(scan, "over_range", lambda suspect, grid: [np.zeros(0)])
+    monkeypatch.setattr(scan, "_best_of", lambda *of: (np.zeros(0), 1.0, np.zeros(0)))
+    told = []
+
+    def progress(part):
+        told.append(part)
+        return part < 0.5
+
+    base = SimpleNamespace(theta=np.zeros(0), hypothesis=SimpleNamespace(plus=lambda s: s))
+    found = list(scan.over_their_range(None, [None] * 4, base, None, progress))
+    assert [one is not None for one in found] == [True, True, False, False] and told == [0.0, 0.25, 0.5]
