@@ -471,7 +471,7 @@ def _text(d: Diagnosis, files: Mapping[str, list[Path] | Path], scene: str) -> l
         bound = ", at its bound" if n.at_bound else ""
         unit = "" if n.unit in ("-", "1", ANY) else f" {n.unit}"
         interval = f", 95 % interval {n.low:.4g} to {n.high:.4g}" if n.low < n.high else ""
-        lines.append(f"  {n.label} = {n.value:.4g}{unit}{interval}{bound}")
+        lines.append(f"  {n.label} = {n.value:.4g}{unit}{n.each}{interval}{bound}")
     which = "held out" if d.left_out else "fitted"
     lines += ["", f"{f'rms error, {which}':24s} {'noise':>10s} {'as given':>10s} {'refitted':>10s} {'explained':>10s}"]
     rows = zip(d.components, d.units, d.noise, d.error_before, d.error_refitted, d.error_after, strict=True)

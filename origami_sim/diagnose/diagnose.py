@@ -17,7 +17,7 @@ from origami_sim.diagnose.closed_loop import closed_loop
 from origami_sim.diagnose.experiment import explanations, propose
 from origami_sim.diagnose.keep import Keep
 from origami_sim.diagnose.later import Part, add, attempt
-from origami_sim.diagnose.observed import unobserved
+from origami_sim.diagnose.observed import beyond_the_log, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import Recorded, among, gathered
 from origami_sim.diagnose.tables import by_fold, correlations, patch, suspected, table, traces
@@ -173,7 +173,7 @@ def _diagnosed(
     best = judged.best
     if keep is not None:
         keep.fits = {"before": given, "refitted": base, "after": best}
-    noted = list(dict.fromkeys([*judged.notes, *noted]))
+    noted = list(dict.fromkeys([*judged.notes, *noted, *beyond_the_log(forward, best)]))
     nowhere, left_out = np.full(len(forward.components), np.nan), "Held-out error could not be told"
 
     def error(f: Fit) -> tuple[np.ndarray, list[str]]:

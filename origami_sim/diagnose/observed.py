@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from origami_sim.effects import CATALOGUE
 from origami_sim.errors import InputError
+from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
 from origami_sim.model import Model
 from origami_sim.observation.attachments import body_point, index_of, panel_of
@@ -27,6 +29,10 @@ OFF = 20.0
 
 TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""
+
+
+RESTS = 1e-3
+"""Part of its range by which a drive may still change where it is said to rest: that of a good supply."""
 
 
 def unobserved(forward: Predictor) -> str | None:
@@ -64,6 +70,39 @@ def unobserved(forward: Predictor) -> str | None:
         return None
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}: what is missing there can be told only by its effect on the rest."
+
+
+def beyond_the_log(forward: Predictor, f: Fit) -> list[str]:
+    """A sentence for each recording of which a clock that is off takes frames past the end of a drive that still moves.
+
+    There the drive is held at its last value, which it did not do.
+    """
+    out = []
+    for r, recording in enumerate(forward.recordings):
+        if recording.by_step:
+            continue
+        times, clocks = recording.times - recording.times[0], dict[str, dict[str, np.ndarray]]()
+        for n, value in zip(f.free, f.theta, strict=True):
+            owner, _, name = n.label.partition(".") if n.aligned else (n.owner, "", n.name)
+            law = CATALOGUE.get(owner) if n.recording in (None, r) else None
+            if law and law.family == "measurement" and not law.channels and law.apply is not None:
+                clocks.setdefault(owner, {})[name] = np.array([value])
+        taken = times.copy()
+        for owner, values in clocks.items():
+            taken += CATALOGUE[owner].apply(lambda t: t, times, **values) - times
+        for drive in recording.drive.values():
+            own = recording.times if drive.times is None else drive.times
+            late = taken > own[-1] - recording.times[0] + 0.5 * float(np.median(np.diff(times)))
+            if drive.constant or not np.any(late):
+                continue
+            past = float(taken[-1] - own[-1] + recording.times[0])
+            last = np.asarray(drive.values)[own >= own[-1] - 2.0 * past]
+            if np.any(np.ptp(last, axis=0) > RESTS * np.ptp(drive.values, axis=0)):
+                out.append(
+                    f"The clock takes the last {np.sum(late)} frames of {recording.name} up to {past:.2g} s past the "
+                    f"end of the recorded {drive.name}, which is taken as held there: leave them out, or log it longer."
+                )
+    return out
 
 
 def check_recording(recording: Recording, model: Model) -> None:

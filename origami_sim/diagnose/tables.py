@@ -94,7 +94,7 @@ def numbers(f: Fit) -> list[Number]:
     """Numbers that suspects fix, then fitted ones with 95 % intervals; no coefficients of a moment without a law."""
     given = [Number(f"{s.effect}.{n}", "-", v, v, v, v, 0.0, False) for s in f.hypothesis.suspects for n, v in s.fixed]
     return given + [
-        Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away))
+        Number(n.label, n.unit, float(t), float(low), float(high), n.start, n.spread, bool(b), float(away), n.nodes)
         for n, t, low, high, away, b in zip(f.free, f.theta, *f.intervals(), f.strain, f.at_bound, strict=True)
         if n.owner != UNLISTED
     ]

@@ -68,7 +68,7 @@ def _text(e: Estimate, made: Mapping[str, Path], scene: str) -> list[str]:
         known = "" if not np.isfinite(n.away) else f"{n.prior:.4g}, {n.away:.1f} sd away"
         bound = "   at its bound" if n.at_bound else ""
         value, low, high = (f"{v:.{_digits(n)}g}" for v in (n.value, n.low, n.high))
-        lines.append(f"{n.label + unit:44s} {value:>12s}   {f'{low} to {high}':26s} {known}{bound}")
+        lines.append(f"{n.label + unit:44s} {value:>12s}   {f'{low} to {high}':26s} {known}{bound}{n.each}")
     if (pair := e.strongest_correlation()) is not None:
         lines += ["", f"correlated most: {pair[0]} and {pair[1]} ({pair[2]:+.3f})"]
     if e.effects:

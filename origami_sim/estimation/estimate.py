@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from origami_sim.diagnose.arrange import arranged, shortened
-from origami_sim.diagnose.observed import unobserved
+from origami_sim.diagnose.observed import beyond_the_log, unobserved
 from origami_sim.diagnose.options import Options, Report
 from origami_sim.diagnose.prepare import Recorded, gathered
 from origami_sim.diagnose.tables import numbers, patch, traces
@@ -181,6 +181,7 @@ def _estimated(
         tell("fit", n / len(wanted))
         found = _with(forward, found, variants)
     found = _in_own_noise(forward, found)
+    notes += beyond_the_log(forward, found)
     tell("held out", 0.0)
     try:
         held_out = predicted(forward, refitted(forward, found), level(forward, found)).rms

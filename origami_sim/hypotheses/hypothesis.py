@@ -53,6 +53,11 @@ class Free:
         own = f"{self.owner}.{self.name}" if self.owner else self.name
         return own if self.recording is None else f"{own} of recording {self.recording + 1}"
 
+    @property
+    def nodes(self) -> int:
+        """Nodes that have so much each, of a mass that is added; 1 of other numbers."""
+        return len(self.entities) if self.entities and self.unit == "kg" and get(self.owner).family == "node" else 1
+
 
 @dataclass(frozen=True)
 class Suspect:

@@ -30,6 +30,7 @@ class Number:
         prior, spread: value and standard deviation of what was known before (inf: nothing was); of a positive scale,
             such as a time constant, the deviation is that of its logarithm; see `Coordinates`.
         away: how far it is from there, in standard deviations (nan: nothing was known).
+        nodes: that have so much each, of a mass that is added.
     """
 
     label: str
@@ -41,6 +42,12 @@ class Number:
     spread: float
     at_bound: bool
     away: float = float("nan")
+    nodes: int = 1
+
+    @property
+    def each(self) -> str:
+        """How many have so much, in words; "" where it is one."""
+        return f" at each of {self.nodes} nodes" if self.nodes > 1 else ""
 
 
 @dataclass

@@ -38,12 +38,11 @@ def say(f: Fit, *, only: Collection[str] | None = None) -> str:
     for s in every:
         n = max(s.strengths, key=lambda n: abs(value[id(n)]) / max(deviation[id(n)], 1e-300))
         mass = n.unit == "kg" and get(s.effect).family == "node"
-        nodes = len(n.entities) if mass and n.entities else 1
-        t, d = nodes * value[id(n)], nodes * deviation[id(n)]
+        t, d = n.nodes * value[id(n)], n.nodes * deviation[id(n)]
         digits = 2 + int(np.clip(np.log10(0.5 * abs(t) / max(d, 1e-300)), 0, 4)) if t else 2
-        low, high = (said(nodes * v, n.unit, digits) for v in ends[id(n)])
+        low, high = (said(n.nodes * v, n.unit, digits) for v in ends[id(n)])
         what = f"{'more' if t > 0 else 'less'} {title(s.effect)} than stated" if s.more else title(s.effect)
-        at_each = " in all" if nodes > 1 else " at each node" if mass and not n.entities else ""
+        at_each = " in all" if n.nodes > 1 else " at each node" if mass and not n.entities else ""
         strength = f"{_named(n, s)} {said(t, n.unit, digits)}{at_each}"
         where = f"at {s.site} " if s.site not in WHOLE else ""
         interval = f", 95 %: {low} to {high}" if len(every) <= 2 else ""

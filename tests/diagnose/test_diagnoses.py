@@ -228,5 +228,6 @@ def test_an_effect_that_numbers_absorbed_is_found_beside_one_that_is_known(tmp_p
     found = diagnose(module, [Recording("swing", motion.times, channels)], catalogue=some, priors=priors)
     assert found.verdict == "SEVERAL" and set(found.candidates[0].effects) == {"air_drag", "added_mass"}
     of = {n.label: n for n in found.candidates[0].numbers}
+    assert of["added_mass.added"].each == " at each of 2 nodes"
     for label, true in (("air_drag.drag_coefficient", 2.0), ("added_mass.added", 2e-5)):
         assert of[label].low < true < of[label].high

@@ -1,14 +1,16 @@
 """Folds that no channel shows are named; a recording that shows nothing is refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
-from origami_sim.diagnose.observed import channel_tangents, check_recording, in_ranges, unobserved
+from origami_sim.diagnose.observed import beyond_the_log, channel_tangents, check_recording, in_ranges, unobserved
 from origami_sim.errors import InputError
+from origami_sim.hypotheses.hypothesis import Free
 from origami_sim.observation.doubts import slow_frames
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.curves import Static
@@ -46,6 +48,31 @@ def test_a_fold_below_the_last_marker_is_named():
     assert sentence is not None and sentence.startswith("No channel shows crease 2: ")
     sentence = unobserved(seen_by("fold3"))
     assert sentence is not None and sentence.startswith("No channel shows crease 0 and crease 1: ")
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "value", "log", "after", "late"),
+    [
+        ("clock_delay", "clock_delay", -0.03, 0.0, 1.0, 3),
+        ("clock_delay", "clock_delay", -0.03, 0.5, 1.0, None),  # the log goes on
+        ("clock_delay", "clock_delay", -0.03, 0.0, 0.3, None),  # the drive rests by then
+        ("clock_delay", "clock_delay", 0.03, 0.0, 1.0, None),  # frames before the first see the drive's first value
+        ("clock_rate", "clock_rate", 0.05, 0.0, 1.0, 2),
+        ("angle_offset", "offset", 0.03, 0.0, 1.0, None),  # no clock
+    ],
+)
+def test_frames_past_the_end_of_a_drive_that_moves_are_told(effect, name, value, log, after, late):
+    """There it is held at its last value, which took a delay of 30 ms four of its deviations from the truth."""
+    times = SWING.times - SWING.times[0]
+    own = np.arange(0.0, times[-1] + log + 1e-9, 0.01)
+    field = np.sin(20.0 * np.minimum(own, after))
+    drive = DriveChannel("field_z", field, "T", False, own + SWING.times[0])
+    forward = SimpleNamespace(recordings=[replace(SWING, drive={"field_z": drive})])
+    number = Free(effect, name, "s", 0.0, 0.01)
+    told = beyond_the_log(forward, SimpleNamespace(free=[number], theta=np.array([value])))
+    assert len(told) == (late is not None)
+    if late:
+        assert f"the last {late} frames" in told[0] and "past the end of the recorded field_z" in told[0]
 
 
 def test_folds_that_only_add_up_are_named_as_such():

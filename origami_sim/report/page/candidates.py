@@ -89,7 +89,7 @@ def _number(n: Number, *, owner: bool) -> Html:
         interval(known(n.value), known(n.low), known(n.high), n.unit) if sided else amount(known(n.value), n.unit, 3)
     )
     name = element("span", number_of(n.label, owner=owner), class_="name")
-    return element("div", name, f" {value} ", bound, before, class_="fitted")
+    return element("div", name, f" {value}{n.each} ", bound, before, class_="fitted")
 
 
 def _sentence(text: str) -> str:
