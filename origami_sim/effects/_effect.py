@@ -79,7 +79,8 @@ class Parameter:
             the first (arguments `buffer` and `<name>`).
         typical: a value at which the effect is noticeable on a device of some grams and centimetres; the diagnosis
             starts there, and sets those parameters to it that it does not fit.
-        threshold: of what it is one, "fold", "field" or "voltage"; the diagnosis starts within what was recorded of it.
+        threshold: of what it is one, "fold", "moment" (of a crease), "field" or "voltage"; the diagnosis starts within
+            what was recorded of it.
         takes: the parameter "effect.name" to which it is added, and of which it takes away no more than there is.
         side: parameter that says on which side of this threshold the law acts, 1 above and -1 below.
     """

@@ -75,7 +75,10 @@ EFFECT = Effect(
             "softening", "s", "-", 0.0, (0.0, 1.0),
             "share of the stiffness that is lost while it yields; 1: it flows at a constant moment", typical=0.7,
         ),
-        Parameter("yield_moment", "My", "N m", 0.0, (0.0, math.inf), "moment at which it yields first", typical=2e-4),
+        Parameter(
+            "yield_moment", "My", "N m", 0.0, (0.0, math.inf), "moment at which it yields first", typical=2e-4,
+            threshold="moment",
+        ),
         Parameter(
             "isotropic", "b", "-", 0.0, (0.0, 1.0),
             "share of the hardening by which both limits grow; the rest shifts them", typical=0.0,

@@ -1,4 +1,4 @@
-"""Thresholds of suspected laws, begun within what was recorded: fold angles, fields and voltages.
+"""Thresholds of suspected laws, begun within what was recorded: fold angles, moments of creases, fields, voltages.
 
 A stop beyond all recorded angles changes nothing, so that no derivative tells of it.
 """
@@ -18,6 +18,12 @@ REACHED = (0.6, 0.9)
 
 A fit moves the threshold from there: half of both, and one of 0.75 alone, lead to the same verdict on a strip that
 meets a stop, and to its angle within 3 mrad.
+"""
+
+YIELDING = (0.2, 0.5)
+"""The same of the moment of a crease that would not yield; one that does turns as far at less.
+
+Half and double of both lead to the same moment and softening of a chain of which one crease yields.
 """
 
 
@@ -41,7 +47,7 @@ def within_reach(forward: Worlds, every: Sequence[Suspect]) -> list[Suspect]:
         above, below = (1.0, 0.0 if high > 0.0 else low, high), (-1.0, 0.0 if low < 0.0 else high, low)
         ways = (above, below) if p.side else ((1.0, 0.0, most),)
         for side, begin, end in ways:
-            for part in REACHED:
+            for part in YIELDING if p.threshold == "moment" else REACHED:
                 start = float(np.clip(begin + part * (end - begin), s.free[place].lower, s.free[place].upper))
                 known = replace(s.free[place], start=start, scale=0.1 * most, spread=most)
                 free = tuple(known if n == place else g for n, g in enumerate(s.free))
@@ -51,9 +57,13 @@ def within_reach(forward: Worlds, every: Sequence[Suspect]) -> list[Suspect]:
 
 def recorded(forward: Worlds, s: Suspect, quantity: str, folds: dict[int, np.ndarray]) -> np.ndarray:
     """All recorded values (n,) of the quantity that a suspect's threshold is of; none if recordings do not tell."""
-    if quantity == "fold":
-        mine = folds if s.entities is None else [c for c in s.entities if c in folds]
-        return np.concatenate([np.zeros(0), *(folds[c] for c in mine)])
+    if quantity in ("fold", "moment"):
+        mine = [c for c in folds if s.entities is None or c in s.entities]
+        seen = {c: folds[c] for c in mine}
+        if quantity == "moment":  # of the crease, as it is given
+            law = forward.parameters.of("crease") if "crease" in forward.model.effects else {}
+            seen = {c: law["stiffness"][c, 0] * (seen[c] - law["rest_angle"][c, 0]) for c in mine if law}
+        return np.concatenate([np.zeros(0), *seen.values()])
     signals = [
         c.at(r.times)
         for r in forward.recordings

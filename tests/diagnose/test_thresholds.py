@@ -26,7 +26,7 @@ def stopped():
     return record({"crease_contact": {"contact_stiffness": (2e-3, None), "contact_angle": (-STOP, None)}}, **SWING)
 
 
-def test_stops_and_contacts_begin_within_the_recorded_angles(stopped):
+def test_stops_contacts_and_yields_begin_within_what_was_recorded(stopped):
     forward, _ = arranged(subject(2), prepared([stopped], 200.0), Options())
     every = forward.admitted(suspects(forward.model, forward.recordings, forward.drive, forward.parameters))
     angles = stopped.channels["fold1"].values
@@ -35,6 +35,10 @@ def test_stops_and_contacts_begin_within_the_recorded_angles(stopped):
     assert starts["crease_stop"] == pytest.approx([0.6 * most, 0.9 * most], rel=0.02)
     sides = [0.6 * angles.max(), 0.9 * angles.max(), 0.6 * angles.min(), 0.9 * angles.min()]
     assert starts["crease_contact"] == pytest.approx(sides, rel=0.02)
+    law = {name: values[0, 0] for name, values in forward.parameters.of("crease").items()}
+    moment = law["stiffness"] * np.abs(angles - law["rest_angle"]).max()  # of a crease that does not yield
+    yields = [s.free[1].start for s in every if s.effect == "crease_yield"]
+    assert yields == pytest.approx([0.2 * moment, 0.5 * moment], rel=0.02)
     fixed = [s.fixed for s in every if s.effect == "crease_contact"]
     assert fixed == [(("contact_side", side),) for side in (1.0, 1.0, -1.0, -1.0)]
     (hysteresis, *_) = (s for s in every if s.effect == "crease_hysteresis")
