@@ -52,6 +52,10 @@ from origami_sim.verdict.stored import Stored
 ALONE = "One recording only: held-out data are stretches of the same recording, which share its errors."
 WHOLE = "One recording, which is predicted as a whole: nothing could be left out, and errors are of what was fitted."
 """Notes on the errors of a single recording."""
+SHORT = (
+    "Segments are as short as tells a start, as the refitted model is too far off for linear steps; where nothing "
+    "explains a recording, state longer ones (`--segment`): what sticks for long shows in these."
+)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads of their own would wait for each other
@@ -123,7 +127,7 @@ def _diagnosed(
     given, base, weights = nominal_fits(forward)
     if (finer := shortened(forward, base, o)) is not None:
         forward = finer
-        noted.append("Segments are as short as tells a start, as the refitted model is too far off for linear steps.")
+        noted.append(SHORT)
         if keep is not None:
             keep.follow(forward)
         given, base, weights = nominal_fits(forward)
