@@ -58,11 +58,10 @@ def within_reach(forward: Worlds, every: Sequence[Suspect]) -> list[Suspect]:
 def recorded(forward: Worlds, s: Suspect, quantity: str, folds: dict[int, np.ndarray]) -> np.ndarray:
     """All recorded values (n,) of the quantity that a suspect's threshold is of; none if recordings do not tell."""
     if quantity in ("fold", "moment"):
-        mine = [c for c in folds if s.entities is None or c in s.entities]
-        seen = {c: folds[c] for c in mine}
+        seen = {c: angles for c, angles in folds.items() if s.entities is None or c in s.entities}
         if quantity == "moment":  # of the crease, as it is given
             law = forward.parameters.of("crease") if "crease" in forward.model.effects else {}
-            seen = {c: law["stiffness"][c, 0] * (seen[c] - law["rest_angle"][c, 0]) for c in mine if law}
+            seen = {c: law["stiffness"][c, 0] * (a - law["rest_angle"][c, 0]) for c, a in seen.items() if law}
         return np.concatenate([np.zeros(0), *seen.values()])
     signals = [
         c.at(r.times)
