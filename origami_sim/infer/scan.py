@@ -175,15 +175,20 @@ def at_their_strengths(
         # the wrong way, a strength is next to none at its bound
         return float(found.cost), np.where(np.abs(found.x) < LEAST, 0.0, found.x)
 
+    def elsewhere(strengths: np.ndarray) -> bool:
+        """Whether a signature explains most at strengths, over its size, at which it was not simulated."""
+        x = np.abs(strengths)
+        return bool(np.any((x > 0.0) & ((x < 1.0 / MOST) | (x > MOST))))
+
     out, whole = list(signatures), 0.5 * float(rest @ rest)
     best = {n: explained(s) for n, s in enumerate(out) if s.parts and not s.status}
     for n, new in _at_other_times(forward, {n: out[n] for n in best}, base, weights):
-        if all(np.all(np.isfinite(p)) for p in new.parts) and (then := explained(new))[0] < best[n][0]:
+        then = explained(new) if all(np.all(np.isfinite(p)) for p in new.parts) else None
+        if then is not None and then[0] < best[n][0] and np.any(then[1]) and not elsewhere(then[1]):
             out[n], best[n] = new, then
     for _ in range(ROUNDS):
         leading = sorted(best, key=lambda n: best[n][0])[:LEADING]
-        apart = {n: np.abs(best[n][1]) for n in leading if n not in settled}
-        far = [n for n, x in apart.items() if np.any((x > 0.0) & ((x < 1.0 / MOST) | (x > MOST)))]
+        far = [n for n in leading if n not in settled and elsewhere(best[n][1])]
         if not far:
             break
         strengths = [best[n][1] for n in far]

@@ -231,3 +231,19 @@ def test_an_effect_that_numbers_absorbed_is_found_beside_one_that_is_known(tmp_p
     assert of["added_mass.added"].each == " at each of 2 nodes"
     for label, true in (("air_drag.drag_coefficient", 2.0), ("added_mass.added", 2e-5)):
         assert of[label].low < true < of[label].high
+
+
+def test_a_late_clock_promises_nothing_of_lags_at_which_it_was_not_simulated():
+    """A crease that rubs was a moment that no law gives, as clocks late by half a swing were said to explain more."""
+    size = {"panels": 3, "duration": 2.5, "rate": 80, "size": 0.6}
+    rubs = record({"crease_friction": {"friction_moment": (2e-5, [1])}}, **size)
+    some = (
+        "crease_friction",
+        "crease_stiffening",
+        "crease_quadratic_damping",
+        "crease_relaxation",
+        "clock_delay",
+        "tracker_lag",
+    )
+    found = diagnose(subject(3), [rubs], Options(threads=1), catalogue=some)
+    assert found.verdict == "MECHANISM" and found.chosen == ["crease_friction at crease 1"], found.sentence
