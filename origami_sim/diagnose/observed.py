@@ -89,7 +89,9 @@ def beyond_the_log(forward: Predictor, f: Fit) -> list[str]:
                 clocks.setdefault(owner, {})[name] = np.array([value])
         taken = times.copy()
         for owner, values in clocks.items():
-            taken += CATALOGUE[owner].apply(lambda t: t, times, **values) - times
+            read = CATALOGUE[owner].apply
+            assert read is not None  # as above
+            taken += read(lambda t: t, times, **values) - times
         for drive in recording.drive.values():
             own = recording.times if drive.times is None else drive.times
             late = taken > own[-1] - recording.times[0] + 0.5 * float(np.median(np.diff(times)))
