@@ -83,7 +83,7 @@ def beyond_the_log(forward: Predictor, f: Fit) -> list[str]:
             continue
         times, clocks = recording.times - recording.times[0], dict[str, dict[str, np.ndarray]]()
         for n, value in zip(f.free, f.theta, strict=True):
-            owner, _, name = n.label.partition(".") if n.aligned else (n.owner, "", n.name)
+            owner, _, name = n.name.partition(".") if n.aligned else (n.owner, "", n.name)
             law = CATALOGUE.get(owner) if n.recording in (None, r) else None
             if law and law.family == "measurement" and not law.channels and law.apply is not None:
                 clocks.setdefault(owner, {})[name] = np.array([value])

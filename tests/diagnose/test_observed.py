@@ -68,9 +68,10 @@ def test_frames_past_the_end_of_a_drive_that_moves_are_told(effect, name, value,
     field = np.sin(20.0 * np.minimum(own, after))
     drive = DriveChannel("field_z", field, "T", False, own + SWING.times[0])
     forward = SimpleNamespace(recordings=[replace(SWING, drive={"field_z": drive})])
-    number = Free(effect, name, "s", 0.0, 0.01)
-    told = beyond_the_log(forward, SimpleNamespace(free=[number], theta=np.array([value])))
-    assert len(told) == (late is not None)
+    alone = Free(effect, name, "s", 0.0, 0.01)
+    aligned = Free("", f"{effect}.{name}", "s", 0.0, 0.01, aligned=True, recording=0)
+    told, also = (beyond_the_log(forward, SimpleNamespace(free=[n], theta=np.array([value]))) for n in (alone, aligned))
+    assert told == also and len(told) == (late is not None)
     if late:
         assert f"the last {late} frames" in told[0] and "past the end of the recorded field_z" in told[0]
 
