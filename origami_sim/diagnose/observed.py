@@ -1,16 +1,20 @@
 """What of a device the channels of its recordings show at all."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from origami_sim.effects import CATALOGUE
 from origami_sim.errors import InputError
 from origami_sim.fit.least_squares import Fit
 from origami_sim.fit.predictor import Predictor
+from origami_sim.hypotheses.hypothesis import apply
 from origami_sim.model import Model
 from origami_sim.observation.attachments import body_point, index_of, panel_of
 from origami_sim.observation.channels import stacked
+from origami_sim.observation.thinning import BENDS
+from origami_sim.predict.begun import within
+from origami_sim.predict.measured import clock_of
 from origami_sim.predict.starts import channel_tangent, seen_first
 from origami_sim.recording import Channel, Recording
 from origami_sim.verdict.words import joined
@@ -29,10 +33,6 @@ OFF = 20.0
 
 TOGETHER = 1e-6
 """Change of the channels, over the largest, below which a mixture of folds counts as unseen."""
-
-
-RESTS = 1e-3
-"""Part of its range by which a drive may still change where it is said to rest: that of a good supply."""
 
 
 def unobserved(forward: Predictor) -> str | None:
@@ -73,7 +73,7 @@ def unobserved(forward: Predictor) -> str | None:
 
 
 def beyond_the_log(forward: Predictor, f: Fit) -> list[str]:
-    """A sentence for each recording of which a clock that is off takes frames past the end of a drive that still moves.
+    """A sentence for each drive past the end of whose log a clock that is off takes frames, while it still moves.
 
     There the drive is held at its last value, which it did not do.
     """
@@ -81,30 +81,32 @@ def beyond_the_log(forward: Predictor, f: Fit) -> list[str]:
     for r, recording in enumerate(forward.recordings):
         if recording.by_step:
             continue
-        times, clocks = recording.times - recording.times[0], dict[str, dict[str, np.ndarray]]()
-        for n, value in zip(f.free, f.theta, strict=True):
-            owner, _, name = n.name.partition(".") if n.aligned else (n.owner, "", n.name)
-            law = CATALOGUE.get(owner) if n.recording in (None, r) else None
-            if law and law.family == "measurement" and not law.channels and law.apply is not None:
-                clocks.setdefault(owner, {})[name] = np.array([value])
-        taken = times.copy()
-        for owner, values in clocks.items():
-            read = CATALOGUE[owner].apply
-            assert read is not None  # as above
-            taken += read(lambda t: t, times, **values) - times
+        times = recording.times - recording.times[0]
+        taken, frame = _taken(forward, f, r), float(np.median(np.diff(times)))
         for drive in recording.drive.values():
             own = recording.times if drive.times is None else drive.times
-            late = taken > own[-1] - recording.times[0] + 0.5 * float(np.median(np.diff(times)))
-            if drive.constant or not np.any(late):
+            past = taken - (own[-1] - recording.times[0])
+            late = int(np.sum(past > 0.5 * frame))
+            if drive.constant or not late:
                 continue
-            past = float(taken[-1] - own[-1] + recording.times[0])
-            last = np.asarray(drive.values)[own >= own[-1] - 2.0 * past]
-            if np.any(np.ptp(last, axis=0) > RESTS * np.ptp(drive.values, axis=0)):
+            last = np.asarray(drive.values)[own >= own[-1] - 2.0 * past.max()]
+            if np.any(np.ptp(last, axis=0) > BENDS * np.ptp(drive.values, axis=0)):
                 out.append(
-                    f"The clock takes the last {np.sum(late)} frames of {recording.name} up to {past:.2g} s past the "
-                    f"end of the recorded {drive.name}, which is taken as held there: leave them out, or log it longer."
+                    f"The clock takes the last {late} frames of {recording.name} up to {past.max():.2g} s past the end "
+                    f"of the recorded {drive.name}, which is taken as held there: leave them out, or log it longer."
                 )
     return out
+
+
+def _taken(forward: Predictor, f: Fit, r: int) -> np.ndarray:
+    """(n,) when the frames of a recording were taken by the clock of its drives, of the channel that is latest [s]."""
+    recording, names = forward.recordings[r], [n.name for n in forward.subject.nominals]
+    hypothesis, values = within(f.hypothesis, f.theta, len(names), r)
+    model, parameters, _ = forward.subject.build(dict(zip(names, values[: len(names)].tolist(), strict=True)))
+    model = replace(model.with_effects(*hypothesis.effects), channels=len(recording.channels))
+    parameters = apply(parameters, hypothesis, values[len(names) :], model)
+    times, channels = recording.times - recording.times[0], range(len(recording.channels))
+    return np.max([clock_of(model, parameters, 1, c, times)[:, 0] for c in channels], axis=0)
 
 
 def check_recording(recording: Recording, model: Model) -> None:

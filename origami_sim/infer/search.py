@@ -99,10 +99,8 @@ def _about_given(out: Posterior, forward: Predictor, base: Fit, given: Fit) -> N
     """Enters what single effects promise about the model as given, where the refit left its numbers' priors."""
     by = level(forward, base)
     given = fit(forward, Hypothesis(), by, local=given.local, most=0)  # with derivatives by its numbers
-    about = screen(forward, [s.suspect for s in out.signatures], given, by)
-    of = {s.suspect.form: s for s in about}  # their strengths have another scale here
-    alone = {k: of.get(out.suspect(n).form) for k in out.estimates if len(k) == 1 for n in k}
-    known = {k: s for k, s in alone.items() if s is not None}
+    about = _screened(out, forward, range(len(out.signatures)), given, by)  # strengths have another scale here
+    known = {k: about[n] for k in out.estimates if len(k) == 1 for n in k if n in about}
     _promised(out, list(known), from_given_numbers(forward, list(known.values()), given, base, by))
 
 
@@ -151,17 +149,25 @@ def screened_beside(out: Posterior, forward: Predictor, going_on: GoingOn) -> bo
         return False
     f, others = out.nodes[key].fit, out.nodes[key].others
     mine = [n for n in others if out.suspect(n).effect not in out.effects(key) and not out.signatures[n].status]
-    told = lambda: going_on(0.0, out)  # noqa: E731
-    about = {
-        s.suspect.form: s
-        for s in screen(forward, [out.suspect(n) for n in mine], f, out.weights, going_on=told)
-        if s.parts and not s.status
-    }
-    known = {n: about.get(out.suspect(n).form) for n in mine}
+    about = _screened(out, forward, mine, f, out.weights, lambda: going_on(0.0, out))
     # in the units that they had, in which what was estimated about other fits remains
-    out.about[key] = {n: s.of(out.suspect(n)) for n, s in known.items() if s is not None}
+    out.about[key] = {n: s.of(out.suspect(n)) for n, s in about.items() if s.parts and not s.status}
     _add(out, forward, key, f, log_priors(out.signatures))
     return True
+
+
+def _screened(
+    out: Posterior,
+    forward: Predictor,
+    some: Sequence[int],
+    f: Fit,
+    weights: Weights,
+    going_on: Callable[[], bool] = lambda: True,
+) -> dict[int, Signature]:
+    """Signatures of some suspects about a fit."""
+    about = screen(forward, [out.suspect(n) for n in some], f, weights, going_on=going_on)
+    of = {s.suspect.form: s for s in about}
+    return {n: of[form] for n in some if (form := out.suspect(n).form) in of}
 
 
 def beyond_the_catalogue(out: Posterior, forward: Predictor) -> None:

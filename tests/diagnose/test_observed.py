@@ -10,7 +10,9 @@ from origami_sim.device.scene import scene_module, scene_settings
 from origami_sim.diagnose import Subject
 from origami_sim.diagnose.observed import beyond_the_log, channel_tangents, check_recording, in_ranges, unobserved
 from origami_sim.errors import InputError
-from origami_sim.hypotheses.hypothesis import Free
+from origami_sim.hypotheses.hypothesis import Hypothesis
+from origami_sim.hypotheses.subject import alignments
+from origami_sim.hypotheses.suspects import suspects
 from origami_sim.observation.doubts import slow_frames
 from origami_sim.predict.bars import BarRollouts
 from origami_sim.predict.curves import Static
@@ -51,27 +53,30 @@ def test_a_fold_below_the_last_marker_is_named():
 
 
 @pytest.mark.parametrize(
-    ("effect", "name", "value", "log", "after", "late"),
+    ("label", "value", "log", "after", "late"),
     [
-        ("clock_delay", "clock_delay", -0.03, 0.0, 1.0, 3),
-        ("clock_delay", "clock_delay", -0.03, 0.5, 1.0, None),  # the log goes on
-        ("clock_delay", "clock_delay", -0.03, 0.0, 0.3, None),  # the drive rests by then
-        ("clock_delay", "clock_delay", 0.03, 0.0, 1.0, None),  # frames before the first see the drive's first value
-        ("clock_rate", "clock_rate", 0.05, 0.0, 1.0, 2),
-        ("angle_offset", "offset", 0.03, 0.0, 1.0, None),  # no clock
+        ("clock_delay at the measurement", -0.03, 0.0, 1.0, 3),
+        ("clock_delay at channel fold2", -0.03, 0.0, 1.0, 3),
+        ("clock_delay at the measurement", -0.03, 0.5, 1.0, None),  # the log goes on
+        ("clock_delay at the measurement", -0.03, 0.0, 0.3, None),  # the drive rests by then
+        ("clock_delay at the measurement", 0.03, 0.0, 1.0, None),  # frames before the first see the drive's first value
+        ("clock_rate at the measurement", 0.05, 0.0, 1.0, 2),
+        ("angle_offset at the measurement", 0.03, 0.0, 1.0, None),  # no clock
+        ("clock_delay.clock_delay", -0.03, 0.0, 1.0, 3),  # aligned, with a prior
     ],
 )
-def test_frames_past_the_end_of_a_drive_that_moves_are_told(effect, name, value, log, after, late):
-    """There it is held at its last value, which took a delay of 30 ms four of its deviations from the truth."""
-    times = SWING.times - SWING.times[0]
-    own = np.arange(0.0, times[-1] + log + 1e-9, 0.01)
-    field = np.sin(20.0 * np.minimum(own, after))
-    drive = DriveChannel("field_z", field, "T", False, own + SWING.times[0])
-    forward = SimpleNamespace(recordings=[replace(SWING, drive={"field_z": drive})])
-    alone = Free(effect, name, "s", 0.0, 0.01)
-    aligned = Free("", f"{effect}.{name}", "s", 0.0, 0.01, aligned=True, recording=0)
-    told, also = (beyond_the_log(forward, SimpleNamespace(free=[n], theta=np.array([value]))) for n in (alone, aligned))
-    assert told == also and len(told) == (late is not None)
+def test_frames_past_the_end_of_a_drive_that_moves_are_told(label, value, log, after, late):
+    """There it is held at its last value, which took a delay of 30 ms three of its deviations from the truth."""
+    own = np.arange(0.0, np.ptp(SWING.times) + log + 1e-9, 0.01)
+    drive = DriveChannel("field_z", np.sin(20.0 * np.minimum(own, after)), "T", False, own + SWING.times[0])
+    swing = replace(SWING, drive={"field_z": drive})
+    priors = {label: "10 ms"} if "." in label else {}
+    asked = Subject.from_model(MODEL, PARAMETERS).beside(alignments(priors))
+    forward = BarRollouts(asked, [swing], segment=0.2)
+    every = {s.label: s for s in suspects(MODEL, [swing], forward.drive)}
+    hypothesis = Hypothesis(() if priors else (every[label],))
+    told = beyond_the_log(forward, SimpleNamespace(hypothesis=hypothesis, theta=np.array([value])))
+    assert len(told) == (late is not None)
     if late:
         assert f"the last {late} frames" in told[0] and "past the end of the recorded field_z" in told[0]
 

@@ -23,11 +23,10 @@ from origami_sim.fit.nominal import nominal_fits
 from origami_sim.fit.weights import Weights
 from origami_sim.hypotheses.hypothesis import Hypothesis
 from origami_sim.hypotheses.suspects import suspects
-from origami_sim.infer import scan
 from origami_sim.infer.components import with_single_components
 from origami_sim.infer.placement import forget
 from origami_sim.infer.posterior import marginals
-from origami_sim.infer.scan import at_their_strengths, over_shapes
+from origami_sim.infer.scan import at_their_strengths, over_shapes, over_their_range
 from origami_sim.infer.screen import screen
 from origami_sim.infer.search import better_within, continued_from, search
 from origami_sim.pattern import strip
@@ -416,17 +415,16 @@ def test_an_effect_that_can_act_at_one_crease_is_no_suspect_at_all_of_them():
     }
 
 
-def test_a_scan_of_strengths_ends_with_the_time(monkeypatch):
+def test_a_scan_of_strengths_ends_with_the_time(rubbing):
     """A search went on for as long as its limit again, as the scan told its progress and did not hear the answer."""
-    monkeypatch.setattr(scan, "Cleared", lambda *of: None)
-    monkeypatch.setattr(scan, "over_range", lambda suspect, grid: [np.zeros(0)])
-    monkeypatch.setattr(scan, "_best_of", lambda *of: (np.zeros(0), 1.0, np.zeros(0)))
-    told = []
+    forward, _, base, weights, signatures = rubbing
+    some, told = [s.suspect for s in signatures if s.suspect.effect == "crease_friction"], []
 
-    def progress(part):
+    def progress(part: float) -> bool:
         told.append(part)
         return part < 0.5
 
-    base = SimpleNamespace(theta=np.zeros(0), hypothesis=SimpleNamespace(plus=lambda s: s))
-    found = list(scan.over_their_range(None, [None] * 4, base, None, progress))
-    assert [one is not None for one in found] == [True, True, False, False] and told == [0.0, 0.25, 0.5]
+    found = list(over_their_range(forward, some, base, weights, progress))
+    rubs = [s.label for s in some].index("crease_friction at crease 1")
+    assert len(found) == len(some) == 3 and rubs == 1 and told == [0.0, 1 / 3, 2 / 3]
+    assert found[rubs] is not None and found[2] is None
